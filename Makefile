@@ -1,0 +1,25 @@
+# The set-up is tools/workspace.py; every target below calls it first, and a finished set-up is recognised in a second.
+PYTHON ?= python3
+RUN := .venv/bin/ros-run
+
+.PHONY: setup demo test lint bench clean
+
+setup:
+	@$(PYTHON) tools/workspace.py
+
+demo: setup
+	@.venv/bin/texture demo --out out/demo
+
+lint: setup
+	@$(RUN) ruff check .
+	@$(RUN) ruff format --check .
+	@$(RUN) mypy
+
+test: setup lint
+	@$(RUN) python -m pytest
+
+bench: setup
+	@.venv/bin/texture bench all
+
+clean:
+	rm -rf .venv build install log out .mypy_cache .ruff_cache .pytest_cache

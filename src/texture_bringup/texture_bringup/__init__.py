@@ -1,0 +1,1 @@
+"""Launch files, configuration, the stand-alone launcher and the texture command."""

@@ -1,0 +1,1 @@
+"""Data types, parameters, catalogues and ROS glue shared by all packages of the suite."""

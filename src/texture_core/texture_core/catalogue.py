@@ -1,0 +1,45 @@
+"""Look a choice up by name: in a table of the suite, or as 'module:Class' of the user's own."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+from texture_core.errors import UnknownName
+
+T = TypeVar('T')
+
+
+def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
+    """Return the entry called `name`; `kind` is the noun for the error sentence, such as 'feature'.
+
+    A name with a colon is imported: 'my_package.my_module:MyFeature'.
+
+    Raises
+    ------
+    UnknownName
+        With the nearest known name.
+    """
+    if ':' in name:
+        return _import(name, kind)  # type: ignore[return-value]
+    if name not in catalogue:
+        raise unknown(name, catalogue, kind)
+    return catalogue[name]
+
+
+def unknown(name: str, known: Iterable[str], kind: str) -> UnknownName:
+    """Return the error for a name that is not among the known ones, with the nearest of them."""
+    names = sorted(known)
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"; did you mean '{near[0]}'?" if near else '.'
+    return UnknownName(f"no {kind} '{name}'{hint} Known: {', '.join(names) or 'none'}")
+
+
+def _import(name: str, kind: str) -> Any:
+    module, _, attribute = name.partition(':')
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise UnknownName(f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported") from error

@@ -1,0 +1,35 @@
+"""What can go wrong, each with one sentence for the user: what came, what is allowed, what to do."""
+
+from __future__ import annotations
+
+
+class TextureError(Exception):
+    """Base of all errors that a user can cause or meet; its text is shown to the user as it is."""
+
+
+class UnknownName(TextureError):
+    """A name that no catalogue knows."""
+
+
+class InvalidParameter(TextureError):
+    """A parameter of the wrong type or out of its range."""
+
+
+class InvalidData(TextureError):
+    """Samples, windows or recordings that cannot be used."""
+
+
+class ModelMismatch(TextureError):
+    """A model that does not fit the data, the recipe or the features it is given."""
+
+
+class DeviceError(TextureError):
+    """A device that cannot be reached or does not answer."""
+
+
+class MotionRefused(TextureError):
+    """A motion that is unknown, unsafe or impossible now."""
+
+
+class MotionAborted(TextureError):
+    """A motion that had begun and was ended early."""

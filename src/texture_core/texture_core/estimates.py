@@ -1,0 +1,42 @@
+"""What the suite concludes from touching a surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class TextureEstimate:
+    """What surface is being felt; label '' and no probabilities while there is no evidence."""
+
+    stamp_ns: int
+    exploration_id: str
+    label: str = ''
+    known: bool = False
+    confidence: float = math.nan
+    labels: tuple[str, ...] = ()
+    probabilities: tuple[float, ...] = ()
+    windows: int = 0
+    evidence_s: float = 0.0
+    final: bool = False
+    processing_s: float = 0.0
+    model: str = ''
+    message: str = ''
+
+
+@dataclass(frozen=True)
+class RoughnessEstimate:
+    """How rough the surface feels, 1 (smooth) to 5 (rough); not valid while there is no grade."""
+
+    stamp_ns: int
+    exploration_id: str
+    valid: bool = False
+    grade: float = math.nan
+    grade_std: float = math.nan
+    windows: int = 0
+    evidence_s: float = 0.0
+    final: bool = False
+    processing_s: float = 0.0
+    model: str = ''
+    message: str = ''

@@ -1,0 +1,58 @@
+"""What the exploring finger is asked to do, and what it is doing."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+
+class Phase(str, enum.Enum):
+    """Phase of an exploration; windows are cut from SLIDE alone."""
+
+    IDLE = 'idle'
+    APPROACH = 'approach'
+    CONTACT = 'contact'
+    SLIDE = 'slide'
+    LIFT = 'lift'
+    DONE = 'done'
+    ABORTED = 'aborted'
+
+
+ENDED = frozenset({Phase.IDLE, Phase.DONE, Phase.ABORTED})
+
+
+@dataclass(frozen=True)
+class ExplorationState:
+    """What the finger is doing from `stamp_ns` on; unknown numbers are NaN, unknown names ''.
+
+    `steady_s` is a promise: phase, speed and force hold at least so long after the stamp. It lets a window be used
+    the moment its last sample arrives, without waiting for the next state.
+    """
+
+    stamp_ns: int
+    exploration_id: str
+    motion: str
+    phase: Phase
+    steady_s: float = 0.0
+    speed_m_s: float = math.nan
+    force_n: float = math.nan
+    direction_rad: float = math.nan
+    progress: float = math.nan
+    surface: str = ''
+
+
+@dataclass(frozen=True)
+class ExplorationRequest:
+    """What an operator asks for; a number of 0 means the default of the motion."""
+
+    motion: str
+    speed_m_s: float = 0.0
+    force_n: float = 0.0
+    distance_m: float = 0.0
+    radius_m: float = 0.0
+    turns: float = 0.0
+    duration_s: float = 0.0
+    direction_rad: float = 0.0
+    surface: str = ''
+    stop_when_certain: bool = False

@@ -1,0 +1,131 @@
+"""A parameter exists once: as a field of a frozen dataclass with default, unit, range and description.
+
+ROS declaration (`texture_core.ros.parameters`), reading from YAML, validation and the README tables all come from it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import typing
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from texture_core.catalogue import unknown
+from texture_core.errors import InvalidParameter, UnknownName
+
+T = TypeVar('T')
+NOUNS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text'}
+
+
+def param(
+    default: Any,
+    description: str,
+    *,
+    unit: str = '',
+    low: float | None = None,
+    high: float | None = None,
+    choices: Sequence[str] = (),
+) -> Any:
+    """Return a dataclass field that knows its unit, range, choices and description."""
+    metadata = {'description': description, 'unit': unit, 'low': low, 'high': high, 'choices': tuple(choices)}
+    if isinstance(default, list):
+        return dataclasses.field(default_factory=lambda: list(default), metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameter:
+    """One parameter of a dataclass, as `parameters_of` lists it."""
+
+    name: str
+    type: type
+    default: Any
+    description: str
+    unit: str
+    low: float | None
+    high: float | None
+    choices: tuple[str, ...]
+
+    @property
+    def range_text(self) -> str:
+        """The allowed values in words, '' if all are."""
+        if self.choices:
+            return 'one of ' + ', '.join(self.choices)
+        unit = f' {self.unit}' if self.unit else ''
+        bounds = {
+            (True, True): f'{self.low} to {self.high}{unit}',
+            (True, False): f'at least {self.low}{unit}',
+            (False, True): f'at most {self.high}{unit}',
+            (False, False): '',
+        }
+        return bounds[self.low is not None, self.high is not None]
+
+    def check(self, value: Any) -> Any:
+        """Return the value in the parameter's type.
+
+        Raises
+        ------
+        InvalidParameter
+            If its type or range is wrong.
+        """
+        if self.type is list or typing.get_origin(self.type) is list:
+            return list(value)
+        if self.type is float and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        if not isinstance(value, self.type) or (self.type is not bool and isinstance(value, bool)):
+            raise InvalidParameter(f"parameter '{self.name}' is {value!r}; {NOUNS[self.type]} is needed")
+        self._check_range(value)
+        return value
+
+    def _check_range(self, value: Any) -> None:
+        below = self.low is not None and not value >= self.low
+        above = self.high is not None and not value <= self.high
+        unlisted = bool(self.choices) and value not in self.choices
+        if below or above or unlisted or (isinstance(value, float) and math.isnan(value)):
+            allowed = self.range_text or 'a number that is not NaN'
+            raise InvalidParameter(f"parameter '{self.name}' is {value!r}; allowed is {allowed}")
+
+
+def parameters_of(cls: type) -> list[Parameter]:
+    """Return the parameters of a dataclass in their order."""
+    types = typing.get_type_hints(cls)
+    listed = []
+    for item in dataclasses.fields(cls):
+        default = item.default_factory() if item.default_factory is not dataclasses.MISSING else item.default
+        meta = {'description': '', 'unit': '', 'low': None, 'high': None, 'choices': (), **item.metadata}
+        listed.append(Parameter(item.name, types[item.name], default, **meta))
+    return listed
+
+
+def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
+    """Build a parameter dataclass from a mapping (a YAML section); what is not named keeps its default.
+
+    Raises
+    ------
+    InvalidParameter
+        If a value has the wrong type or range, or a name is unknown (with the nearest known one).
+    """
+    known = {parameter.name: parameter for parameter in parameters_of(cls)}
+    place = f'{where}: ' if where else ''
+    if not isinstance(values, Mapping):
+        raise InvalidParameter(f'{place}came {values!r}; a mapping of parameter names to values is needed')
+    checked = {}
+    for name, value in values.items():
+        if name not in known:
+            raise InvalidParameter(f'{place}{unknown(str(name), known, "parameter")}')
+        try:
+            checked[name] = known[name].check(value)
+        except (InvalidParameter, UnknownName) as error:
+            raise InvalidParameter(f'{place}{error}') from error
+    return cls(**checked)
+
+
+def markdown_table(cls: type) -> str:
+    """Return the parameters of a dataclass as a Markdown table for a README."""
+    rows = ['| parameter | default | range | meaning |', '|---|---|---|---|']
+    for item in parameters_of(cls):
+        unit = f' {item.unit}' if item.unit else ''
+        default = f'`{item.default!r}`{unit}'
+        rows.append(f'| `{item.name}` | {default} | {item.range_text or "any"} | {item.description} |')
+    return '\n'.join(rows) + '\n'

@@ -1,0 +1,37 @@
+"""Find a file that a package of the suite ships, in the source tree or in an installation, without ROS."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from texture_core.catalogue import unknown
+
+SOURCE_TREE = Path(__file__).resolve().parents[2]
+
+
+def folder(package: str, name: str) -> Path:
+    """Return the folder `name` ('config/recipes') of a package; the first of the places that has it."""
+    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    places = [SOURCE_TREE / package, *(Path(prefix) / 'share' / package for prefix in prefixes if prefix)]
+    for place in places:
+        if (place / name).is_dir():
+            return place / name
+    return places[0] / name
+
+
+def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix: str = '.yaml') -> Path:
+    """Return the file a user means: a path, or the name of a file that the package ships in `subfolder`.
+
+    Raises
+    ------
+    UnknownName
+        If there is neither, with the nearest name; `kind` is the noun for the sentence, such as 'recipe'.
+    """
+    path = Path(name_or_path).expanduser()
+    if path.is_file():
+        return path
+    shipped = {item.stem: item for item in folder(package, subfolder).glob(f'*{suffix}')}
+    if name_or_path not in shipped:
+        raise unknown(name_or_path, shipped, kind)
+    return shipped[name_or_path]

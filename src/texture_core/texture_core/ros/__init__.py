@@ -1,0 +1,1 @@
+"""The only part of texture_core that imports ROS."""

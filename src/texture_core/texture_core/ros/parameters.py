@@ -1,0 +1,94 @@
+"""Declare the fields of a parameter dataclass as ROS parameters and read them back, checked."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.parameter import Parameter as RosParameter
+
+from texture_core.errors import InvalidParameter
+from texture_core.parameters import Parameter, from_mapping, parameters_of
+
+T = TypeVar('T')
+TYPES = {
+    bool: RosParameter.Type.BOOL,
+    int: RosParameter.Type.INTEGER,
+    float: RosParameter.Type.DOUBLE,
+    str: RosParameter.Type.STRING,
+    list[str]: RosParameter.Type.STRING_ARRAY,
+    list[float]: RosParameter.Type.DOUBLE_ARRAY,
+}
+UNBOUNDED = 1e300
+
+
+def declare(node: Any, cls: type[T]) -> T:
+    """Declare every field of `cls` with its description, unit and range; return the values the node was given.
+
+    Raises
+    ------
+    InvalidParameter
+        If a given value has the wrong type or range.
+    """
+    for item in parameters_of(cls):
+        if node.has_parameter(item.name):
+            continue
+        try:
+            node.declare_parameter(item.name, item.default, _descriptor(item))
+        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
+            raise InvalidParameter(
+                f"parameter '{item.name}' of node '{node.get_name()}' was refused: {error}; {_needed(item)}"
+            ) from error
+    return read(node, cls)
+
+
+def read(node: Any, cls: type[T]) -> T:
+    """Return the declared parameters of `cls` with their present values."""
+    return from_mapping(cls, {item.name: node.get_parameter(item.name).value for item in parameters_of(cls)})
+
+
+def on_change(node: Any, cls: type[T], apply: Callable[[T], None]) -> None:
+    """Call `apply` with the new values before a change of parameters is accepted; what it refuses is not set."""
+    known = {item.name for item in parameters_of(cls)}
+
+    def check(changes: list[RosParameter]) -> SetParametersResult:
+        changed = {change.name: change.value for change in changes if change.name in known}
+        if not changed:
+            return SetParametersResult(successful=True)
+        present = {name: node.get_parameter(name).value for name in known}
+        try:
+            apply(from_mapping(cls, {**present, **changed}))
+        except InvalidParameter as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    node.add_on_set_parameters_callback(check)
+
+
+def _needed(item: Parameter) -> str:
+    return f'{TYPES[item.type].name.lower()} {item.range_text}'.strip() + ' is needed'
+
+
+def _descriptor(item: Parameter) -> ParameterDescriptor:
+    unit = f' [{item.unit}]' if item.unit else ''
+    descriptor = ParameterDescriptor(
+        name=item.name,
+        type=TYPES[item.type].value,
+        description=f'{item.description}{unit}',
+        additional_constraints=item.range_text if item.choices else '',
+        # A YAML file may give 1 where 1.0 is meant; check() makes it a number of the right type.
+        dynamic_typing=False,
+    )
+    if item.low is None and item.high is None:
+        return descriptor
+    low = item.low if item.low is not None else -UNBOUNDED
+    high = item.high if item.high is not None else UNBOUNDED
+    if item.type is int:
+        limits = IntegerRange(from_value=int(max(low, -(2**62))), to_value=int(min(high, 2**62)))
+        descriptor.integer_range = [limits]
+    elif item.type is float or typing.get_origin(item.type) is None:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=float(low), to_value=float(high))]
+    return descriptor

@@ -1,0 +1,15 @@
+"""Quality of service of every topic of the suite, in one place."""
+
+from __future__ import annotations
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+# One second of 5 ms batches: a stalled subscriber loses samples, never holds the driver up.
+SENSOR_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.BEST_EFFORT)
+# Few and small, none may be missing: the end of an exploration travels in them.
+FEATURE_QOS = QoSProfile(depth=200, reliability=ReliabilityPolicy.RELIABLE)
+ESTIMATE_QOS = QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE)
+# A node that starts late learns at once what is going on.
+STATE_QOS = QoSProfile(
+    depth=200, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)

@@ -1,0 +1,77 @@
+"""A batch of consecutive samples of one sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.errors import InvalidData
+
+NANOSECONDS = 1_000_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class TactileSignal:
+    """A batch of consecutive samples, as a driver delivers it and a message carries it.
+
+    Parameters
+    ----------
+    stamp_ns
+        Time of the first sample, ns since the epoch of the clock in use.
+    sensor, channels, unit
+        Name of the sensor part, of each column, and of the unit ('' if unknown).
+    sampling_rate_hz
+        Nominal rate, > 0.
+    first_sample
+        Running index of the first sample since the stream began; a jump between batches is a loss.
+    samples : (n_samples, n_channels) float32
+        NaN for a sample known to be bad.
+    frame_id
+        Frame of the fingertip.
+
+    Raises
+    ------
+    InvalidData
+        If the shape, the rate or the index makes no sense.
+    """
+
+    stamp_ns: int
+    sensor: str
+    channels: tuple[str, ...]
+    unit: str
+    sampling_rate_hz: float
+    first_sample: int
+    samples: NDArray[np.float32]
+    frame_id: str = ''
+
+    def __post_init__(self) -> None:
+        if self.samples.ndim != 2 or self.samples.shape[1] != len(self.channels):
+            raise InvalidData(
+                f"signal of '{self.sensor}' has samples of shape {self.samples.shape}; "
+                f'(n_samples, {len(self.channels)}) is needed for its channels {list(self.channels)}'
+            )
+        if not (np.isfinite(self.sampling_rate_hz) and self.sampling_rate_hz > 0):
+            raise InvalidData(
+                f"signal of '{self.sensor}' has a sampling rate of {self.sampling_rate_hz} Hz; give one above 0"
+            )
+        if self.first_sample < 0:
+            raise InvalidData(f"signal of '{self.sensor}' starts at sample {self.first_sample}; 0 is the first")
+
+    @property
+    def next_sample(self) -> int:
+        """Running index of the sample after this batch."""
+        return self.first_sample + len(self.samples)
+
+    @property
+    def end_ns(self) -> int:
+        """Time of the sample after this batch, ns."""
+        return self.stamp_ns + round(len(self.samples) / self.sampling_rate_hz * NANOSECONDS)
+
+
+def lost_samples(batches: Sequence[TactileSignal]) -> int:
+    """Return how many samples are missing between consecutive batches of one stream."""
+    return sum(max(0, after.first_sample - before.next_sample) for before, after in pairwise(batches))

@@ -1,0 +1,1 @@
+"""Drivers of tactile sensors: bytes to numbers to TactileSignal."""

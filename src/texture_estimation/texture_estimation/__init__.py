@@ -1,0 +1,1 @@
+"""Recipes, learners and evidence: from features to texture and roughness."""

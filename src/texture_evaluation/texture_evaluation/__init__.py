@@ -1,0 +1,1 @@
+"""Bags and data sets, experiments, metrics and charts."""

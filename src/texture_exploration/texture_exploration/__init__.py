@@ -1,0 +1,1 @@
+"""Exploratory motions, the robots that perform them, and their safety."""

@@ -1,0 +1,1 @@
+"""Windows of a tactile signal and the features that describe them."""

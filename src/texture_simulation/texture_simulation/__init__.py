@@ -1,0 +1,1 @@
+"""Simulated surfaces, contact and sensors, and devices emulated at the wire."""

