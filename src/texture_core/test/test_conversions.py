@@ -1,0 +1,57 @@
+"""Every data class goes through its message, serialised as on the wire, and comes back the same."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from rclpy.serialization import deserialize_message, serialize_message
+from texture_msgs import msg
+from texture_msgs.srv import Explore
+
+from texture_core.errors import InvalidData
+from texture_core.estimates import RoughnessEstimate, TextureEstimate
+from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
+from texture_core.features import FeatureVector
+from texture_core.ros.conversions import from_msg, request_from_msg, request_to_msg, to_msg
+from texture_core.signal import TactileSignal
+
+pytestmark = pytest.mark.ros
+STAMP = 1_700_000_000_123_456_789
+EXAMPLES = [
+    TactileSignal(
+        STAMP, 'a/b', ('x', 'y'), 'Pa', 2200.0, 2**40, np.array([[1.5, math.nan], [-3e-20, 7]], np.float32), 'tip'
+    ),
+    ExplorationState(STAMP, 'e-1', 'linear_slide', Phase.SLIDE, 0.1, 0.05, 1.0, math.pi / 4, 0.5, 'felt'),
+    FeatureVector(STAMP, 'e-1', 0.5, 0.1, ('a', 'b'), np.array([0.1, math.nan]), 0.05, 1.0, 'f', False, 3),
+    FeatureVector(STAMP, 'e-1', 0.0, 0.1, last=True),
+    TextureEstimate(STAMP, 'e-1', 'felt', True, 0.9, ('felt', 'wool'), (0.9, 0.1), 4, 0.8, True, 1e-4, 'm', 'ok'),
+    RoughnessEstimate(STAMP, 'e-1', True, 3.5, 0.4, 4, 0.8, True, 1e-4, 'm', 'ok'),
+]
+
+
+@pytest.mark.parametrize('value', EXAMPLES, ids=lambda value: type(value).__name__)
+def test_a_value_survives_the_wire(value: object) -> None:
+    message = to_msg(value)
+    back = from_msg(deserialize_message(serialize_message(message), type(message)))
+    for item in fields(value):  # type: ignore[arg-type]
+        np.testing.assert_equal(getattr(back, item.name), getattr(value, item.name))
+
+
+def test_a_request_is_the_same_for_action_and_service() -> None:
+    request = ExplorationRequest('linear_slide', 0.05, 1.0, surface='felt', stop_when_certain=True)
+    assert request_from_msg(request_to_msg(request)) == request
+    assert request_from_msg(request_to_msg(request, Explore.Request)) == request
+
+
+def test_samples_that_do_not_fill_the_channels_are_refused() -> None:
+    message = msg.TactileSignal(sensor='s', channels=['x', 'y'], sampling_rate_hz=1.0, samples=[1.0, 2.0, 3.0])
+    with pytest.raises(InvalidData, match='3 samples for 2 channels'):
+        from_msg(message)
+
+
+def test_an_unknown_phase_is_refused() -> None:
+    with pytest.raises(InvalidData, match="phase 'dancing'"):
+        from_msg(msg.ExplorationState(phase='dancing'))

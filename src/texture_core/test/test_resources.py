@@ -1,0 +1,25 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from texture_core.errors import UnknownName
+from texture_core.resources import find_file, folder
+
+
+def test_a_path_of_the_user_wins(tmp_path: Path) -> None:
+    path = tmp_path / 'mine.yaml'
+    path.write_text('')
+    assert find_file(str(path), 'texture_core', 'config', 'recipe') == path
+
+
+def test_a_shipped_file_is_found_by_name_in_an_installation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shipped = tmp_path / 'share' / 'some_package' / 'config'
+    shipped.mkdir(parents=True)
+    (shipped / 'good.yaml').write_text('')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{tmp_path}')
+    assert folder('some_package', 'config') == shipped
+    assert find_file('good', 'some_package', 'config', 'recipe') == shipped / 'good.yaml'
+    with pytest.raises(UnknownName, match="no recipe 'goood'; did you mean 'good'"):
+        find_file('goood', 'some_package', 'config', 'recipe')

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.parameter import Parameter
+
+from texture_core.errors import InvalidParameter
+from texture_core.parameters import param
+from texture_core.ros.parameters import declare, on_change, read
+
+pytestmark = pytest.mark.ros
+
+
+@dataclass(frozen=True)
+class Params:
+    length_s: float = param(0.5, 'Length of one window.', unit='s', low=0.01, high=10.0)
+    name: str = param('x', 'A name.', choices=('x', 'y'))
+
+
+@pytest.fixture
+def make_node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    monkeypatch.setitem(os.environ, 'ROS_DOMAIN_ID', '10')
+    monkeypatch.setitem(os.environ, 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    context = rclpy.Context()
+    context.init()
+    nodes = []
+
+    def make(**overrides: Any) -> Any:
+        given = [Parameter(name, value=value) for name, value in overrides.items()]
+        nodes.append(rclpy.create_node('n', context=context, parameter_overrides=given))
+        return nodes[-1]
+
+    yield make
+    for node in nodes:
+        node.destroy_node()
+    context.shutdown()
+
+
+def test_defaults_ranges_and_descriptions_reach_ros(make_node: Any) -> None:
+    node = make_node()
+    assert declare(node, Params) == Params()
+    descriptor = node.describe_parameter('length_s')
+    assert descriptor.description == 'Length of one window. [s]'
+    assert descriptor.floating_point_range[0].to_value == 10.0
+
+
+def test_a_given_value_is_used(make_node: Any) -> None:
+    assert declare(make_node(length_s=2.0), Params).length_s == 2.0
+
+
+@pytest.mark.parametrize('bad', [{'length_s': 11.0}, {'length_s': 'long'}, {'length_s': 1}, {'name': 'z'}])
+def test_a_bad_value_is_refused_in_one_sentence(make_node: Any, bad: dict[str, Any]) -> None:
+    with pytest.raises(InvalidParameter, match=next(iter(bad))):
+        declare(make_node(**bad), Params)
+
+
+def test_a_refused_change_is_not_set(make_node: Any) -> None:
+    node = make_node()
+    declare(node, Params)
+    seen = []
+    on_change(node, Params, seen.append)
+    assert not node.set_parameters([Parameter('name', value='z')])[0].successful
+    assert node.set_parameters([Parameter('name', value='y')])[0].successful
+    assert seen == [Params(name='y')]
+    assert read(node, Params).name == 'y'

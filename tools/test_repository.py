@@ -1,0 +1,53 @@
+"""Checks of the repository as a whole: links, the shared setup.py, versions, anatomy."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = sorted(path.parent for path in ROOT.glob('src/*/package.xml'))
+PYTHON_PACKAGES = [package for package in PACKAGES if package.name != 'texture_msgs']
+PAGES = sorted([*ROOT.glob('*.md'), *ROOT.glob('docs/**/*.md'), *ROOT.glob('src/*/*.md')])
+LINK = re.compile(r'\]\(([^)\s]+)\)')
+HEADING = re.compile(r'^#+ (.+)$', re.MULTILINE)
+
+
+def anchors(page: Path) -> set[str]:
+    """Return the anchors that a Markdown page offers, as the common renderers name them."""
+    text = re.sub(r'```.*?```', '', page.read_text(), flags=re.DOTALL)
+    return {re.sub(r'[^\w\- ]', '', heading.lower()).strip().replace(' ', '-') for heading in HEADING.findall(text)}
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_relative_link_leads_somewhere(page: Path) -> None:
+    text = re.sub(r'```.*?```', '', page.read_text(), flags=re.DOTALL)
+    for link in LINK.findall(text):
+        if '://' in link or link.startswith('mailto:'):
+            continue
+        path, _, anchor = link.partition('#')
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f'{link} leads nowhere'
+        if anchor:
+            assert anchor in anchors(target), f'{link}: no such heading'
+
+
+def test_there_are_nine_packages() -> None:
+    assert len(PACKAGES) == 9
+
+
+@pytest.mark.parametrize('package', PYTHON_PACKAGES, ids=lambda package: package.name)
+def test_setup_py_is_the_same_text_everywhere(package: Path) -> None:
+    assert (package / 'setup.py').read_text() == (PYTHON_PACKAGES[0] / 'setup.py').read_text()
+
+
+@pytest.mark.parametrize('package', PACKAGES, ids=lambda package: package.name)
+def test_a_package_has_its_papers(package: Path) -> None:
+    facts = ElementTree.parse(package / 'package.xml').getroot()
+    assert facts.findtext('version') == ElementTree.parse(PACKAGES[0] / 'package.xml').getroot().findtext('version')
+    assert facts.findtext('license') == 'Apache-2.0'
+    assert (package / 'README.md').exists()
+    assert (package / 'CHANGELOG.rst').exists()
