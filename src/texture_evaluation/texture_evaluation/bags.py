@@ -1,0 +1,257 @@
+"""Read and write recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, ReaderError, StoragePlugin, Writer
+from rosbags.typesys.base import TypesysError
+
+from texture_core.errors import InvalidData
+from texture_core.signal import TactileSignal
+from texture_evaluation.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode, typestore
+
+if sys.version_info >= (3, 14):
+    from compression.zstd import ZstdError
+else:
+    from backports.zstd import ZstdError
+
+# What the reader raises, depending on which byte of a file is wrong.
+BROKEN = (
+    ReaderError, TypesysError, ZstdError, OSError, EOFError, struct.error,
+    ValueError, IndexError, KeyError, TypeError, AssertionError, MemoryError, OverflowError,
+)  # fmt: skip
+FOREVER = QosTime(2147483647, 4294967295)
+
+
+def _offered(reliability: QosReliability, durability: QosDurability, depth: int) -> list[Qos]:
+    keep, lively = QosHistory.KEEP_LAST, QosLiveliness.AUTOMATIC
+    return [Qos(keep, depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)]
+
+
+# The same as texture_core.ros.qos, for `ros2 bag play`; by the last part of the topic's name.
+QOS: Mapping[str, list[Qos]] = {
+    'signal': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
+    'signal_static': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
+    'exploration': _offered(QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, 200),
+    'features': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 200),
+    'texture': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
+    'roughness': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
+}
+
+
+class RawMessage(NamedTuple):
+    """One message as it lies in a bag."""
+
+    topic: str
+    msgtype: str
+    log_ns: int
+    data: bytes
+
+
+class BagWriter:
+    """Write a new bag; use it in a `with` block, at the end of which the bag is complete.
+
+    Parameters
+    ----------
+    path
+        Folder to make; nothing may exist there.
+    namespace
+        Put before topics that do not start with '/': 'signal' becomes '/left/signal' in '/left'.
+
+    Raises
+    ------
+    InvalidData
+        If something exists at `path`, or it cannot be made.
+    """
+
+    def __init__(self, path: str | Path, namespace: str = '/') -> None:
+        self.path = Path(path)
+        self._namespace = '/' + namespace.strip('/')
+        self._connections: dict[tuple[str, str], Connection] = {}
+        if self.path.exists():
+            raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
+        self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
+        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        try:
+            self._writer.open()
+        except OSError as error:
+            raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
+
+    def write(self, topic: str, value: Any, log_ns: int) -> None:
+        """Write a data class of texture_core as received at `log_ns`."""
+        self.write_raw(RawMessage(topic, TYPES[type(value)], log_ns, encode(value)))
+
+    def write_raw(self, message: RawMessage) -> None:
+        """Write a message that is CDR already."""
+        key = message.topic, message.msgtype
+        if key not in self._connections:
+            self._connections[key] = self._connect(*key)
+        self._writer.write(self._connections[key], message.log_ns, message.data)
+
+    def close(self) -> None:
+        """Complete the bag; without this it cannot be read."""
+        self._writer.close()
+
+    def _connect(self, topic: str, msgtype: str) -> Connection:
+        name = topic if topic.startswith('/') else f'{self._namespace.rstrip("/")}/{topic}'
+        qos = QOS.get(short_name(name), [])
+        return self._writer.add_connection(name, msgtype, typestore=typestore(), offered_qos_profiles=qos)
+
+    def __enter__(self) -> BagWriter:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def short_name(topic: str) -> str:
+    """Return the last part of a topic's name: 'signal' of '/left/signal'."""
+    return topic.rsplit('/', 1)[-1]
+
+
+def is_bag(path: Path) -> bool:
+    """Say whether something looks like a bag: a folder with metadata.yaml, or an MCAP file."""
+    return (path / 'metadata.yaml').is_file() or (path.is_file() and path.suffix == '.mcap')
+
+
+def find_bags(paths: Iterable[str | Path]) -> list[Path]:
+    """Return the bags among `paths`, each a bag or a folder of bags, in the order given and by name.
+
+    Raises
+    ------
+    InvalidData
+        If one is missing or neither.
+    """
+    found: list[Path] = []
+    for path in map(Path, paths):
+        inside = [path] if is_bag(path) else sorted(filter(is_bag, path.glob('*')))
+        if not inside:
+            raise InvalidData(_no_bag(path))
+        found += inside
+    if not found:
+        raise InvalidData('no bag was given; name one or more bags, or a folder of bags')
+    return found
+
+
+def _no_bag(path: Path) -> str:
+    if not path.exists():
+        return f"there is no bag '{path}'; give the folder that was recorded or imported"
+    if path.is_dir() and next(path.glob('*.mcap'), None):
+        return f"the bag '{path}' has no metadata.yaml, its recording was cut off; `ros2 bag reindex` may save it"
+    return f"'{path}' is no bag; a folder with metadata.yaml and an .mcap file, or a folder of such bags, is needed"
+
+
+def read_raw(
+    path: str | Path, namespace: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
+) -> Iterator[RawMessage]:
+    """Yield every message of a bag in the order of its log times, undecoded.
+
+    Parameters
+    ----------
+    path
+        The bag.
+    namespace
+        Only topics of this namespace; None if the bag has but one.
+    start_ns, stop_ns
+        Only messages logged from `start_ns` to before `stop_ns`.
+
+    Raises
+    ------
+    InvalidData
+        If there is no bag, it is damaged or foreign, or has several namespaces and none was named.
+    """
+    return _read(Path(path), lambda connection: True, namespace, start_ns, stop_ns)
+
+
+def read_bag(
+    path: str | Path,
+    topics: Iterable[str] | None = None,
+    namespace: str | None = None,
+    start_ns: int | None = None,
+    stop_ns: int | None = None,
+) -> Iterator[tuple[str, int, Any]]:
+    """Yield (topic, log time in ns, data class of texture_core) in the order of log times.
+
+    Only messages of the suite are read. Topics are named by their last part, 'signal' for '/left/signal', in
+    `topics` as in the answer; samples are views of the bytes read. The other arguments are those of `read_raw`.
+    """
+    wanted = None if topics is None else set(topics)
+    signals: dict[str, SignalDecoder] = {}
+
+    def chosen(connection: Connection) -> bool:
+        return connection.msgtype in MESSAGES and (wanted is None or short_name(connection.topic) in wanted)
+
+    for message in _read(Path(path), chosen, namespace, start_ns, stop_ns):
+        try:
+            if message.msgtype == TYPES[TactileSignal]:
+                value: Any = signals.setdefault(message.topic, SignalDecoder()).decode(message.data)
+            else:
+                value = decode(message.data, message.msgtype)
+        except InvalidData as error:
+            raise InvalidData(f"the bag '{path}' is damaged: {error}; record it anew") from error
+        yield short_name(message.topic), message.log_ns, value
+
+
+def _read(
+    path: Path,
+    chosen: Callable[[Connection], bool],
+    namespace: str | None,
+    start_ns: int | None,
+    stop_ns: int | None,
+) -> Iterator[RawMessage]:
+    if not is_bag(path):
+        raise InvalidData(_no_bag(path))
+    try:
+        with Reader(path) as reader:
+            connections = [c for c in _of_namespace(path, reader.connections, namespace) if chosen(c)]
+            if not connections or not reader.message_count:
+                return
+            missing = sum(connection.msgcount for connection in connections)
+            for connection, log_ns, data in reader.messages(connections, start_ns, stop_ns):
+                missing -= 1
+                yield RawMessage(connection.topic, connection.msgtype, log_ns, data)
+            if missing and start_ns is None and stop_ns is None:
+                raise ReaderError(f'{missing} of its messages are missing')
+    except BROKEN as error:
+        raise InvalidData(
+            f"the bag '{path}' cannot be read, it is damaged or cut off: {error}; record it anew"
+        ) from error
+
+
+def _of_namespace(path: Path, connections: list[Connection], namespace: str | None) -> list[Connection]:
+    ours = [c for c in connections if c.msgtype in MESSAGES]
+    if not ours:
+        named = ', '.join(sorted({c.msgtype for c in connections})) or 'nothing'
+        raise InvalidData(
+            f"the bag '{path}' holds {named}; messages of texture_msgs are needed, record the suite's topics"
+        )
+    for connection in ours:
+        if connection.digest and connection.digest != typestore().hash_rihs01(connection.msgtype):
+            raise InvalidData(
+                f"the bag '{path}' was recorded with another definition of {connection.msgtype}; record it anew"
+            )
+    found = sorted({c.topic.rsplit('/', 1)[0] or '/' for c in ours})
+    if namespace is None and len(found) > 1:
+        raise InvalidData(f"the bag '{path}' has the namespaces {', '.join(found)}; name one of them")
+    prefix = found[0] if namespace is None else '/' + namespace.strip('/')
+    if prefix not in found:
+        raise InvalidData(f"the bag '{path}' has no namespace '{prefix}'; it has {', '.join(found)}")
+    common = [c for c in connections if c.topic == '/diagnostics']
+    return [c for c in ours if (c.topic.rsplit('/', 1)[0] or '/') == prefix] + common

@@ -1,0 +1,1 @@
+"""Public recordings turned into labelled bags, one module a data set."""

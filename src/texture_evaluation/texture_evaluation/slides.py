@@ -1,0 +1,122 @@
+"""The labelled explorations in bags, and which of them the user means by `--slides 1-30`."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from texture_core.errors import InvalidData
+from texture_core.exploration import ExplorationState, Phase
+from texture_evaluation.bags import find_bags, read_bag
+
+RANGE = re.compile(r'(\d+)(?:-(\d+))?')
+SIGNALS = ('signal', 'signal_static', 'exploration')
+
+
+@dataclass(frozen=True)
+class Slide:
+    """One exploration with a slide, as it lies in a bag.
+
+    `number` counts the slides of this surface from 1 in the order recorded; what belongs to the slide was logged
+    from `start_ns` to before `stop_ns` (None: the end of the bag).
+    """
+
+    bag: Path
+    exploration_id: str
+    surface: str
+    number: int
+    start_ns: int
+    stop_ns: int | None
+    namespace: str | None = None
+
+    def messages(self) -> Iterator[tuple[str, int, Any]]:
+        """Yield (topic, log time in ns, data class) of the signals and states of this slide, in order."""
+        return read_bag(self.bag, SIGNALS, self.namespace, self.start_ns, self.stop_ns)
+
+
+def parse_selection(text: str) -> frozenset[int] | None:
+    """Return the numbers in '1-30' or '1,3,5-7'; None, meaning all, for ''.
+
+    Raises
+    ------
+    InvalidData
+        If the text is no such list.
+    """
+    if not text.strip():
+        return None
+    numbers: set[int] = set()
+    for part in text.split(','):
+        match = RANGE.fullmatch(part.strip())
+        first, last = (int(match[1]), int(match[2] or match[1])) if match else (0, 0)
+        if not 1 <= first <= last:
+            raise InvalidData(f"slides are '{text}'; numbers from 1 and ranges are needed, such as '1-30' or '1,3,5-7'")
+        numbers.update(range(first, last + 1))
+    return frozenset(numbers)
+
+
+def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | None = None) -> list[Slide]:
+    """Return the labelled slides in bags that `slides` names ('' for all), by bag and time.
+
+    Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
+
+    Raises
+    ------
+    InvalidData
+        If a bag cannot be read, no slide is labelled, or none has a number asked for.
+    """
+    wanted = parse_selection(slides)
+    paths = find_bags(bags)
+    labelled = [slide for path in paths for slide in _slides_of(path, namespace) if slide.surface]
+    if not labelled:
+        raise InvalidData(
+            f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
+        )
+    numbered = _number(labelled)
+    found = [slide for slide in numbered if wanted is None or slide.number in wanted]
+    if not found:
+        most = max(slide.number for slide in numbered)
+        raise InvalidData(f"no surface in {_named(paths)} has slides '{slides}'; there are 1 to {most}")
+    return found
+
+
+def _slides_of(path: Path, namespace: str | None) -> list[Slide]:
+    """Return the slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
+    begun: list[tuple[int, str]] = []
+    surfaces: dict[str, str] = {}
+    for _, log_ns, state in read_bag(path, ('exploration',), namespace):
+        _note(state, log_ns, begun, surfaces)
+    ends = [start for start, _ in begun[1:]]
+    return [
+        Slide(path, name, surfaces[name], 0, start, stop, namespace)
+        for (start, name), stop in zip(begun, [*ends, None], strict=True)
+        if name in surfaces
+    ]
+
+
+def _note(state: ExplorationState, log_ns: int, begun: list[tuple[int, str]], surfaces: dict[str, str]) -> None:
+    if state.exploration_id and (not begun or begun[-1][1] != state.exploration_id):
+        begun.append((log_ns, state.exploration_id))
+    if state.phase is Phase.SLIDE:
+        surfaces[state.exploration_id] = state.surface
+
+
+def _number(slides: Sequence[Slide]) -> list[Slide]:
+    by_surface: defaultdict[str, list[Slide]] = defaultdict(list)
+    for slide in slides:
+        by_surface[slide.surface].append(slide)
+    numbers = {
+        id(slide): number
+        for group in by_surface.values()
+        for number, slide in enumerate(sorted(group, key=lambda slide: slide.start_ns), 1)
+    }
+    return [
+        Slide(s.bag, s.exploration_id, s.surface, numbers[id(s)], s.start_ns, s.stop_ns, s.namespace) for s in slides
+    ]
+
+
+def _named(paths: Sequence[Path]) -> str:
+    return f"'{paths[0]}'" if len(paths) == 1 else f"the {len(paths)} bags from '{paths[0]}' on"
