@@ -33,3 +33,11 @@ class MotionRefused(TextureError):
 
 class MotionAborted(TextureError):
     """A motion that had begun and was ended early."""
+
+
+class InvalidLaunch(TextureError):
+    """A launch file or launch argument that cannot be used."""
+
+
+class LaunchFailed(TextureError):
+    """A node that died, or did not come up in time."""

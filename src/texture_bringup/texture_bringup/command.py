@@ -1,0 +1,82 @@
+"""The `texture` command: everything a user does with the suite, one sub-command each."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol, cast
+
+from texture_core.catalogue import find
+from texture_core.errors import TextureError
+
+USER_ERROR, INTERRUPTED = 2, 130
+
+
+class Module(Protocol):
+    """What a module of `commands` holds."""
+
+    def configure(self, parser: argparse.ArgumentParser) -> None:
+        """Add the arguments of the sub-command."""
+
+    def run(self, options: argparse.Namespace) -> int:
+        """Do it, and return the exit code."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A sub-command: its module under `commands`, imported when it is called, and its line in the help."""
+
+    module: str
+    summary: str
+
+
+COMMANDS: Mapping[str, Command] = {
+    'demo': Command('demo', 'the whole thing on an emulated bench: explore, learn, recognise, report'),
+    'launch': Command('launch', 'start the nodes of a launch file'),
+    'explore': Command('explore', 'slide the finger over the surface and say what it is'),
+    'record': Command('record', 'record the running system into a bag'),
+    'replay': Command('replay', 'play a bag to the running system'),
+    'import': Command('import_recordings', "turn other people's recordings into labelled bags"),
+    'train': Command('train', 'learn a model from labelled bags'),
+    'evaluate': Command('evaluate', 'say how good a model is on labelled bags'),
+    'bench': Command('bench', 'run a benchmark; writes figures and a chart'),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the `texture` command; return its exit code: 0, 2 for an error of the user, 130 after Ctrl-C."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        return _dispatch(given)
+    except TextureError as error:
+        print(f'texture: {error}', file=sys.stderr)
+        return USER_ERROR
+    except KeyboardInterrupt:
+        print('texture: interrupted', file=sys.stderr)
+        return INTERRUPTED
+
+
+def _dispatch(given: Sequence[str]) -> int:
+    if not given or given[0] in ('-h', '--help', 'help'):
+        print(overview())
+        return 0
+    name, *rest = given
+    command = find(COMMANDS, name, 'sub-command of texture')
+    module = cast(Module, importlib.import_module(f'texture_bringup.commands.{command.module}'))
+    parser = argparse.ArgumentParser(prog=f'texture {name}', description=command.summary)
+    module.configure(parser)
+    return module.run(parser.parse_args(rest))
+
+
+def overview() -> str:
+    """Return the help of the command itself."""
+    lines = [f'  {name:<10}{command.summary}' for name, command in COMMANDS.items()]
+    head = 'usage: texture COMMAND [...]\n\nRecognise surfaces by sliding a tactile finger over them.\n'
+    return '\n'.join([head, *lines, '\nMore of each: texture COMMAND --help'])
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""The sub-commands of `texture`, one module each."""
