@@ -1,0 +1,30 @@
+"""The features that a recipe can name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from texture_features.feature import Feature
+from texture_features.features.arc_length import ArcLength
+from texture_features.features.force import Force
+from texture_features.features.hjorth import Hjorth
+from texture_features.features.integral import Integral
+from texture_features.features.level import Level
+from texture_features.features.log_bands import LogBands
+from texture_features.features.log_slope_variance import LogSlopeVariance
+from texture_features.features.log_variance import LogVariance
+from texture_features.features.spectral_peaks import SpectralPeaks
+from texture_features.features.speed import Speed
+
+FEATURES: Mapping[str, type[Feature]] = {
+    'log_bands': LogBands,  # Welch 1967
+    'hjorth': Hjorth,  # Hjorth 1970; Kaboli et al. 2015
+    'spectral_peaks': SpectralPeaks,  # Roberge et al.
+    'integral': Integral,  # Roberge et al.
+    'arc_length': ArcLength,  # Roberge et al.
+    'level': Level,
+    'log_variance': LogVariance,
+    'log_slope_variance': LogSlopeVariance,
+    'speed': Speed,
+    'force': Force,
+}

@@ -1,0 +1,93 @@
+"""What a feature is: a stateless function of windows that are alike, with named values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from texture_core.arrays import Array, Samples
+from texture_core.errors import InvalidData
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """One window, or many of one rate and length: the leading axes count the windows.
+
+    Parameters
+    ----------
+    samples : (..., n_samples, n_channels)
+        Finite.
+    rate_hz
+        Sampling rate, > 0.
+    speed_m_s, force_n : (...)
+        Mean speed and normal force in each window; NaN if unknown.
+    """
+
+    samples: Samples
+    rate_hz: float
+    speed_m_s: Array = field(default_factory=lambda: np.array(np.nan))
+    force_n: Array = field(default_factory=lambda: np.array(np.nan))
+
+    def __post_init__(self) -> None:
+        if self.samples.ndim < 2 or 0 in self.samples.shape[-2:]:
+            raise InvalidData(
+                f'windows to describe have samples of shape {self.samples.shape}; '
+                '(..., n_samples, n_channels) with at least one of each is needed'
+            )
+
+    @cached_property
+    def rows(self) -> Array:
+        """The samples as (..., n_channels, n_samples), contiguous.
+
+        Sums along the last axis have the same rounding for one window as for many, and are fast.
+        """
+        return np.ascontiguousarray(self.samples.swapaxes(-1, -2), dtype=np.float64)
+
+    @cached_property
+    def centred_rows(self) -> Array:
+        """The rows less their mean."""
+        return centred(self.rows)
+
+
+class Feature(Protocol):
+    """Frozen parameters of a feature; called with windows it gives its values.
+
+    A feature of the signal gives (..., n_channels, n_names); one of the motion, such as the speed, (..., 1, n_names)
+    and has `of_signal` False.
+    """
+
+    of_signal: ClassVar[bool]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each value of one channel; '' for the only value of a feature."""
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return the values; finite for finite samples."""
+
+
+def centred(rows: Array) -> Array:
+    """Return rows less their mean, (..., n_samples)."""
+    difference: Array = rows - np.add.reduce(rows, axis=-1, keepdims=True) / rows.shape[-1]
+    return difference
+
+
+def power(rows: Array) -> Array:
+    """Return the mean square of each row, (...)."""
+    squares: Array = np.add.reduce(rows * rows, axis=-1) / rows.shape[-1]
+    return squares
+
+
+def slopes(rows: Array) -> Array:
+    """Return the steps from sample to sample, (..., max(1, n_samples - 1)); 0 for a single sample."""
+    if rows.shape[-1] == 1:
+        return np.zeros_like(rows)
+    return rows[..., 1:] - rows[..., :-1]
+
+
+def ratio(above: Array, below: Array) -> Array:
+    """Return above / below; 0 where `below` is 0."""
+    return np.divide(above, below, out=np.zeros_like(above), where=below > 0)

@@ -1,0 +1,253 @@
+"""A feature set: windows, inputs and features, from the recipe that names them to the numbers."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain, groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from texture_core.arrays import Array
+from texture_core.catalogue import find, unknown
+from texture_core.errors import InvalidParameter
+from texture_core.features import FeatureVector
+from texture_core.parameters import from_mapping
+from texture_core.resources import find_file
+from texture_core.window import Window
+from texture_features.catalogue import FEATURES
+from texture_features.feature import Feature, Windows
+from texture_features.windows import CutWindow, Piece, SlideEnd, WindowParams
+
+# Windows described in one go: enough for speed, few enough for the memory cache.
+CHUNK = 64
+Layout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of each input
+
+
+@dataclass(frozen=True)
+class InputFeatures:
+    """The features of one input: (name, feature) in their order."""
+
+    topic: str
+    features: tuple[tuple[str, Feature], ...]
+
+
+@dataclass(frozen=True)
+class FeatureSet:
+    """What makes a feature vector of a window, in the order of the recipe.
+
+    Examples
+    --------
+    >>> features = FeatureSet.load('default')
+    >>> vectors = [features.describe(piece) for piece in cut_recording(signals, states, features.windows)]
+    """
+
+    windows: WindowParams
+    inputs: tuple[InputFeatures, ...]
+    _layouts: dict[Layout, tuple[tuple[str, ...], str]] = field(default_factory=dict, repr=False, compare=False)
+
+    @classmethod
+    def load(cls, name_or_path: str) -> FeatureSet:
+        """Read the feature set of a recipe (YAML) or of a model's card (JSON), by name or path.
+
+        Raises
+        ------
+        UnknownName, InvalidParameter
+            If there is no such file or it does not hold a feature set.
+        """
+        return cls.from_mapping(read_recipe(name_or_path), f"recipe '{name_or_path}'")
+
+    @classmethod
+    def from_mapping(cls, recipe: Mapping[str, Any], where: str = 'recipe') -> FeatureSet:
+        """Build from the keys `windows` and `inputs` of a recipe; other keys are left alone."""
+        windows = from_mapping(WindowParams, recipe.get('windows') or {}, f'{where}, windows')
+        inputs = recipe.get('inputs')
+        if not isinstance(inputs, Mapping) or not inputs:
+            raise InvalidParameter(
+                f"{where}: inputs is {inputs!r}; name one or more, such as 'inputs: {{signal: {{features: [hjorth]}}}}'"
+            )
+        return cls(windows, tuple(_input(str(topic), section, where) for topic, section in inputs.items()))
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Return the feature set as a recipe writes it, every parameter spelt out."""
+        return {
+            'windows': dataclasses.asdict(self.windows),
+            'inputs': {
+                item.topic: {'features': [{name: _parameters(feature)} for name, feature in item.features]}
+                for item in self.inputs
+            },
+        }
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The inputs, in order."""
+        return tuple(item.topic for item in self.inputs)
+
+    def describe(self, piece: Piece) -> FeatureVector:
+        """Return the features of a window; for the end of a slide, the empty vector that is `last`."""
+        if isinstance(piece, SlideEnd):
+            return FeatureVector(
+                start_ns=piece.end_ns,
+                exploration_id=piece.exploration_id,
+                window_s=0.0,
+                hop_s=piece.hop_s,
+                last=True,
+                skipped=piece.skipped,
+            )
+        inputs = [piece.windows[topic] for topic in self.topics]
+        speed, force = np.array(piece.speed_m_s), np.array(piece.force_n)
+        values = self._values([Windows(item.samples, item.rate_hz, speed, force) for item in inputs])
+        return self._vector(piece, _layout(inputs), values)
+
+    def describe_many(self, pieces: Iterable[Piece]) -> list[FeatureVector]:
+        """Return what `describe` returns for each piece, to the last bit, but faster."""
+        vectors: list[FeatureVector] = []
+        for kind, group in groupby(pieces, self._kind):
+            alike = list(group)
+            if not kind:
+                vectors += [self.describe(piece) for piece in alike]
+                continue
+            for start in range(0, len(alike), CHUNK):
+                vectors += self._describe_alike(alike[start : start + CHUNK])  # type: ignore[arg-type]
+        return vectors
+
+    def names(self, layout: Layout) -> tuple[str, ...]:
+        """Return the name of each value, given (rate, channels) of each input: 'signal/log_bands/12/dynamic'."""
+        return self._names_and_fingerprint(layout)[0]
+
+    def fingerprint(self, layout: Layout) -> str:
+        """Return what identifies the values, such as '3f9c12ab signal=2200Hz*1 signal_static=100Hz*22'.
+
+        The hash covers inputs, features and window length; hop and skip do not change what a value means.
+        """
+        return self._names_and_fingerprint(layout)[1]
+
+    def _kind(self, piece: Piece) -> tuple[Any, ...]:
+        """Return what pieces must share to be described together; () for the end of a slide."""
+        if isinstance(piece, SlideEnd):
+            return ()
+        return tuple(
+            (item.rate_hz, item.channels, item.samples.shape) for item in map(piece.windows.__getitem__, self.topics)
+        )
+
+    def _describe_alike(self, pieces: Sequence[CutWindow]) -> list[FeatureVector]:
+        speed = np.array([piece.speed_m_s for piece in pieces])
+        force = np.array([piece.force_n for piece in pieces])
+        inputs = [pieces[0].windows[topic] for topic in self.topics]
+        stacked = [
+            Windows(np.stack([piece.windows[topic].samples for piece in pieces]), item.rate_hz, speed, force)
+            for topic, item in zip(self.topics, inputs, strict=True)
+        ]
+        values = self._values(stacked)
+        layout = _layout(inputs)
+        return [self._vector(piece, layout, row) for piece, row in zip(pieces, values, strict=True)]
+
+    def _values(self, inputs: Sequence[Windows]) -> Array:
+        """Return the values of windows, (..., n_values)."""
+        blocks = [
+            block.reshape(*block.shape[:-2], -1)
+            for item, windows in zip(self.inputs, inputs, strict=True)
+            for block in [feature(windows) for _, feature in item.features]
+        ]
+        return np.concatenate(blocks, axis=-1)
+
+    def _vector(self, piece: CutWindow, layout: Layout, values: Array) -> FeatureVector:
+        names, fingerprint = self._names_and_fingerprint(layout)
+        return FeatureVector(
+            start_ns=piece.start_ns,
+            exploration_id=piece.exploration_id,
+            window_s=piece.length_s,
+            hop_s=piece.hop_s,
+            names=names,
+            values=values,
+            speed_m_s=piece.speed_m_s,
+            force_n=piece.force_n,
+            feature_set=fingerprint,
+            skipped=piece.skipped,
+        )
+
+    def _names_and_fingerprint(self, layout: Layout) -> tuple[tuple[str, ...], str]:
+        if layout not in self._layouts:
+            names = chain.from_iterable(
+                _names(item, channels) for item, (_, channels) in zip(self.inputs, layout, strict=True)
+            )
+            self._layouts[layout] = (tuple(names), self._fingerprint(layout))
+        return self._layouts[layout]
+
+    def _fingerprint(self, layout: Layout) -> str:
+        meaning = {**self.as_mapping(), 'windows': self.windows.length_s}
+        digest = hashlib.sha256(json.dumps(meaning, sort_keys=True).encode()).hexdigest()[:8]
+        met = [
+            f'{topic}={rate:.6g}Hz*{len(channels)}' for topic, (rate, channels) in zip(self.topics, layout, strict=True)
+        ]
+        return ' '.join([digest, *met])
+
+
+def read_recipe(name_or_path: str) -> Mapping[str, Any]:
+    """Return the mapping in a recipe (YAML) or under `recipe` in a model's card (JSON).
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        If there is no such file or it cannot be read.
+    """
+    path = find_file(name_or_path, 'texture_estimation', 'config/recipes', 'recipe')
+    try:
+        text = path.read_text(encoding='utf-8')
+        content = json.loads(text).get('recipe') if path.suffix == '.json' else yaml.safe_load(text)
+    except (OSError, ValueError, AttributeError, yaml.YAMLError) as error:
+        reason = ' '.join(str(error).split())
+        raise InvalidParameter(
+            f"recipe '{path}' cannot be read: {reason}; give a YAML file or a model's card"
+        ) from error
+    if not isinstance(content, Mapping):
+        raise InvalidParameter(f"'{path}' holds no recipe; a mapping with the key 'inputs' is needed")
+    return content
+
+
+def recipe_name(name_or_path: str) -> str:
+    """Return the name of a recipe: that of its file."""
+    return Path(name_or_path).stem
+
+
+def _input(topic: str, section: Any, where: str) -> InputFeatures:
+    place = f"{where}, input '{topic}'"
+    if not isinstance(section, Mapping) or not isinstance(section.get('features'), list) or not section['features']:
+        raise InvalidParameter(f"{place}: came {section!r}; a list under 'features' is needed, such as [hjorth]")
+    for key in section:
+        if key != 'features':
+            raise InvalidParameter(f'{place}: {unknown(str(key), ["features"], "key")}')
+    return InputFeatures(topic, tuple(_feature(entry, place) for entry in section['features']))
+
+
+def _feature(entry: Any, where: str) -> tuple[str, Feature]:
+    """Build a feature from 'name' or {name: {parameter: value}}."""
+    if isinstance(entry, str):
+        entry = {entry: {}}
+    if not isinstance(entry, Mapping) or len(entry) != 1:
+        raise InvalidParameter(f"{where}: came {entry!r}; a feature is written 'name' or 'name: {{parameter: value}}'")
+    [(name, values)] = entry.items()
+    cls = find(FEATURES, str(name), 'feature')
+    return str(name), from_mapping(cls, values or {}, f"{where}, feature '{name}'")
+
+
+def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:
+    for name, feature in item.features:
+        columns = channels if feature.of_signal else ('',)
+        for channel in columns:
+            for value in feature.names:
+                yield '/'.join(part for part in (item.topic, name, value, channel) if part)
+
+
+def _layout(inputs: Sequence[Window]) -> Layout:
+    return tuple((item.rate_hz, item.channels) for item in inputs)
+
+
+def _parameters(feature: Feature) -> dict[str, Any]:
+    return dataclasses.asdict(feature)  # type: ignore[call-overload, no-any-return]

@@ -1,0 +1,1 @@
+"""The features, one a file; `texture_features.catalogue` lists them."""

@@ -1,0 +1,29 @@
+"""Integral of the squared signal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from texture_core.arrays import Array
+from texture_features.feature import Windows, power
+
+
+@dataclass(frozen=True)
+class Integral:
+    """Integral of the squared, zero-mean signal over the window, unit² s.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", eq. 1.
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One value without a name of its own."""
+        return ('',)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return ∫ s² dt."""
+        rows = windows.centred_rows
+        return (power(rows) * (rows.shape[-1] / windows.rate_hz))[..., None]

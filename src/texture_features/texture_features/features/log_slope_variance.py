@@ -1,0 +1,32 @@
+"""Logarithm of the variance of the steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows, centred, power, slopes
+
+
+@dataclass(frozen=True)
+class LogSlopeVariance:
+    """Logarithm of the variance of the steps from sample to sample of each channel."""
+
+    of_signal: ClassVar[bool] = True
+
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, unit²; 1/12 for whole counts.', low=1e-300, high=1e300
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One value without a name of its own."""
+        return ('',)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return log(variance of the steps + floor)."""
+        return np.log(power(centred(slopes(windows.rows))) + self.floor)[..., None]

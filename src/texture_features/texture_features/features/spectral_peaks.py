@@ -1,0 +1,77 @@
+"""The highest peaks of the spectrum, at least some distance apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows
+
+
+@dataclass(frozen=True)
+class SpectralPeaks:
+    """Frequency (Hz) and amplitude of the highest peaks of the Fourier transform."""
+
+    of_signal: ClassVar[bool] = True
+
+    peaks: int = param(
+        5, 'Number of peaks; those that the spectrum lacks have frequency and amplitude 0.', low=1, high=64
+    )
+    gap_hz: float = param(10.0, 'Least distance between two peaks.', unit='Hz', low=0.0, high=1e6)
+    order: str = param('intensity', 'How the peaks are ranked.', choices=('intensity', 'frequency'))
+    points: int = param(2048, 'Samples of the transform; a shorter window is padded with zeros.', low=8, high=1 << 20)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Frequency and amplitude of each peak."""
+        return tuple(f'{number + 1}/{what}' for number in range(self.peaks) for what in ('frequency_hz', 'amplitude'))
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return frequency and amplitude of each peak in turn."""
+        rows = windows.centred_rows
+        points = max(self.points, rows.shape[-1])
+        amplitudes = np.abs(np.fft.rfft(rows, points)) * (2.0 / rows.shape[-1])
+        step_hz = windows.rate_hz / points
+        bins, heights = highest_peaks(amplitudes, self.peaks, self.gap_hz / step_hz)
+        values = np.stack((bins * step_hz, heights), axis=-1)
+        if self.order == 'frequency':
+            values = np.take_along_axis(values, np.argsort(values[..., :1], axis=-2, kind='stable'), axis=-2)
+        return values.reshape(*values.shape[:-2], -1)
+
+
+def highest_peaks(spectrum: Array, count: int, gap: float) -> tuple[Array, Array]:
+    """Return bins and heights of the highest local maxima, highest first; 0 and 0 for those that are lacking.
+
+    Parameters
+    ----------
+    spectrum : (..., n_bins)
+        Not negative.
+    count
+        Number of peaks wanted.
+    gap
+        A maximum closer than so many bins to a higher one is left out.
+
+    Returns
+    -------
+    two arrays of shape (..., count)
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.B.
+    """
+    left = np.zeros_like(spectrum)
+    middle = spectrum[..., 1:-1]
+    is_peak = (middle > spectrum[..., :-2]) & (middle >= spectrum[..., 2:])
+    left[..., 1:-1] = np.where(is_peak, middle, 0.0)
+    bins = np.zeros((*spectrum.shape[:-1], count))
+    heights = np.zeros_like(bins)
+    index = np.arange(spectrum.shape[-1])
+    for number in range(count):
+        best = left.argmax(axis=-1)[..., None]
+        height = np.take_along_axis(left, best, axis=-1)
+        heights[..., number] = height[..., 0]
+        bins[..., number] = np.where(height > 0, best, 0)[..., 0]
+        left[np.abs(index - best) < max(gap, 1.0)] = 0.0
+    return bins, heights

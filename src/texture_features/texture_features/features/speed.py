@@ -1,0 +1,27 @@
+"""Speed of the finger."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_features.feature import Windows
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not say."""
+
+    of_signal: ClassVar[bool] = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One value without a name of its own."""
+        return ('',)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return the speed."""
+        return np.asarray(windows.speed_m_s, dtype=np.float64)[..., None, None]
