@@ -4,9 +4,9 @@ On the wire a frame is COBS(header | body | CRC) and a zero byte; all numbers ar
 
     kind u8 | version u8 | sequence u16 | time_us u32 | rows u8 | columns u8 | body | crc16
 
-The CRC is CRC-16/CCITT-FALSE (polynomial 1021, start FFFF; of "123456789": 29B1) of all before it. `sequence` counts the
-frames of a device, `time_us` is the device's clock at the first sample; both wrap. No zero byte occurs within a frame, so
-a reader is in step again after the next one, whatever happened.
+The CRC is CRC-16/CCITT-FALSE (polynomial 1021, start FFFF; of "123456789": 29B1) of all before it. `sequence` counts
+the frames of a device, `time_us` is the device's clock at the first sample; both wrap. COBS (Cheshire & Baker 1999)
+leaves no zero byte within a frame, so a reader is in step again after the next one, whatever happened.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ from binascii import crc_hqx
 from struct import Struct
 from typing import NamedTuple
 
-from cobs import cobs
-
 HEADER = Struct('<BBHIBB')
 CRC = Struct('<H')
 CRC_START = 0xFFFF
 DELIMITER = b'\x00'
+FULL_BLOCK = 255
 MAX_FRAME_BYTES = 4096
 
 
@@ -77,16 +76,30 @@ class Deframer:
 
 def _unpack(chunk: bytes) -> Frame | None:
     """Return the frame in what stood between two zero bytes, or None if it is not one."""
-    try:
-        content = cobs.decode(chunk)
-    except cobs.DecodeError:
-        return None
-    if len(content) < HEADER.size + CRC.size:
+    content = _unstuff(chunk)
+    if content is None or len(content) < HEADER.size + CRC.size:
         return None
     checked, (crc,) = content[: -CRC.size], CRC.unpack(content[-CRC.size :])
     if crc_hqx(checked, CRC_START) != crc:
         return None
-    return Frame(*HEADER.unpack_from(checked), checked[HEADER.size :])
+    kind, version, sequence, time_us, rows, columns = HEADER.unpack_from(checked)
+    return Frame(kind, version, sequence, time_us, rows, columns, checked[HEADER.size :])
+
+
+def _unstuff(chunk: bytes) -> bytes | None:
+    """Undo COBS: a block is its length and the bytes up to the next zero; a full one is followed by none."""
+    runs = []
+    position = 0
+    while position < len(chunk):
+        length = chunk[position]
+        run = chunk[position + 1 : position + length]
+        if len(run) < length - 1:
+            return None
+        runs.append(run)
+        position += length
+        if length < FULL_BLOCK and position < len(chunk):
+            runs.append(DELIMITER)
+    return b''.join(runs)
 
 
 class WrappingCounter:
