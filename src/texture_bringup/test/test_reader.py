@@ -121,8 +121,9 @@ def test_the_command_line_is_that_of_ros(launch, tmp_path) -> None:
     )
     words = command(node, tmp_path / 'params')
     assert words[1:4] == ['--flag', 'a b', 'c d']
-    assert words[4:-2] == ['--ros-args', '-r', '__node:=n', '-r', '__ns:=/ns', '-r', 'signal:=/s']
-    assert Path(words[-1]).read_text() == '/ns/n:\n  ros__parameters:\n    rate: 2\n'
+    assert words[4:10] == ['--ros-args', '-r', '__node:=n', '-r', '__ns:=/ns', '--params-file']
+    assert words[11:] == ['-r', 'signal:=/s']
+    assert Path(words[10]).read_text() == '/ns/n:\n  ros__parameters:\n    rate: 2\n'
 
 
 def test_an_unknown_package_or_executable_gets_the_nearest(launch, tmp_path) -> None:

@@ -8,6 +8,7 @@ import signal
 import sys
 from pathlib import Path
 
+from texture_bringup.launcher import process
 from texture_bringup.launcher.files import find_launch_file, given_arguments
 from texture_bringup.launcher.reader import declared_arguments, read
 from texture_bringup.launcher.supervisor import Supervisor
@@ -17,11 +18,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument('file', help="path of a launch file, or the name of one of the suite's, such as bench")
     parser.add_argument('arguments', nargs='*', metavar='NAME:=VALUE', help='arguments of the launch file')
+    parser.add_argument('--parent', type=int, help=argparse.SUPPRESS)
     parser.add_argument('--show-args', action='store_true', help='show the arguments of the launch file')
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the nodes until they end or Ctrl-C; return 1 if one died, else 0."""
+    if options.parent is not None:
+        process.end_with(options.parent, signal.SIGINT)
     path = find_launch_file(options.file)
     if options.show_args:
         print(arguments_text(path))

@@ -7,7 +7,8 @@ import ctypes
 import os
 import signal
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -23,14 +24,15 @@ LIBC = ctypes.CDLL(None)
 
 def command(node: NodeDescription, parameter_folder: Path) -> list[str]:
     """Return the command line of a node; parameters given in the launch file are written to `parameter_folder`."""
-    ros = [f'__node:={node.name}'] * bool(node.name) + [f'__ns:={node.namespace}'] * bool(node.namespace)
-    ros += [f'{source}:={target}' for source, target in node.remappings]
-    options = [part for rule in ros for part in ('-r', rule)]
+    names = [f'__node:={node.name}'] * bool(node.name) + [f'__ns:={node.namespace}'] * bool(node.namespace)
+    options = [part for rule in names for part in ('-r', rule)]
     for index, parameters in enumerate(node.parameters):
         file = parameters if isinstance(parameters, Path) else parameter_folder / f'{index}.yaml'
         if not isinstance(parameters, Path):
             _write_parameters(file, node.parameter_key, parameters)
         options += ['--params-file', str(file)]
+    for source, target in node.remappings:
+        options += ['-r', f'{source}:={target}']
     return [str(packages.executable(node.package, node.executable)), *node.arguments, '--ros-args', *options]
 
 
@@ -63,19 +65,17 @@ def _popen(command_line: Sequence[str], environment: Mapping[str, str]) -> subpr
         stderr=subprocess.PIPE,
         # A pipe would hold the output of Python programs back until 8 KiB have come together.
         env={**environment, 'PYTHONUNBUFFERED': '1'},
-        preexec_fn=_end_with(os.getpid()),  # noqa: PLW1509 - the launcher is a program without threads
+        preexec_fn=partial(end_with, os.getpid(), signal.SIGTERM),  # noqa: PLW1509 - the launcher is a program without threads
         start_new_session=True,
     )
 
 
-def _end_with(parent: int) -> Callable[[], None]:
-    def prepare() -> None:
-        if hasattr(LIBC, 'prctl'):
-            LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-        if os.getppid() != parent:  # it died before the wish was made
-            os._exit(1)
-
-    return prepare
+def end_with(parent: int, number: signal.Signals) -> None:
+    """Let the kernel send this process a signal when its parent dies, however it dies."""
+    if hasattr(LIBC, 'prctl'):
+        LIBC.prctl(PR_SET_PDEATHSIG, number)
+    if os.getppid() != parent:  # it died before the wish was made
+        os._exit(1)
 
 
 def send(process: subprocess.Popen[bytes], number: signal.Signals) -> None:

@@ -134,14 +134,13 @@ class Supervisor:
     def _end(self, running: Running) -> None:
         self._forget(running)
         node, returncode = running.job.node, running.process.returncode
+        asked_for = self._stopping_since_s is not None
+        restart = node.respawn and not asked_for
+        self._failed |= returncode != 0 and not (asked_for or restart)
         self._say(f'[launch] {running.label} {process.ending(returncode)}')
-        if self._stopping_since_s is not None:
-            return
-        if node.respawn:
+        if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, running.job))
-            return
-        self._failed |= returncode != 0 or node.needed
-        if node.needed:
+        elif node.needed and not asked_for:
             self._say(f'[launch] {running.label} is needed by the others, which are stopped now')
             self.stop()
 

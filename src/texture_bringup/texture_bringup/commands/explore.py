@@ -1,0 +1,83 @@
+"""`texture explore`: slide the finger over the surface, show progress, print the estimates."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from texture_bringup.ros.operator import Operator
+from texture_core.errors import MotionRefused
+from texture_core.estimates import RoughnessEstimate, TextureEstimate
+from texture_core.exploration import ExplorationRequest, ExplorationState
+
+# Option, field of the request, unit or '', meaning.
+NUMBERS = (
+    ('speed', 'speed_m_s', 'm/s', 'speed along the surface'),
+    ('force', 'force_n', 'N', 'force on the surface'),
+    ('distance', 'distance_m', 'm', 'length of a linear slide'),
+    ('radius', 'radius_m', 'm', 'radius of a circular motion'),
+    ('turns', 'turns', '', 'turns of a circular motion'),
+    ('duration', 'duration_s', 's', 'duration of an in-hand slide'),
+    ('direction', 'direction_rad', 'rad', 'direction of travel, from +x towards +y'),
+)
+BAR = 24
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the sub-command."""
+    parser.add_argument('motion', help='how to move, such as linear_slide')
+    for option, _, unit, meaning in NUMBERS:
+        shown = f'{meaning}, {unit}' if unit else meaning
+        parser.add_argument(f'--{option}', type=float, default=0.0, help=f'{shown}; 0: the default of the motion')
+    parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
+    parser.add_argument(
+        '--stop-when-certain', action='store_true', help='end the slide as soon as the texture is certain'
+    )
+    parser.add_argument('--namespace', default='', help='namespace of the nodes')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Explore once; return 1 if it was ended early by a fault or a stop."""
+    with Operator(options.namespace) as operator:
+        operator.wait_for_explorer(deadline_s=10.0)
+        explored = operator.explore(request_of(options), show_progress)
+    if sys.stderr.isatty():
+        print(file=sys.stderr)
+    if not explored.exploration_id:
+        raise MotionRefused(explored.message)
+    print(f'{explored.exploration_id}: {explored.message}')
+    print(f'texture:   {texture_text(explored.texture)}')
+    print(f'roughness: {roughness_text(explored.roughness)}')
+    return 0 if explored.success else 1
+
+
+def request_of(options: argparse.Namespace) -> ExplorationRequest:
+    """Return the request that the options stand for."""
+    numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
+    return ExplorationRequest(
+        options.motion, surface=options.surface, stop_when_certain=options.stop_when_certain, **numbers
+    )
+
+
+def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
+    """Draw how far it is, on one line of a terminal."""
+    if not sys.stderr.isatty():
+        return
+    share = state.progress if state.progress >= 0 else 0.0
+    bar = '█' * round(BAR * share)
+    print(f'\r{state.phase.value:<9}|{bar:<{BAR}}| {texture_text(texture):<60}', end='', file=sys.stderr, flush=True)
+
+
+def texture_text(estimate: TextureEstimate) -> str:
+    """Return a texture estimate in words."""
+    if not estimate.label:
+        return estimate.message or 'none yet'
+    known = '' if estimate.known else ', but it resembles none of the known textures'
+    return f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s{known}'
+
+
+def roughness_text(estimate: RoughnessEstimate) -> str:
+    """Return a roughness estimate in words."""
+    if not estimate.valid:
+        return estimate.message or 'none'
+    return f'{estimate.grade:.1f} ± {estimate.grade_std:.1f} on the scale from 1 (smooth) to 5 (rough)'

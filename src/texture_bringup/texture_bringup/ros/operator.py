@@ -1,0 +1,171 @@
+"""What an operator does with the running nodes: explore, stop, set parameters."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+from rclpy.action import ActionClient
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+from texture_msgs import action, msg
+
+from texture_core.errors import InvalidParameter, LaunchFailed, MotionAborted
+from texture_core.estimates import RoughnessEstimate, TextureEstimate
+from texture_core.exploration import ExplorationRequest, ExplorationState
+from texture_core.ros.conversions import from_msg, request_to_msg
+from texture_core.ros.qos import SENSOR_QOS
+
+STEP_S = 0.1
+CANCEL_DEADLINE_S = 10.0
+Progress = Callable[[ExplorationState, TextureEstimate], None]
+
+
+@dataclass(frozen=True)
+class Explored:
+    """The answer to an exploration."""
+
+    success: bool
+    message: str
+    exploration_id: str
+    texture: TextureEstimate
+    roughness: RoughnessEstimate
+
+
+class Operator:
+    """A client of the nodes of one namespace; use it in a `with` block, from one thread.
+
+    Parameters
+    ----------
+    namespace
+        Where the nodes live; '' for the root.
+    domain_id
+        ROS domain; None for that of the environment.
+    guard
+        Called while waiting; it raises if waiting has become senseless.
+    """
+
+    def __init__(
+        self, namespace: str = '', domain_id: int | None = None, guard: Callable[[], None] = lambda: None
+    ) -> None:
+        self._guard = guard
+        self._context = Context()
+        self._context.init(domain_id=domain_id)
+        self._node = Node('operator', namespace=namespace or None, context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._explore = ActionClient(self._node, action.Explore, 'explore')
+
+    def __enter__(self) -> Operator:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._explore.destroy()
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.try_shutdown()
+
+    def wait_for_explorer(self, deadline_s: float) -> None:
+        """Wait until explorations can be asked for.
+
+        Raises
+        ------
+        LaunchFailed
+            If the explorer does not appear in time.
+        """
+        self._until(self._explore.server_is_ready, deadline_s, 'no explorer answers; start one, such as the emulated '
+                    'bench with `texture launch bench`')  # fmt: skip
+
+    def wait_for_signal(self, deadline_s: float) -> None:
+        """Wait until the sensor delivers samples."""
+        batches: list[msg.TactileSignal] = []
+        subscription = self._node.create_subscription(msg.TactileSignal, 'signal', batches.append, SENSOR_QOS)
+        try:
+            self._until(lambda: bool(batches), deadline_s, "no samples arrive on 'signal'; is the sensor connected?")
+        finally:
+            self._node.destroy_subscription(subscription)
+
+    def explore(self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None) -> Explored:
+        """Explore, and return what was felt; Ctrl-C stops the exploration before it goes on.
+
+        Raises
+        ------
+        MotionAborted
+            If the explorer vanishes meanwhile.
+        """
+
+        def on_feedback(message: Any) -> None:
+            on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
+
+        goal = self._result(self._explore.send_goal_async(request_to_msg(request), on_feedback))
+        ending = goal.get_result_async()
+        try:
+            result = self._result(ending).result
+        except KeyboardInterrupt:
+            self._cancel(goal, ending)
+            raise
+        return Explored(
+            result.success, result.message, result.exploration_id, from_msg(result.texture), from_msg(result.roughness)
+        )
+
+    def stop(self, deadline_s: float = 5.0) -> str:
+        """Stop whatever moves; return what the explorer says."""
+        client = self._node.create_client(Trigger, 'stop')
+        try:
+            self._until(client.service_is_ready, deadline_s, 'no explorer answers')
+            return str(self._result(client.call_async(Trigger.Request())).message)
+        finally:
+            self._node.destroy_client(client)
+
+    def set_parameters(self, node: str, values: Mapping[str, Any], deadline_s: float = 30.0) -> None:
+        """Set parameters of a node.
+
+        Raises
+        ------
+        LaunchFailed
+            If the node does not answer.
+        InvalidParameter
+            If it refuses one, with its reason.
+        """
+        client = AsyncParameterClient(self._node, node)
+        self._until(client.services_are_ready, deadline_s, f"node '{node}' does not answer; is it running?")
+        answer = self._result(client.set_parameters([Parameter(name, value=value) for name, value in values.items()]))
+        for name, outcome in zip(values, answer.results, strict=True):
+            if not outcome.successful:
+                raise InvalidParameter(f"node '{node}' refused parameter '{name}': {outcome.reason}")
+
+    def _result(self, future: Future) -> Any:
+        """Return the result of a future that the explorer or another node answers."""
+        while not future.done():
+            self._step()
+            if not self._explore.server_is_ready():
+                raise MotionAborted('the explorer has vanished; look at its output')
+        return future.result()
+
+    def _until(self, condition: Callable[[], bool], deadline_s: float, complaint: str) -> None:
+        deadline = time.monotonic() + deadline_s
+        while not condition():
+            if time.monotonic() > deadline:
+                raise LaunchFailed(f'{complaint} (waited {deadline_s:.0f} s)')
+            self._step()
+
+    def _step(self) -> None:
+        self._guard()
+        self._executor.spin_once(timeout_sec=STEP_S)
+
+    def _cancel(self, goal: Any, ending: Future) -> None:
+        """Ask for the end, and wait until the finger is lifted."""
+        goal.cancel_goal_async()
+        deadline = time.monotonic() + CANCEL_DEADLINE_S
+        while not ending.done() and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=STEP_S)
