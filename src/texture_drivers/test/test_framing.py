@@ -1,85 +1,145 @@
-from __future__ import annotations
-
-import struct
 from binascii import crc_hqx
 
-from hypothesis import given, settings
+import pytest
+from hypothesis import given
 from hypothesis import strategies as st
 
-from texture_drivers.framing import CRC_START, Deframer, Frame, WrappingCounter
+from texture_drivers.framing import CRC_START, Deframer, Frame, WrappingCounter, pack
 
-FRAME = Frame(0x42, 1, 7, 1000, 1, 2, b'\x00\x11\x00')
-
-
-def wire(frame: Frame) -> bytes:
-    content = struct.pack('<BBHIBB', *frame[:-1]) + frame.body
-    content += struct.pack('<H', crc_hqx(content, 0xFFFF))
-    return b''.join(bytes([len(run) + 1]) + run for run in content.split(b'\x00')) + b'\x00'  # runs below 254 bytes
+BODIES = st.lists(st.binary(max_size=40), min_size=2, max_size=8)
 
 
-def test_the_check_sum_is_crc16_ccitt_false() -> None:
-    assert crc_hqx(b'123456789', CRC_START) == 0x29B1
+def numbered(sequence, body=b'', kind=1):
+    return Frame(kind, 1, sequence, 1000 * sequence, 1, 1, body)
 
 
-def test_a_frame_written_by_hand_is_read() -> None:
-    # header, body and CRC 03B4; COBS writes the distance to the next zero before each run without one
-    blocks = bytes.fromhex('04 420107  03 e803  01  03 0102  02 11  03 b403')
-    assert Deframer().feed(blocks + b'\x00') == [FRAME]
+def bitwise_crc(data: bytes) -> int:
+    """The definition: shift out, and where a one leaves, subtract the polynomial x^16 + x^12 + x^5 + 1."""
+    register = 0xFFFF
+    for byte in data:
+        register ^= byte << 8
+        for _ in range(8):
+            register = (register << 1) ^ (0x1021 if register & 0x8000 else 0)
+            register &= 0xFFFF
+    return register
 
 
-def test_long_runs_without_a_zero_are_read() -> None:
-    for length in (241, 242, 243, 600):
-        content = struct.pack('<BBHIBB', 1, 1, 0x101, 0x1010101, 1, 1) + b'\x01' * length
-        content += struct.pack('<H', crc_hqx(content, 0xFFFF))
-        full, rest = divmod(len(content), 254)
-        assert b'\x00' not in content
-        blocks = b''.join(b'\xff' + content[254 * i :][:254] for i in range(full))
-        stream = blocks + (bytes([rest + 1]) + content[254 * full :] if rest else b'') + b'\x00'
-        assert [len(frame.body) for frame in Deframer().feed(stream)] == [length]
+def test_the_checksum_has_the_published_check_value():
+    assert crc_hqx(b'123456789', CRC_START) == 0x29B1 == bitwise_crc(b'123456789')
 
 
-def test_frames_are_found_however_the_stream_is_cut() -> None:
-    stream = b''.join(wire(FRAME._replace(sequence=n)) for n in range(5))
-    for size in (1, 2, 7, len(stream)):
-        deframer = Deframer()
-        found = [f.sequence for i in range(0, len(stream), size) for f in deframer.feed(stream[i : i + size])]
-        assert found == [0, 1, 2, 3, 4]
-        assert deframer.bad_frames == 0
+def test_a_frame_worked_by_hand_is_read_and_written():
+    frame = Frame(0x42, 1, 7, 1000, 1, 2, b'\x00\x11\x00')
+    # Kind 42, version 01, sequence 0700, time E8030000, rows 01, columns 02, body 001100, checksum B403. COBS puts the
+    # distance to the next zero before each run without one.
+    assert bitwise_crc(bytes.fromhex('42 01 0700 E8030000 01 02 001100')) == 0x03B4
+    by_hand = bytes.fromhex('04 420107  03 E803  01  03 0102  02 11  03 B403  00')
+    assert Deframer().feed(by_hand) == [frame]
+    assert pack(frame) == by_hand
 
 
-def test_entering_in_the_middle_is_no_fault_but_a_damaged_frame_is() -> None:
+def test_frames_come_out_the_same_however_the_stream_is_cut():
+    frames = [numbered(i, bytes([i, 0, 255 - i])) for i in range(20)]
     deframer = Deframer()
-    assert deframer.feed(wire(FRAME)[5:] + wire(FRAME)) == [FRAME]
-    assert deframer.bad_frames == 0
-    damaged = bytearray(wire(FRAME))
-    damaged[3] ^= 0x10
-    assert deframer.feed(bytes(damaged) + wire(FRAME)) == [FRAME]
-    assert deframer.bad_frames == 1
+    stream = b''.join(map(pack, frames))
+    assert [frame for byte in stream for frame in deframer.feed(bytes([byte]))] == frames
 
 
-@settings(max_examples=50)
-@given(st.lists(st.binary(max_size=200), max_size=20))
-def test_arbitrary_bytes_never_raise_and_memory_stays_bounded(pieces: list[bytes]) -> None:
-    deframer = Deframer(max_frame_bytes=64)
+def test_missing_numbers_are_counted_for_each_kind_over_the_wrap():
+    deframer = Deframer()
+    sent = [(1, 65534), (2, 9), (1, 1), (2, 10), (1, 2)]  # of kind 1 are missing 65535 and 0
+    frames = deframer.feed(b''.join(pack(numbered(sequence, kind=kind)) for kind, sequence in sent))
+    assert [frame.lost for frame in frames] == [0, 0, 2, 0, 0]
+    assert deframer.lost == 2
+
+
+def test_a_frame_that_comes_twice_is_given_once():
+    deframer = Deframer()
+    assert len(deframer.feed(pack(numbered(5)) * 2 + pack(numbered(6)))) == 2
+    assert (deframer.repeated, deframer.lost, deframer.bad_frames) == (1, 0, 0)
+
+
+def test_numbers_that_go_back_are_a_device_that_began_anew_and_no_loss():
+    deframer = Deframer()
+    deframer.feed(b''.join(pack(numbered(i)) for i in (300, 301, 0, 1)))
+    assert (deframer.renumbered, deframer.lost, deframer.frames) == (1, 0, 4)
+
+
+def test_every_flipped_bit_is_noticed():
+    good = pack(numbered(1, bytes(range(40))))
+    for position in range(8 * (len(good) - 1)):
+        damaged = bytearray(good)
+        damaged[position // 8] ^= 1 << position % 8
+        deframer = Deframer()
+        deframer.feed(b'\x00')
+        assert deframer.feed(bytes(damaged)) == []
+        assert deframer.bad_frames >= 1
+
+
+def test_joining_in_the_middle_of_a_frame_is_no_fault():
+    deframer = Deframer()
+    assert len(deframer.feed(pack(numbered(1, b'half'))[3:] + pack(numbered(2, b'whole')))) == 1
+    assert (deframer.bad_frames, deframer.lost) == (0, 0)
+
+
+def test_after_a_restart_numbers_may_begin_anywhere():
+    deframer = Deframer()
+    deframer.feed(pack(numbered(500)) + b'\x07unfinished')
+    deframer.restart()
+    assert len(deframer.feed(pack(numbered(0)))) == 1
+    assert (deframer.lost, deframer.bad_frames, deframer.frames) == (0, 0, 2)
+
+
+def test_a_line_without_zeros_needs_no_more_memory_than_one_frame():
+    deframer = Deframer(max_frame_bytes=100)
+    for _ in range(1000):
+        deframer.feed(b'\xff' * 50)
+        assert len(deframer._rest) <= 101
+    assert deframer.feed(b'\x00' + pack(numbered(1, b'again')))[0].body == b'again'
+
+
+@pytest.mark.parametrize('size', [0, 1, 240, 241, 242, 243, 2000])
+def test_long_bodies_survive(size):
+    body = bytes(i % 251 + 1 for i in range(size))
+    assert Deframer().feed(pack(numbered(3, body)))[0].body == body
+
+
+@given(st.lists(st.binary(max_size=300), max_size=20))
+def test_arbitrary_bytes_never_raise(pieces):
+    deframer = Deframer(max_frame_bytes=200)
     for piece in pieces:
         deframer.feed(piece)
-        assert len(deframer._rest) <= 65
-    # In step again after the next zero byte.
-    deframer.feed(b'\x00')
-    assert deframer.feed(wire(FRAME)) == [FRAME]
+        assert len(deframer._rest) <= 201
 
 
-def test_every_flipped_bit_is_noticed() -> None:
-    good = wire(FRAME)
-    for position in range(len(good) - 1):
-        for bit in range(8):
-            damaged = bytearray(good)
-            damaged[position] ^= 1 << bit
-            assert Deframer().feed(b'\x00' + bytes(damaged)) == []
+@given(noise=st.binary(max_size=200), bodies=BODIES)
+def test_after_any_noise_at_most_one_frame_is_lost(noise, bodies):
+    frames = Deframer().feed(noise + b''.join(pack(numbered(i, body)) for i, body in enumerate(bodies)))
+    assert [frame.body for frame in frames][-(len(bodies) - 1) :] == bodies[1:]
 
 
-def test_a_counter_is_followed_beyond_its_wrapping() -> None:
-    counter = WrappingCounter(16)
-    assert [counter.advance(reading) for reading in (65534, 65535, 1, 2)] == [65534, 65535, 65537, 65538]
-    assert counter.step(2) == 0
-    assert counter.step(1) == -1
+@given(bodies=BODIES, dropped=st.integers(0, 10_000))
+def test_a_dropped_byte_costs_at_most_two_frames_and_the_loss_is_counted(bodies, dropped):
+    deframer = Deframer()
+    deframer.feed(pack(numbered(0)))
+    stream = b''.join(pack(numbered(i + 1, body)) for i, body in enumerate(bodies))
+    position = dropped % len(stream)
+    end = pack(numbered(len(bodies) + 1))
+    frames = deframer.feed(stream[:position] + stream[position + 1 :] + end + end)
+    assert len(bodies) + 1 - len(frames) == deframer.lost <= 2
+
+
+@given(st.lists(st.integers(-(2**15), 2**15 - 1), max_size=50))
+def test_a_wrapping_counter_is_followed_forwards_and_back(steps):
+    counter, truth = WrappingCounter(16), 2**20
+    counter.advance(truth % 2**16)
+    offset = truth - (counter.value or 0)
+    for step in steps:
+        truth += step
+        assert counter.step(truth % 2**16) == step
+        assert counter.advance(truth % 2**16) == truth - offset
+
+
+def test_microseconds_in_32_bits_run_on_over_their_wrap():
+    counter = WrappingCounter(32)
+    assert [counter.advance(reading) for reading in (2**32 - 5, 5, 15)] == [2**32 - 5, 2**32 + 5, 2**32 + 15]

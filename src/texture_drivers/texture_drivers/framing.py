@@ -1,12 +1,13 @@
-"""Frames of a serial line: COBS, a check sum, a sequence number and the device's time. For devices of our own design.
+"""Frames on a serial line: checked, numbered and timed, for devices of our own design.
 
-On the wire a frame is COBS(header | body | CRC) and a zero byte; all numbers are little endian:
+    COBS( kind u8 | version u8 | sequence u16 | time_us u32 | rows u8 | columns u8 | body | crc u16 ) 00
 
-    kind u8 | version u8 | sequence u16 | time_us u32 | rows u8 | columns u8 | body | crc16
+All numbers are little endian. COBS (consistent overhead byte stuffing) leaves no zero byte within a frame: whatever is
+lost or added on the way, the frame after the next zero is whole again. The checksum is CRC-16/CCITT-FALSE, also called
+IBM-3740 (polynomial 1021, start FFFF, of "123456789": 29B1), over everything before it. The sequence counts the frames
+of one kind, so each stream on a shared line knows its own losses. The time is the device's, of the first row; it wraps.
 
-The CRC is CRC-16/CCITT-FALSE (polynomial 1021, start FFFF; of "123456789": 29B1) of all before it. `sequence` counts
-the frames of a device, `time_us` is the device's clock at the first sample; both wrap. COBS (Cheshire & Baker 1999)
-leaves no zero byte within a frame, so a reader is in step again after the next one, whatever happened.
+Source: Cheshire & Baker 1999, "Consistent Overhead Byte Stuffing".
 """
 
 from __future__ import annotations
@@ -15,11 +16,14 @@ from binascii import crc_hqx
 from struct import Struct
 from typing import NamedTuple
 
+from cobs import cobs
+
 HEADER = Struct('<BBHIBB')
 CRC = Struct('<H')
 CRC_START = 0xFFFF
 DELIMITER = b'\x00'
-FULL_BLOCK = 255
+SEQUENCE_BITS = 16
+TIME_BITS = 32
 MAX_FRAME_BYTES = 4096
 
 
@@ -33,6 +37,7 @@ class Frame(NamedTuple):
     rows: int
     columns: int
     body: bytes
+    lost: int = 0  # frames of this kind missing just before it
 
 
 class Deframer:
@@ -41,65 +46,85 @@ class Deframer:
     Parameters
     ----------
     max_frame_bytes
-        Longest frame on the wire; a longer run without a zero byte is refused. Bounds the memory kept.
+        Longest frame on the line; what goes on longer without a zero byte is refused. Bounds the memory kept.
     """
 
     def __init__(self, max_frame_bytes: int = MAX_FRAME_BYTES) -> None:
         self.frames = 0
-        self.bad_frames = 0
+        self.bad_frames = 0  # too short or long, wrongly stuffed, or of a wrong checksum
+        self.lost = 0  # frames whose number never came
+        self.repeated = 0  # came twice; the second is left out
+        self.renumbered = 0  # numbers went back: the device began anew
         self._max_bytes = max_frame_bytes
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what is unfinished and the numbers expected: the line was opened anew. The totals go on."""
         self._rest = b''
         self._in_step = False
+        self._last: dict[int, int] = {}
 
     def feed(self, data: bytes) -> list[Frame]:
-        """Return the frames completed by `data`; what is refused is counted in `bad_frames`."""
-        *chunks, rest = (self._rest + data).split(DELIMITER)
+        """Return the frames completed by `data`; never raises."""
+        *pieces, rest = (self._rest + data).split(DELIMITER)
         # One byte more than allowed is enough to refuse the frame when its end comes.
         self._rest = rest[: self._max_bytes + 1]
-        frames = []
-        for chunk in filter(None, chunks):
-            frame = _unpack(chunk) if len(chunk) <= self._max_bytes else None
-            if frame is not None:
-                frames.append(frame)
-            elif self._in_step:
-                self.bad_frames += 1
-            # The first piece of a stream is seldom a whole frame: that is no fault.
-            self._in_step = True
+        frames = [frame for piece in pieces if (frame := self._take(piece)) is not None]
         self.frames += len(frames)
         return frames
 
-    def restart(self) -> None:
-        """Forget the piece kept: another stream begins."""
-        self._rest = b''
-        self._in_step = False
-
-
-def _unpack(chunk: bytes) -> Frame | None:
-    """Return the frame in what stood between two zero bytes, or None if it is not one."""
-    content = _unstuff(chunk)
-    if content is None or len(content) < HEADER.size + CRC.size:
+    def _take(self, piece: bytes) -> Frame | None:
+        """Return the frame in what stood between two zero bytes, unless it is damaged or came before."""
+        in_step, self._in_step = self._in_step, True
+        frame = unpack(piece) if len(piece) <= self._max_bytes else None
+        if frame is not None:
+            return self._number(frame)
+        # A line is joined in the middle of a frame, and a sender may add zeros at any time: both are no fault.
+        self.bad_frames += bool(piece) and in_step
         return None
-    checked, (crc,) = content[: -CRC.size], CRC.unpack(content[-CRC.size :])
-    if crc_hqx(checked, CRC_START) != crc:
+
+    def _number(self, frame: Frame) -> Frame | None:
+        range_ = 1 << SEQUENCE_BITS
+        step = (frame.sequence - self._last.get(frame.kind, frame.sequence - 1)) % range_
+        self._last[frame.kind] = frame.sequence
+        if step == 0:
+            self.repeated += 1
+            return None
+        if step >= range_ // 2:  # a line never changes the order
+            self.renumbered += 1
+            return frame
+        self.lost += step - 1
+        return frame._replace(lost=step - 1) if step > 1 else frame
+
+
+def unpack(piece: bytes) -> Frame | None:
+    """Return the frame in what stood between two zero bytes, or None if it is damaged."""
+    try:
+        raw = cobs.decode(piece)
+    except cobs.DecodeError:
+        return None
+    checked = raw[: -CRC.size]
+    if len(checked) < HEADER.size or CRC.unpack(raw[-CRC.size :]) != (crc_hqx(checked, CRC_START),):
         return None
     kind, version, sequence, time_us, rows, columns = HEADER.unpack_from(checked)
     return Frame(kind, version, sequence, time_us, rows, columns, checked[HEADER.size :])
 
 
-def _unstuff(chunk: bytes) -> bytes | None:
-    """Undo COBS: a block is its length and the bytes up to the next zero; a full one is followed by none."""
-    runs = []
-    position = 0
-    while position < len(chunk):
-        length = chunk[position]
-        run = chunk[position + 1 : position + length]
-        if len(run) < length - 1:
-            return None
-        runs.append(run)
-        position += length
-        if length < FULL_BLOCK and position < len(chunk):
-            runs.append(DELIMITER)
-    return b''.join(runs)
+def pack(frame: Frame) -> bytes:
+    """Return the bytes of a frame on the line, the zero after it included; sequence and time are cut to their bits."""
+    checked = (
+        HEADER.pack(
+            frame.kind,
+            frame.version,
+            frame.sequence % (1 << SEQUENCE_BITS),
+            frame.time_us % (1 << TIME_BITS),
+            frame.rows,
+            frame.columns,
+        )
+        + frame.body
+    )
+    stuffed: bytes = cobs.encode(checked + CRC.pack(crc_hqx(checked, CRC_START)))
+    return stuffed + DELIMITER
 
 
 class WrappingCounter:
