@@ -1,0 +1,78 @@
+"""A table to explore on: time, arm and surface stepped by hand, so that every run is the same."""
+
+import importlib.util
+
+import pytest
+
+from texture_core.exploration import ExplorationRequest
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.exploration import Exploration
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+# The pure tests run where there is no ROS.
+collect_ignore = [] if importlib.util.find_spec('rclpy') else ['test_explorer_node.py']
+
+ARM_STEP_NS = 5_000_000
+
+
+class Table:
+    """An arm over a surface, and what the exploration on it reported."""
+
+    def __init__(self, arm=SimulatedArmParams(), touch=TouchParams(), limits=SafetyLimits()):  # noqa: B008 (frozen)
+        self.now_ns = 1_000_000_000
+        self.arm = SimulatedArm(arm, clock=lambda: self.now_ns, own_thread=False)
+        self.arm.connect()
+        self.home = self.arm.state().position
+        self.touch, self.limits = touch, limits
+        self.states, self.places = [], []
+        self.exploration = None
+        self.when = {}  # what to do at the third state of a phase
+
+    def pace(self):
+        for _ in range(2):
+            self.now_ns += ARM_STEP_NS
+            self.arm.step(ARM_STEP_NS * 1e-9)
+
+    def explore(self, request=ExplorationRequest('linear_slide')):  # noqa: B008 (frozen)
+        motion = MOTIONS[request.motion](request, self.home, self.touch, self.limits)
+        self.exploration = Exploration(
+            'one',
+            request,
+            arm=self.arm,
+            motion=motion,
+            limits=self.limits,
+            clock=lambda: self.now_ns,
+            on_state=self.on_state,
+        )
+        return self.exploration.run(self.pace)
+
+    def on_state(self, state):
+        self.states.append(state)
+        self.places.append(self.arm.state().position)
+        if [old.phase for old in self.states[-3:]] == [state.phase] * 3:
+            self.when.pop(state.phase, lambda: None)()
+
+    @property
+    def phases(self):
+        """The phases in their order, each once per stay."""
+        seen = [state.phase for state in self.states]
+        return [phase for before, phase in zip([None, *seen], seen, strict=False) if phase is not before]
+
+    def first(self, phase):
+        """Return the first state of a phase and where the finger was."""
+        at = [state.phase for state in self.states].index(phase)
+        return self.states[at], self.places[at]
+
+
+@pytest.fixture
+def make_table():
+    """Return the class of tables."""
+    return Table
+
+
+@pytest.fixture
+def table():
+    """Return a table with all defaults."""
+    return Table()

@@ -1,0 +1,54 @@
+"""What every arm of the catalogue keeps to, on its default parameters."""
+
+import math
+import time
+
+import pytest
+
+from texture_exploration.arms.catalogue import ARMS
+from texture_exploration.arms.protocol import ArmCommand
+
+
+@pytest.fixture(params=ARMS)
+def arm(request):
+    arm_class = ARMS[request.param]
+    arm = arm_class(arm_class.Params())
+    arm.connect()
+    yield arm
+    arm.close()
+
+
+def wait_for(condition, deadline_s=5.0):
+    deadline = time.monotonic() + deadline_s
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def test_the_state_stays_young_while_the_arm_rests(arm):
+    first = arm.state().time_ns
+    wait_for(lambda: arm.state().time_ns > first)
+    assert arm.state().fault == ''
+    assert all(map(math.isfinite, (*arm.state().position, *arm.state().velocity, arm.state().force_n)))
+
+
+def test_the_arm_moves_as_commanded_and_stops(arm):
+    x, y, _ = arm.state().position
+    arm.command(ArmCommand(tangential_m_s=(0.02, -0.01)))
+    wait_for(lambda: arm.state().position[0] > x and arm.state().position[1] < y)
+    arm.stop()
+    wait_for(lambda: not any(arm.state().velocity))
+
+
+def test_the_arm_stops_by_itself_when_it_hears_nothing(arm):
+    arm.command(ArmCommand(normal_m_s=0.01))
+    wait_for(lambda: arm.state().velocity[2] > 0)
+    wait_for(lambda: not any(arm.state().velocity))
+
+
+def test_closing_twice_and_connecting_again_is_no_trouble(arm):
+    arm.close()
+    arm.close()
+    arm.connect()
+    before = arm.state().time_ns
+    wait_for(lambda: arm.state().time_ns > before)

@@ -1,0 +1,40 @@
+import threading
+
+from texture_core.estimates import RoughnessEstimate, TextureEstimate
+from texture_exploration.estimates import CertaintyParams, Estimates
+
+
+def texture(**values):
+    return TextureEstimate(**{'stamp_ns': 1, 'exploration_id': 'one', 'label': 'cork', 'known': True, **values})
+
+
+def test_a_known_confident_texture_of_enough_windows_is_certain():
+    params = CertaintyParams(certain_confidence=0.9, certain_windows=3)
+    assert params.certain(texture(confidence=0.95, windows=3))
+    assert not params.certain(texture(confidence=0.95, windows=2))
+    assert not params.certain(texture(confidence=0.85, windows=9))
+    assert not params.certain(texture(confidence=0.95, windows=3, known=False))
+    assert not params.certain(texture(windows=3))  # confidence unknown
+
+
+def test_the_final_estimate_ends_the_waiting():
+    estimates = Estimates('one')
+    later = threading.Timer(0.05, estimates.update, [texture(final=True)])
+    later.start()
+    assert estimates.wait_until_final(['texture'], timeout_s=10.0)
+    assert estimates.texture.label == 'cork'
+
+
+def test_without_a_final_estimate_the_newest_stays():
+    estimates = Estimates('one')
+    estimates.update(texture(windows=2))
+    estimates.update(RoughnessEstimate(1, 'one', final=True))
+    assert estimates.wait_until_final(['roughness'], timeout_s=0.0)
+    assert not estimates.wait_until_final(['texture', 'roughness'], timeout_s=0.01)
+    assert estimates.texture.windows == 2
+
+
+def test_nobody_waits_any_longer_once_it_is_given_up():
+    estimates = Estimates('one')
+    estimates.give_up()
+    assert not estimates.wait_until_final(['texture'], timeout_s=60.0)

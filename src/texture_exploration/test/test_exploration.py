@@ -1,0 +1,112 @@
+import re
+
+import pytest
+
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_exploration.arms.simulated import SimulatedArmParams
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+MOVING = (Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT)
+
+
+@pytest.mark.parametrize('phase', MOVING)
+def test_a_stop_in_any_phase_lifts_the_finger_and_says_aborted(table, phase):
+    table.when[phase] = lambda: table.exploration.stop('stopped on request')
+    outcome = table.explore()
+    assert (outcome.success, outcome.message) == (False, 'stopped on request')
+    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
+    assert table.arm.state().force_n == 0
+    assert table.arm.state().position[2] == pytest.approx(table.home[2], abs=0.001)
+
+
+def test_a_stop_while_sliding_leaves_along_the_normal(table):
+    table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
+    table.explore()
+    begin, end = table.first(Phase.SLIDE)[1], table.arm.state().position
+    assert end[0] - begin[0] < 0.004  # 0.05 m/s until the third state
+
+
+def test_without_a_surface_the_approach_gives_up(make_table):
+    table = make_table(SimulatedArmParams(stiffness_n_m=0.0), TouchParams(approach_travel_m=0.02))
+    outcome = table.explore()
+    assert not outcome.success
+    assert outcome.message.startswith('no surface within 0.02 m')
+    assert table.phases == [Phase.APPROACH, Phase.LIFT, Phase.ABORTED]
+    assert not outcome.slid
+
+
+def test_a_force_above_the_limit_aborts(make_table):
+    table = make_table(limits=SafetyLimits(max_force_n=1.5, force_limit_n=2.0))
+    table.when[Phase.SLIDE] = lambda: table.arm.push(3.0)
+    outcome = table.explore()
+    assert outcome.message.endswith('is above the limit of 2 N')
+    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
+
+
+def test_a_finger_that_leaves_the_workspace_is_lifted(make_table):
+    table = make_table(limits=SafetyLimits(z_low_m=-0.0004))
+    outcome = table.explore()  # 1 N needs 0.5 mm of depth
+    assert outcome.message.startswith('the finger left the workspace: z is -0.000')
+    assert table.arm.state().force_n == 0
+
+
+@pytest.mark.parametrize('phase', MOVING)
+def test_an_arm_that_hangs_aborts_within_the_allowed_age(table, phase):
+    table.when[phase] = table.arm.freeze
+    outcome = table.explore()
+    hung = table.arm.state().time_ns
+    assert re.search(r'has not answered for 15\d ms; the finger was not lifted', outcome.message)
+    assert (table.states[-1].stamp_ns - hung) * 1e-9 == pytest.approx(0.15, abs=0.011)
+    assert table.phases[-1] is Phase.ABORTED
+
+
+def test_a_fault_of_the_arm_aborts_and_is_told(table):
+    table.when[Phase.SLIDE] = lambda: table.arm.fail('protective stop')
+    assert 'the arm reports a fault: protective stop' in table.explore().message
+
+
+def test_an_arm_that_is_lost_aborts(table):
+    table.when[Phase.SLIDE] = table.arm.close
+    outcome = table.explore()
+    assert outcome.message.startswith('the simulated arm is not connected')
+    assert table.phases[-1] is Phase.ABORTED
+
+
+def test_a_bug_in_the_loop_leaves_no_arm_moving(table):
+    def bug():
+        raise ZeroDivisionError
+
+    table.when[Phase.SLIDE] = bug
+    with pytest.raises(ZeroDivisionError):
+        table.explore()
+    before = table.arm.state().position
+    table.pace()
+    assert table.arm.state().position == before
+    assert not table.exploration.outcome.success
+
+
+def test_a_slide_can_end_early_with_success_but_keeps_its_promise(table):
+    table.when[Phase.SLIDE] = lambda: table.exploration.finish('the texture is certain')
+    outcome = table.explore()
+    assert (outcome.success, outcome.message) == (True, 'the texture is certain')
+    begin, end = table.first(Phase.SLIDE)[0], table.first(Phase.LIFT)[0]
+    assert begin.stamp_ns + begin.steady_s * 1e9 <= end.stamp_ns
+    assert (end.stamp_ns - begin.stamp_ns) * 1e-9 < 0.15
+
+
+def test_a_force_that_never_settles_aborts_with_what_was_waited_for(make_table):
+    table = make_table(limits=SafetyLimits(contact_timeout_s=0.5), arm=SimulatedArmParams(admittance_m_s_n=1e-4))
+    assert table.explore(ExplorationRequest('linear_slide', force_n=3.0)).message.startswith(
+        'waited 0.5 s for the force to settle at 3 N; the force is'
+    )
+
+
+def test_states_come_fifty_times_a_second_and_carry_who_and_what(table):
+    table.explore(ExplorationRequest('linear_slide', surface='cork'))
+    sliding = [state for state in table.states if state.phase is Phase.SLIDE]
+    assert len(sliding) == pytest.approx(50 * 2.0, abs=2)
+    assert {(state.exploration_id, state.motion, state.surface) for state in table.states} == {
+        ('one', 'linear_slide', 'cork')
+    }
+    assert [sliding[0].progress, sliding[-1].progress] == pytest.approx([0.0, 1.0], abs=0.02)

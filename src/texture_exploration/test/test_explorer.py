@@ -1,0 +1,83 @@
+import pytest
+
+from texture_core.errors import DeviceError, MotionRefused, UnknownName
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.explorer import Explorer
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+QUICK = ExplorationRequest('linear_slide', speed_m_s=0.1, distance_m=0.02)
+SLOW = ExplorationRequest('linear_slide', speed_m_s=0.01, distance_m=0.1)
+DEADLINE_S = 20.0
+
+
+@pytest.fixture
+def explorer():
+    arm = SimulatedArm(SimulatedArmParams(start_height_m=0.002))
+    # A busy machine may hold the threads up; this is about who may begin, not about time.
+    explorer = Explorer(arm, TouchParams(), SafetyLimits(stale_s=2.0), lambda state: None)
+    explorer.connect()
+    yield explorer
+    explorer.close()
+
+
+def test_explorations_follow_each_other(explorer):
+    for name in ('one', 'two'):
+        exploration = explorer.begin(name, QUICK)
+        assert exploration.ended.wait(DEADLINE_S)
+        assert exploration.outcome.success, exploration.outcome.message
+    assert explorer.counts == {'done': 2, 'aborted': 0, 'refused': 0}
+
+
+def test_a_second_exploration_at_once_is_refused(explorer):
+    explorer.begin('one', SLOW)
+    with pytest.raises(MotionRefused, match="'one' is still running"):
+        explorer.begin('two', QUICK)
+    assert explorer.counts['refused'] == 1
+
+
+def test_an_unknown_motion_is_refused_with_the_nearest_name(explorer):
+    with pytest.raises(UnknownName, match="did you mean 'linear_slide'"):
+        explorer.begin('one', ExplorationRequest('linear_slid'))
+
+
+def test_stopping_lifts_the_finger(explorer):
+    exploration = explorer.begin('one', SLOW)
+    assert explorer.stop('enough')
+    assert exploration.ended.wait(DEADLINE_S)
+    assert (exploration.outcome.message, explorer.counts['aborted']) == ('enough', 1)
+    assert not explorer.stop('again')
+
+
+def test_an_arm_that_failed_is_connected_again_by_the_next_request(explorer):
+    explorer.arm.fail('protective stop')
+    while not explorer.trouble():
+        pass
+    exploration = explorer.begin('one', QUICK)
+    assert exploration.ended.wait(DEADLINE_S)
+    assert exploration.outcome.success, exploration.outcome.message
+
+
+def test_closing_while_it_moves_lifts_the_finger_and_ends_the_thread(explorer):
+    exploration = explorer.begin('one', SLOW)
+    explorer.close()
+    assert exploration.state.phase is Phase.ABORTED
+    assert explorer.arm.state().position[2] > 0.001
+    with pytest.raises(MotionRefused, match='shutting down'):
+        explorer.begin('two', QUICK)
+
+
+class LostArm(SimulatedArm):
+    def connect(self):
+        raise DeviceError('the arm does not answer; check its cable')
+
+    def state(self):
+        raise DeviceError('not connected')
+
+
+def test_an_arm_that_cannot_be_reached_refuses_in_a_sentence():
+    explorer = Explorer(LostArm(), TouchParams(), SafetyLimits(), lambda state: None)
+    with pytest.raises(MotionRefused, match='the arm is not ready: the arm does not answer'):
+        explorer.begin('one', QUICK)
+    assert explorer.trouble() == 'not connected'

@@ -1,0 +1,235 @@
+"""The explorer as others meet it: over ROS, on a simulated arm in real time."""
+
+import time
+
+import pytest
+import rclpy
+from action_msgs.msg import GoalStatus
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.action import ActionClient
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
+from texture_msgs import action, msg, srv
+
+from texture_core.estimates import TextureEstimate
+from texture_core.ros.conversions import to_msg
+from texture_core.ros.qos import ESTIMATE_QOS, STATE_QOS
+from texture_core.ros.time import to_ns
+from texture_exploration.nodes.explorer import THREADS, ExplorerNode
+
+QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
+SLOW = {'motion': 'linear_slide', 'speed_m_s': 0.01, 'distance_m': 0.1}
+DEADLINE_S = 20.0
+
+pytestmark = pytest.mark.ros
+
+
+class Client(Node):
+    """Somebody who asks, listens and, if told to, estimates."""
+
+    def __init__(self):
+        super().__init__('client')
+        self.states, self.diagnostics, self.feedback = [], [], []
+        self.answer = None  # makes a texture estimate of a state
+        self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self.diagnostics.append, 10)
+        self.explore = self.create_client(srv.Explore, 'explore')
+        self.stop = self.create_client(Trigger, 'stop')
+        self.action = ActionClient(self, action.Explore, 'explore')
+
+    def estimate(self, answer):
+        publisher = self.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
+        self.answer = lambda state: publisher.publish(to_msg(answer(state)))
+        return publisher
+
+    def _on_state(self, state):
+        self.states.append(state)
+        if self.answer is not None and state.exploration_id:
+            self.answer(state)
+
+    def phases(self, exploration_id):
+        seen = [state.phase for state in self.states if state.exploration_id == exploration_id]
+        return [phase for before, phase in zip([None, *seen], seen, strict=False) if phase != before]
+
+
+class World:
+    """An explorer and a client in one executor."""
+
+    def __init__(self, **parameters):
+        values = {'start_height_m': 0.002, 'stale_s': 1.0, **parameters}
+        overrides = [Parameter(name, value=value) for name, value in values.items()]
+        self.explorer = ExplorerNode(parameter_overrides=overrides)
+        self.client = Client()
+        self.executor = MultiThreadedExecutor(THREADS)
+        self.executor.add_node(self.explorer)
+        self.executor.add_node(self.client)
+        assert self.client.explore.wait_for_service(DEADLINE_S)
+        assert self.client.stop.wait_for_service(DEADLINE_S)
+
+    def until(self, condition):
+        deadline = time.monotonic() + DEADLINE_S
+        while not condition():
+            assert time.monotonic() < deadline, 'the deadline passed'
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def result(self, future):
+        self.until(future.done)
+        return future.result()
+
+    def call(self, **request):
+        return self.client.explore.call_async(srv.Explore.Request(**request))
+
+    def goal(self, **request):
+        assert self.client.action.wait_for_server(DEADLINE_S)
+        return self.result(
+            self.client.action.send_goal_async(action.Explore.Goal(**request), self.client.feedback.append)
+        )
+
+    def until_phase(self, phase):
+        self.until(lambda: any(state.phase == phase for state in self.client.states))
+
+    def close(self):
+        self.explorer.shutdown()
+        self.executor.shutdown()
+        self.explorer.destroy_node()
+        self.client.destroy_node()
+
+
+@pytest.fixture
+def make_world(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '30')
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    rclpy.init()
+    worlds = []
+
+    def make(**parameters):
+        worlds.append(World(**parameters))
+        return worlds[-1]
+
+    yield make
+    for world in worlds:
+        world.close()
+    rclpy.shutdown()
+
+
+@pytest.fixture
+def world(make_world):
+    return make_world()
+
+
+def test_a_service_call_explores_and_reports(world):
+    response = world.result(world.call(**QUICK, surface='cork'))
+    assert (response.success, response.message) == (True, 'the motion ended as asked')
+    assert not response.texture.label
+    world.until_phase('done')
+    assert world.client.phases(response.exploration_id) == ['approach', 'contact', 'slide', 'lift', 'done']
+    assert {s.surface for s in world.client.states if s.exploration_id} == {'cork'}
+    world.until(lambda: world.client.states[-1].phase == 'idle')
+
+
+def test_stamps_are_of_the_ros_clock(world):
+    before = world.client.get_clock().now().nanoseconds
+    world.result(world.call(**QUICK))
+    world.until_phase('done')
+    stamps = [to_ns(state.header.stamp) for state in world.client.states if state.exploration_id]
+    assert stamps == sorted(stamps)
+    assert before < stamps[0] <= stamps[-1] < world.client.get_clock().now().nanoseconds
+
+
+def test_an_unknown_motion_is_refused_with_the_nearest_name(world):
+    response = world.result(world.call(motion='linear_slid'))
+    assert not response.success
+    assert "did you mean 'linear_slide'" in response.message
+    assert response.exploration_id == ''
+
+
+def test_a_second_request_at_once_is_refused(world):
+    first = world.call(**SLOW)
+    world.until_phase('approach')
+    assert 'is still running' in world.result(world.call(**QUICK)).message
+    world.result(world.client.stop.call_async(Trigger.Request()))
+    assert world.result(first).message == 'stopped on request'
+
+
+def test_stop_works_while_the_service_is_busy(world):
+    call = world.call(**SLOW)
+    world.until_phase('slide')
+    assert world.result(world.client.stop.call_async(Trigger.Request())).success
+    response = world.result(call)
+    assert (response.success, response.message) == (False, 'stopped on request')
+    assert world.client.phases(response.exploration_id)[-2:] == ['lift', 'aborted']
+
+
+def test_the_action_tells_how_it_goes(world):
+    goal = world.goal(**QUICK)
+    result = world.result(goal.get_result_async())
+    assert result.status == GoalStatus.STATUS_SUCCEEDED
+    assert result.result.success
+    assert {note.feedback.state.exploration_id for note in world.client.feedback} == {result.result.exploration_id}
+    assert 'slide' in {note.feedback.state.phase for note in world.client.feedback}
+
+
+def test_a_cancelled_action_lifts_the_finger(world):
+    goal = world.goal(**SLOW)
+    world.until_phase('slide')
+    world.result(goal.cancel_goal_async())
+    result = world.result(goal.get_result_async())
+    assert result.status == GoalStatus.STATUS_CANCELED
+    assert result.result.message == 'cancelled by the client'
+
+
+def test_a_refused_goal_ends_aborted_with_a_sentence(world):
+    result = world.result(world.goal(motion='linear_slide', force_n=50.0).get_result_async())
+    assert result.status == GoalStatus.STATUS_ABORTED
+    assert 'allowed is 0.1 to 6 N' in result.result.message
+
+
+def cork(state, **values):
+    known = {'label': 'cork', 'known': True, 'confidence': 0.99, 'windows': 5}
+    return TextureEstimate(to_ns(state.header.stamp), state.exploration_id, **{**known, **values})
+
+
+def test_a_certain_texture_ends_the_slide_early(world):
+    publisher = world.client.estimate(lambda state: cork(state, final=state.phase in ('lift', 'done')))
+    world.until(publisher.get_subscription_count)
+    response = world.result(world.call(**SLOW, stop_when_certain=True))
+    assert response.success
+    assert response.message == "ended early: 'cork' is certain with 0.99 after 5 windows"
+    assert (response.texture.label, response.texture.final) == ('cork', True)
+    assert max(state.progress for state in world.client.states if state.phase == 'slide') < 0.5
+
+
+def test_without_a_final_estimate_the_newest_is_given(make_world):
+    world = make_world(estimate_timeout_s=0.2)
+    publisher = world.client.estimate(lambda state: cork(state, windows=2))
+    world.until(publisher.get_subscription_count)
+    response = world.result(world.call(**QUICK))
+    assert (response.texture.windows, response.texture.final) == (2, False)
+
+
+def test_estimates_of_another_exploration_are_left_alone(make_world):
+    world = make_world(estimate_timeout_s=0.0)
+    publisher = world.client.estimate(lambda state: TextureEstimate(1, 'other', label='silk'))
+    world.until(publisher.get_subscription_count)
+    assert world.result(world.call(**QUICK)).texture.label == ''
+
+
+def test_the_diagnostics_count_what_happened(world):
+    world.result(world.call(**QUICK))
+    world.result(world.call(motion='nothing'))
+
+    def numbers():
+        return {pair.key: pair.value for array in world.client.diagnostics for pair in array.status[0].values}
+
+    world.until(lambda: (numbers().get('done'), numbers().get('refused')) == ('1', '1'))
+    assert numbers()['phase'] == 'idle'
+    assert float(numbers()['arm_state_age_s']) < 1.0
+
+
+def test_a_shutdown_while_moving_lifts_the_finger_and_frees_the_caller(world):
+    call = world.call(**SLOW)
+    world.until_phase('slide')
+    world.explorer.shutdown()
+    assert world.result(call).message == 'the explorer was shut down'

@@ -1,0 +1,42 @@
+import math
+
+import pytest
+
+from texture_core.errors import InvalidParameter
+from texture_exploration.arms.protocol import ArmState
+from texture_exploration.safety import SafetyLimits
+
+REST = (0.0, 0.0, 0.0)
+
+
+def test_a_workspace_turned_inside_out_is_refused():
+    with pytest.raises(InvalidParameter, match=r"'x_low_m' is 0\.3; it must be below 'x_high_m'"):
+        SafetyLimits(x_low_m=0.3)
+
+
+def test_a_limit_below_what_may_be_asked_for_is_refused():
+    with pytest.raises(InvalidParameter, match="'force_limit_n' is 5"):
+        SafetyLimits(force_limit_n=5.0)
+
+
+def test_a_finger_within_all_limits_violates_nothing():
+    assert SafetyLimits().violation(ArmState(0, (0.0, 0.1, -0.001), REST, 9.9)) == ''
+
+
+@pytest.mark.parametrize('force', [10.1, math.nan, math.inf])
+def test_a_force_that_is_too_high_or_unknown_is_a_violation(force):
+    assert 'above the limit' in SafetyLimits().violation(ArmState(0, REST, REST, force))
+
+
+def test_a_position_outside_or_unknown_is_a_violation():
+    assert SafetyLimits().violation(ArmState(0, (0.0, 0.3, 0.0), REST, 0.0)) == (
+        'the finger left the workspace: y is 0.3000 m, allowed is -0.2 to 0.2 m'
+    )
+    assert SafetyLimits().violation(ArmState(0, (0.0, 0.0, math.nan), REST, 0.0))
+
+
+def test_the_room_is_the_way_to_the_nearest_wall():
+    limits = SafetyLimits()
+    assert limits.room_m((0.1, 0.0, 0.0), 0.0) == pytest.approx(0.1)
+    assert limits.room_m((0.1, 0.0, 0.0), math.pi) == pytest.approx(0.3)
+    assert limits.room_m((0.0, 0.0, 0.0), math.pi / 4) == pytest.approx(0.2 * math.sqrt(2))

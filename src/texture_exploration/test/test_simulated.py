@@ -1,0 +1,94 @@
+import math
+import socket
+
+import pytest
+
+from texture_core.errors import DeviceError
+from texture_core.finger import FingerState
+from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+
+
+class Clock:
+    now_ns = 0
+
+    def __call__(self):
+        return self.now_ns
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+def make(clock, **parameters):
+    arm = SimulatedArm(SimulatedArmParams(**parameters), clock, own_thread=False)
+    arm.connect()
+    return arm
+
+
+def run(arm, clock, command, seconds, dt=0.004):
+    for _ in range(round(seconds / dt)):
+        arm.command(command)
+        clock.now_ns += round(dt * 1e9)
+        arm.step(dt)
+
+
+def test_the_force_is_stiffness_times_depth(clock):
+    arm = make(clock, stiffness_n_m=1500.0, start_height_m=0.0)
+    run(arm, clock, ArmCommand(normal_m_s=-0.001), 1.0)
+    assert arm.state().force_n == pytest.approx(1.5)
+
+
+def test_the_force_error_decays_with_the_time_constant_of_the_admittance(clock):
+    arm = make(clock, stiffness_n_m=2000.0, admittance_m_s_n=0.01, start_height_m=0.0)
+    run(arm, clock, ArmCommand(force_n=1.0), 0.1)  # two time constants of 1 / (2000 · 0.01) s
+    assert arm.state().force_n == pytest.approx(1 - math.exp(-2), rel=1e-3)
+
+
+def test_force_control_is_stable_however_stiff_the_surface_and_long_the_step(clock):
+    arm = make(clock, stiffness_n_m=1e5, start_height_m=0.0)
+    run(arm, clock, ArmCommand(force_n=1.0), 5.0, dt=0.1)
+    assert arm.state().force_n == pytest.approx(1.0)
+
+
+def test_above_the_surface_force_control_comes_down(clock):
+    arm = make(clock, start_height_m=0.002)
+    run(arm, clock, ArmCommand(force_n=1.0), 1.0)
+    assert arm.state().force_n == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_frozen_arm_grows_old_until_it_is_connected_again(clock):
+    arm = make(clock)
+    arm.freeze()
+    run(arm, clock, ArmCommand(normal_m_s=0.1), 0.2)
+    assert arm.state().time_ns == 0
+    arm.connect()
+    assert arm.state().time_ns == clock.now_ns
+
+
+def test_a_failed_arm_stands_still_and_says_why(clock):
+    arm = make(clock)
+    arm.fail('protective stop')
+    run(arm, clock, ArmCommand(normal_m_s=0.1), 0.1)
+    assert arm.state().fault == 'protective stop'
+    assert arm.state().position == (0.0, 0.0, 0.01)
+
+
+def test_a_closed_arm_refuses_commands(clock):
+    arm = make(clock)
+    arm.close()
+    with pytest.raises(DeviceError, match='connect it first'):
+        arm.command(ArmCommand())
+
+
+def test_the_bench_is_told_where_the_finger_is(clock):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
+        bench.bind(('127.0.0.1', 0))
+        bench.settimeout(5.0)
+        arm = make(clock, finger_port=bench.getsockname()[1], start_height_m=0.0)
+        run(arm, clock, ArmCommand(tangential_m_s=(0.1, 0.0), normal_m_s=-0.1), 0.004)
+        told = [FingerState.from_bytes(bench.recv(1024)) for _ in range(2)][-1]
+        arm.close()
+    assert (told.time_ns, told.vx_m_s, told.x_m) == (4_000_000, 0.1, pytest.approx(0.0004))
+    assert told.force_n == pytest.approx(0.8)

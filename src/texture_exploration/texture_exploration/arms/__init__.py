@@ -1,0 +1,1 @@
+"""The robots that carry the exploring finger, behind one small protocol."""

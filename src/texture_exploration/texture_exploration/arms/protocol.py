@@ -1,0 +1,68 @@
+"""What every arm that carries the finger can do, whatever it is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+Vector = tuple[float, float, float]  # x, y in the surface, z away from it
+
+
+@dataclass(frozen=True)
+class ArmState:
+    """Where the fingertip is and what it feels, in the frame of the surface.
+
+    `time_ns` is when the arm measured it, of CLOCK_MONOTONIC; `position` in m, `velocity` in m/s; `force_n` is the
+    force normal to the surface, positive when pressing. `fault` says why the arm cannot move; '' if it can.
+    """
+
+    time_ns: int
+    position: Vector
+    velocity: Vector
+    force_n: float
+    fault: str = ''
+
+
+@dataclass(frozen=True)
+class ArmCommand:
+    """What the finger shall do from now on: a velocity along the surface, and a velocity or a force normal to it.
+
+    `normal_m_s` is positive away from the surface. If `force_n` is given, the arm controls that pressing force instead
+    and ignores `normal_m_s`: above the surface it comes down until it presses.
+    """
+
+    tangential_m_s: tuple[float, float] = (0.0, 0.0)
+    normal_m_s: float = 0.0
+    force_n: float | None = None
+
+
+class Arm(Protocol):
+    """An arm under hybrid control: velocity along the surface, velocity or force along its normal.
+
+    A command holds until the next one, but at most for a fraction of a second: an arm that hears nothing stops by
+    itself. Any method but `close` raises DeviceError if the arm cannot be reached.
+    """
+
+    def connect(self) -> None:
+        """Reach the arm and clear its faults; may be called again after `close`."""
+
+    def close(self) -> None:
+        """Stop, and let the arm go; never raises, may be called twice."""
+
+    def state(self) -> ArmState:
+        """Return the newest measured state at once; its age tells whether the arm still answers."""
+
+    def command(self, command: ArmCommand) -> None:
+        """Take over a command at once; it does not wait for the arm to follow."""
+
+    def stop(self) -> None:
+        """Stand still and hold the position, whatever the arm was doing; may be called from any thread."""
+
+
+class ArmClass(Protocol):
+    """A class of arms: its parameter dataclass, and how to make one from it."""
+
+    Params: type[Any]
+
+    def __call__(self, params: Any) -> Arm:
+        """Return an arm that is not yet connected."""

@@ -1,0 +1,191 @@
+"""An arm without a robot: a kinematic finger over an elastic plane at z = 0."""
+
+from __future__ import annotations
+
+import math
+import socket
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from texture_core.errors import DeviceError
+from texture_core.finger import FingerState
+from texture_core.parameters import param
+from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+
+RATE_HZ = 250.0
+RESTING_PERIOD_S = 0.05  # a finger at rest is still reported, but costs next to nothing
+STANDSTILL = ArmCommand()
+
+
+@dataclass(frozen=True)
+class SimulatedArmParams:
+    """The simulated arm and the surface under it."""
+
+    stiffness_n_m: float = param(2000.0, 'Stiffness of finger and surface; 0: there is none.', unit='N/m', low=0.0)
+    admittance_m_s_n: float = param(
+        0.01, 'Normal speed per force error of the force control.', unit='m/s/N', low=1e-4, high=1.0
+    )
+    start_height_m: float = param(0.01, 'Height of the finger at the start.', unit='m', low=0.0, high=0.2)
+    command_timeout_s: float = param(0.25, 'Stand still when no command came for so long.', unit='s', low=0.02)
+    finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
+
+
+class SimulatedArm:
+    """A finger that follows velocities exactly and approaches a wanted force exponentially.
+
+    Parameters
+    ----------
+    params
+        The arm and its surface.
+    clock
+        CLOCK_MONOTONIC in ns.
+    own_thread
+        Move by itself at 250 Hz once connected. If False, whoever owns the arm calls `step`.
+    """
+
+    Params = SimulatedArmParams
+
+    def __init__(
+        self,
+        params: SimulatedArmParams = SimulatedArmParams(),
+        clock: Callable[[], int] = time.monotonic_ns,
+        own_thread: bool = True,
+    ) -> None:
+        self._params = params
+        self._clock = clock
+        self._own_thread = own_thread
+        self._command = STANDSTILL
+        self._command_ns = clock()
+        self._state = ArmState(clock(), (0.0, 0.0, params.start_height_m), (0.0, 0.0, 0.0), 0.0)
+        self._frozen = False
+        self._fault = ''
+        self._push_n = 0.0
+        self._wake = threading.Event()
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._report = FingerReport(params.finger_port)
+
+    def connect(self) -> None:
+        """Start to move in time; clears what was injected."""
+        self.close()
+        self._frozen, self._fault, self._push_n = False, '', 0.0
+        self._closing.clear()
+        self._report.open()
+        self.step(0.0)
+        if self._own_thread:
+            self._thread = threading.Thread(target=self._run, name='simulated_arm', daemon=True)
+            self._thread.start()
+
+    def close(self) -> None:
+        """Stop and end the thread."""
+        self._command = STANDSTILL
+        self._closing.set()
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        self._report.close()
+
+    def state(self) -> ArmState:
+        """Return the newest state."""
+        return self._state
+
+    def command(self, command: ArmCommand) -> None:
+        """Follow a command from the next step on."""
+        if self._closing.is_set():
+            raise DeviceError('the simulated arm is not connected; connect it first')
+        was_resting = self._command == STANDSTILL
+        self._command_ns = self._clock()
+        self._command = command
+        if was_resting:
+            self._wake.set()
+
+    def stop(self) -> None:
+        """Stand still."""
+        self._command = STANDSTILL
+
+    def freeze(self) -> None:
+        """Behave like a controller that hangs: the state grows old, commands do nothing, until connected again."""
+        self._frozen = True
+
+    def fail(self, reason: str) -> None:
+        """Behave like an arm in a protective stop: stand still and report the reason, until connected again."""
+        self._fault = reason
+
+    def push(self, force_n: float) -> None:
+        """Add a force as if somebody pushed the finger, until connected again."""
+        self._push_n = force_n
+
+    def step(self, dt_s: float) -> None:
+        """Move for `dt_s` as commanded; the new state carries the clock's present time."""
+        if self._frozen:
+            return
+        now_ns = self._clock()
+        unheard = (now_ns - self._command_ns) * 1e-9 > self._params.command_timeout_s
+        if unheard or self._fault:
+            self._command = STANDSTILL
+        command = self._command
+        (vx, vy), (x, y, z) = command.tangential_m_s, self._state.position
+        dz = self._normal_step(command, dt_s)
+        position = (x + vx * dt_s, y + vy * dt_s, z + dz)
+        velocity: Vector = (vx, vy, dz / dt_s if dt_s > 0 else 0.0)
+        self._state = ArmState(now_ns, position, velocity, self._force(position[2]), self._fault)
+        self._report.send(self._state)
+
+    def _force(self, height_m: float) -> float:
+        return self._params.stiffness_n_m * max(0.0, -height_m) + self._push_n
+
+    def _normal_step(self, command: ArmCommand, dt_s: float) -> float:
+        """Return the change of height in one step, m.
+
+        Admittance control, vz = a·(F − F_wanted), solved exactly over the step: with F = k·depth the force error
+        decays as exp(−a·k·t), which no step size makes unstable.
+        """
+        if command.force_n is None:
+            return command.normal_m_s * dt_s
+        admittance = self._params.admittance_m_s_n
+        decay_s = admittance * self._params.stiffness_n_m
+        effective_s = -math.expm1(-decay_s * dt_s) / decay_s if decay_s > 0 else dt_s
+        return admittance * (self._state.force_n - command.force_n) * effective_s
+
+    def _run(self) -> None:
+        last_ns = self._clock()
+        while not self._closing.is_set():
+            resting = self._command == STANDSTILL
+            # A command ends the rest at once; while moving, the clock alone sets the pace.
+            if resting:
+                self._wake.wait(RESTING_PERIOD_S)
+                self._wake.clear()
+                last_ns = self._clock() if self._command != STANDSTILL else last_ns
+            else:
+                self._closing.wait(1 / RATE_HZ)
+            now_ns = self._clock()
+            self.step((now_ns - last_ns) * 1e-9)
+            last_ns = now_ns
+
+
+class FingerReport:
+    """Tells the emulated bench where the finger is; says nothing if the port is 0."""
+
+    def __init__(self, port: int) -> None:
+        self._address = ('127.0.0.1', port)
+        self._socket: socket.socket | None = None
+
+    def open(self) -> None:
+        """Open the socket; nobody needs to listen."""
+        if self._address[1]:
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def send(self, state: ArmState) -> None:
+        """Send one datagram."""
+        if self._socket is not None:
+            finger = FingerState(state.time_ns, *state.position, *state.velocity, state.force_n)
+            self._socket.sendto(finger.to_bytes(), self._address)
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None

@@ -1,0 +1,166 @@
+"""One exploration: the loop that ties a motion to an arm and watches over both."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from texture_core.errors import DeviceError
+from texture_core.exploration import ENDED, ExplorationRequest, ExplorationState, Phase
+from texture_exploration.arms.protocol import Arm, ArmState
+from texture_exploration.motions.protocol import Motion, MotionStep
+from texture_exploration.safety import SafetyLimits
+
+STATE_PERIOD_NS = 20_000_000
+# A tick that comes a little early must not wait for the next one.
+STATE_SLACK_NS = 5_000_000
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How an exploration ended; `slid` tells whether there was anything to feel."""
+
+    success: bool
+    message: str
+    slid: bool
+
+
+class Exploration:
+    """Step a motion until it ends, whatever happens to the arm.
+
+    Parameters
+    ----------
+    exploration_id, request
+        What is explored; repeated in each state.
+    arm, motion, limits
+        Who moves, how, and what ends it at once.
+    clock
+        CLOCK_MONOTONIC in ns.
+    on_state
+        Called in the thread of `run` with each new phase and 50 times a second; stamps are of `clock`.
+
+    Attributes
+    ----------
+    ended : threading.Event
+        Set by whoever calls `run` when all is over, for those who wait.
+    outcome, state
+        How it ended, and the newest state.
+    """
+
+    def __init__(
+        self,
+        exploration_id: str,
+        request: ExplorationRequest,
+        *,
+        arm: Arm,
+        motion: Motion,
+        limits: SafetyLimits,
+        clock: Callable[[], int],
+        on_state: Callable[[ExplorationState], None],
+    ) -> None:
+        self.exploration_id = exploration_id
+        self.request = request
+        self.outcome = Outcome(False, 'it broke off through an internal error; see the log', False)
+        self.ended = threading.Event()
+        self.state = ExplorationState(clock(), exploration_id, request.motion, Phase.IDLE)
+        self._arm = arm
+        self._motion = motion
+        self._limits = limits
+        self._clock = clock
+        self._on_state = on_state
+        self._stop_reason = ''
+        self._finish_reason = ''
+        self._slid = False
+        self._next_state_ns = 0
+
+    def run(self, pace: Callable[[], None]) -> Outcome:
+        """Go through the whole motion; `pace` returns when the next step is due."""
+        try:
+            while not self._tick():
+                pace()
+        except DeviceError as error:
+            self._give_up(f'{error}; the finger was not lifted')
+        finally:
+            # Also when a bug ends the loop: no arm is left moving.
+            with contextlib.suppress(DeviceError):
+                self._arm.stop()
+        return self.outcome
+
+    def stop(self, reason: str) -> None:
+        """Lift the finger and abort, from any phase; from any thread."""
+        self._stop_reason = self._stop_reason or reason
+
+    def finish(self, reason: str) -> None:
+        """End the slide early with success; from any thread."""
+        self._finish_reason = self._finish_reason or reason
+
+    def _tick(self) -> bool:
+        """Do one step; return whether the exploration has ended."""
+        arm, now_ns = self._arm.state(), self._clock()
+        trouble = cannot_move(arm, now_ns, self._limits)
+        if trouble:
+            self._give_up(f'{trouble}; the finger was not lifted')
+            return True
+        reason = self._stop_reason or self._limits.violation(arm)
+        if reason:
+            self._motion.abort(reason)
+        if self._finish_reason:
+            self._motion.finish(self._finish_reason)
+        step = self._motion.step(now_ns, arm)
+        self._arm.command(step.command)
+        self._tell(now_ns, step, arm)
+        return step.phase in ENDED
+
+    def _tell(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
+        """Report the state if its phase is new or the time has come."""
+        self._slid |= step.phase is Phase.SLIDE
+        if step.phase in ENDED:
+            self.outcome = Outcome(step.phase is Phase.DONE, self._motion.message, self._slid)
+        if step.phase is self.state.phase and now_ns < self._next_state_ns:
+            return
+        self._next_state_ns = now_ns + STATE_PERIOD_NS - STATE_SLACK_NS
+        vx, vy, _ = arm.velocity
+        self._report(
+            ExplorationState(
+                stamp_ns=now_ns,
+                exploration_id=self.exploration_id,
+                motion=self.request.motion,
+                phase=step.phase,
+                steady_s=step.steady_s,
+                speed_m_s=(vx * vx + vy * vy) ** 0.5,
+                force_n=arm.force_n,
+                direction_rad=step.direction_rad,
+                progress=step.progress,
+                surface=self.request.surface,
+            )
+        )
+
+    def _give_up(self, reason: str) -> None:
+        """End at once: an arm that does not follow cannot be lifted, only stopped."""
+        self.outcome = Outcome(False, reason, self._slid)
+        self._report(
+            ExplorationState(
+                stamp_ns=self._clock(),
+                exploration_id=self.exploration_id,
+                motion=self.request.motion,
+                phase=Phase.ABORTED,
+                progress=self.state.progress,
+                surface=self.request.surface,
+            )
+        )
+
+    def _report(self, state: ExplorationState) -> None:
+        self.state = state
+        self._on_state(state)
+
+
+def cannot_move(arm: ArmState, now_ns: int, limits: SafetyLimits) -> str:
+    """Return in words why the arm would not follow a command, '' if it would."""
+    age_s = (now_ns - arm.time_ns) * 1e-9
+    if arm.fault:
+        return f'the arm reports a fault: {arm.fault}'
+    if age_s > limits.stale_s:
+        return f'the arm has not answered for {age_s * 1e3:.0f} ms'
+    return ''

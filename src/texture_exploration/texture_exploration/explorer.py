@@ -1,0 +1,183 @@
+"""Whoever owns the arm: begins explorations, one at a time, each in a thread of its own."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+
+from texture_core.catalogue import find
+from texture_core.errors import DeviceError, MotionRefused, TextureError
+from texture_core.exploration import ExplorationRequest, ExplorationState
+from texture_exploration.arms.protocol import Arm, Vector
+from texture_exploration.exploration import Exploration, cannot_move
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+PERIOD_S = 0.01
+CLOSING_S = 10.0  # longer than any motion needs to lift
+
+
+class Explorer:
+    """Own an arm and explore with it.
+
+    Parameters
+    ----------
+    arm
+        Not yet connected.
+    touch, limits
+        How to touch, and what is allowed.
+    on_state
+        Called with each state of each exploration, in the thread that moves; stamps are of `clock`.
+    clock
+        CLOCK_MONOTONIC in ns.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        touch: TouchParams,
+        limits: SafetyLimits,
+        on_state: Callable[[ExplorationState], None],
+        clock: Callable[[], int] = time.monotonic_ns,
+    ) -> None:
+        self.arm = arm
+        self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0)
+        self._touch = touch
+        self._limits = limits
+        self._on_state = on_state
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._home: Vector | None = None
+        self._current: Exploration | None = None
+        self._thread: threading.Thread | None = None
+        self._closed = False
+
+    def connect(self) -> Vector:
+        """Reach the arm, or reach it again after a fault; return where explorations begin.
+
+        Raises
+        ------
+        DeviceError
+            If it cannot be reached.
+        """
+        self.arm.close()
+        self.arm.connect()
+        # After a fault the finger may hang anywhere; the first place is the one that the operator chose.
+        self._home = self._home or self.arm.state().position
+        return self._home
+
+    def now_ns(self) -> int:
+        """Return the time on the clock of the states."""
+        return self._clock()
+
+    def arm_age_s(self) -> float:
+        """Return the age of the newest state of the arm, s; NaN if it cannot be reached."""
+        try:
+            return (self._clock() - self.arm.state().time_ns) * 1e-9
+        except DeviceError:
+            return math.nan
+
+    def trouble(self) -> str:
+        """Return in a sentence why the arm cannot move now, '' if it can."""
+        try:
+            state = self.arm.state()
+        except DeviceError as error:
+            return str(error)
+        return cannot_move(state, self._clock(), self._limits)
+
+    @property
+    def current(self) -> Exploration | None:
+        """The exploration that is running, None if none is."""
+        current = self._current
+        return current if current is not None and not current.ended.is_set() else None
+
+    def begin(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
+        """Begin an exploration in a thread of its own; wait for its event `ended`.
+
+        Raises
+        ------
+        MotionRefused, UnknownName
+            If the request, the arm or a running exploration does not allow it.
+        """
+        with self._lock:
+            try:
+                exploration = self._prepare(exploration_id, request)
+            except TextureError:
+                self.counts['refused'] += 1
+                raise
+            self._current = exploration
+            self._thread = threading.Thread(target=self._run, args=(exploration,), name='exploration', daemon=True)
+            self._thread.start()
+            return exploration
+
+    def stop(self, reason: str) -> bool:
+        """Abort the running exploration; return whether there was one."""
+        current = self.current
+        if current is None:
+            return False
+        current.stop(reason)
+        return True
+
+    def close(self) -> None:
+        """Abort, wait until the finger is lifted, let the arm go."""
+        with self._lock:
+            self._closed = True
+        self.stop('the explorer was shut down')
+        if self._thread is not None:
+            self._thread.join(CLOSING_S)
+        self.arm.close()
+
+    def _prepare(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
+        if self._closed:
+            raise MotionRefused('the explorer is shutting down')
+        if self.current is not None:
+            raise MotionRefused(
+                f"exploration '{self.current.exploration_id}' is still running; wait for its end or stop it"
+            )
+        plan = find(MOTIONS, request.motion, 'motion')
+        home = self._ready()
+        motion = plan(request, home, self._touch, self._limits)
+        return Exploration(
+            exploration_id,
+            request,
+            arm=self.arm,
+            motion=motion,
+            limits=self._limits,
+            clock=self._clock,
+            on_state=self._on_state,
+        )
+
+    def _ready(self) -> Vector:
+        """Return where explorations begin, once the arm can move."""
+        if self._home is None or self.trouble():
+            try:
+                self._home = self.connect()
+            except DeviceError as error:
+                raise MotionRefused(f'the arm is not ready: {error}') from error
+        return self._home
+
+    def _run(self, exploration: Exploration) -> None:
+        try:
+            exploration.run(Pacer(PERIOD_S, self._clock))
+        finally:
+            self.counts['done' if exploration.outcome.success else 'aborted'] += 1
+            exploration.ended.set()
+
+
+class Pacer:
+    """Wait until the next step is due; steps that were missed are not made up for."""
+
+    def __init__(self, period_s: float, clock: Callable[[], int]) -> None:
+        self._period_ns = round(period_s * 1e9)
+        self._clock = clock
+        self._due_ns = clock()
+
+    def __call__(self) -> None:
+        """Sleep."""
+        now_ns = self._clock()
+        self._due_ns = max(self._due_ns + self._period_ns, now_ns)
+        time.sleep((self._due_ns - now_ns) * 1e-9)

@@ -1,0 +1,64 @@
+"""Slide in a straight line at constant speed and force."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from texture_core.errors import MotionRefused
+from texture_core.exploration import ExplorationRequest
+from texture_exploration.arms.protocol import Vector
+from texture_exploration.motions.path import PathFollower, ramps_m
+from texture_exploration.motions.protocol import Motion
+from texture_exploration.motions.slide_over import slide_over
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+DEFAULT_SPEED_M_S = 0.05
+DEFAULT_FORCE_N = 1.0
+DEFAULT_DISTANCE_M = 0.1
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight path."""
+
+    length_m: float
+    heading_rad: float
+
+    def direction_rad(self, travelled_m: float) -> float:
+        """Return the same direction everywhere."""
+        return self.heading_rad
+
+
+def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
+    """Plan a slide of `distance_m` at constant speed, with a ramp before and after it.
+
+    Raises
+    ------
+    MotionRefused
+        If a number is out of its range, does not belong to this motion, or the path leaves the workspace.
+    """
+    request = replace(
+        request,
+        speed_m_s=request.speed_m_s or DEFAULT_SPEED_M_S,
+        force_n=request.force_n or DEFAULT_FORCE_N,
+        distance_m=request.distance_m or DEFAULT_DISTANCE_M,
+    )
+    limits.check(request, ('speed_m_s', 'force_n', 'distance_m'))
+    limits.refuse_unused(request, ('radius_m', 'turns', 'duration_s'))
+    _check_room(request, home, touch, limits)
+    follower = PathFollower(Line(request.distance_m, request.direction_rad))
+    return slide_over(follower, request, home, touch, limits)
+
+
+def _check_room(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
+    if not math.isfinite(request.direction_rad):
+        raise MotionRefused(f'{request.motion}: direction_rad is {request.direction_rad}; a finite number is needed')
+    ramps = ramps_m(request.speed_m_s, touch.acceleration_m_s2)
+    allowed = max(0.0, limits.room_m(home, request.direction_rad) - ramps)
+    if request.distance_m > allowed:
+        raise MotionRefused(
+            f'{request.motion}: distance_m is {request.distance_m:g}, which with {ramps:.3f} m to gain and lose speed '
+            f'leaves the workspace; allowed in this direction is at most {math.floor(allowed * 1000) / 1000:g} m'
+        )

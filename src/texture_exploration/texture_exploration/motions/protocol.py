@@ -1,0 +1,49 @@
+"""What every motion can do, and how it is planned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+
+@dataclass(frozen=True)
+class MotionStep:
+    """What the arm shall do now, and how far the motion is.
+
+    `steady_s` promises that phase, speed and force hold so long from now; `direction_rad` is the direction of travel;
+    `progress` the share of the slide that is over.
+    """
+
+    command: ArmCommand
+    phase: Phase
+    steady_s: float
+    direction_rad: float
+    progress: float
+
+
+class Motion(Protocol):
+    """One planned exploration. Knows no clock and no arm: it is stepped with the time and the state of the arm."""
+
+    def step(self, time_ns: int, arm: ArmState) -> MotionStep:
+        """Return what to do at `time_ns` (CLOCK_MONOTONIC), until the phase is DONE or ABORTED."""
+
+    def abort(self, reason: str) -> None:
+        """Lift the finger along the normal and end as ABORTED, from any phase; the first reason counts."""
+
+    def finish(self, reason: str) -> None:
+        """End the slide early, but no earlier than promised, and go on to DONE."""
+
+    @property
+    def message(self) -> str:
+        """What happened, in one sentence."""
+
+
+# Checks a request against the limits, fills in the defaults and returns the motion; `home` is where it begins and
+# to which height it lifts. Raises MotionRefused.
+Planner = Callable[[ExplorationRequest, Vector, TouchParams, SafetyLimits], Motion]

@@ -1,0 +1,91 @@
+"""A motion made of stages, one after the other, that can be aborted in any of them or finished early."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from texture_core.errors import MotionAborted
+from texture_core.exploration import Phase
+from texture_exploration.arms.protocol import ArmCommand, ArmState
+from texture_exploration.motions.path import PathFollower
+from texture_exploration.motions.protocol import MotionStep
+from texture_exploration.motions.stages import Slide, Stage
+
+
+class StagedMotion:
+    """Go through the stages; on any trouble go to the last one, which lifts the finger.
+
+    Parameters
+    ----------
+    stages
+        In their order; the last one lifts.
+    slide
+        The one among them that slides.
+    follower
+        Of the path on which it slides.
+    """
+
+    def __init__(self, stages: Sequence[Stage], slide: Slide, follower: PathFollower) -> None:
+        self._ahead = list(stages)
+        self._lift = stages[-1]
+        self._slide = slide
+        self._follower = follower
+        self._stage: Stage | None = None
+        self._phase = Phase.IDLE
+        self._abort_reason = ''
+        self._finish_reason = ''
+
+    def step(self, time_ns: int, arm: ArmState) -> MotionStep:
+        """Return what to do now; a stage that is over hands on to the next within the same step."""
+        command = self._try_stage(time_ns, arm)
+        while command is None and self._ahead:
+            self._stage = self._ahead.pop(0)
+            self._stage.begin(time_ns, arm)
+            command = self._try_stage(time_ns, arm)
+        if self._stage is None or command is None:
+            self._stage, command = None, ArmCommand()
+            self._phase = Phase.ABORTED if self._abort_reason else Phase.DONE
+        else:
+            self._phase = self._stage.phase
+        return MotionStep(
+            command=command,
+            phase=self._phase,
+            steady_s=self._stage.steady_s if self._stage else 0.0,
+            direction_rad=self._follower.direction_rad,
+            progress=self._slide.progress,
+        )
+
+    def abort(self, reason: str) -> None:
+        """Go on with the last stage, which lifts; the first reason counts."""
+        if self._phase in (Phase.DONE, Phase.ABORTED):
+            return
+        self._abort_reason = self._abort_reason or reason
+        if self._stage is not self._lift:
+            self._stage, self._ahead = None, [self._lift]
+
+    def finish(self, reason: str) -> None:
+        """End the slide as soon as what was promised is kept; without effect before and after it."""
+        if self._stage is self._slide and not self._finish_reason:
+            self._finish_reason = reason
+            self._slide.finish()
+
+    @property
+    def message(self) -> str:
+        """What happened, in one sentence."""
+        return self._abort_reason or self._finish_reason or 'the motion ended as asked'
+
+    def _try_stage(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Return the command of the present stage; None if it is over, cannot go on, or there is none."""
+        stage = self._stage
+        if stage is None:
+            return None
+        try:
+            command = stage.step(time_ns, arm)
+            if command is not None and stage.elapsed_s(time_ns) > stage.timeout_s:
+                raise MotionAborted(
+                    f'waited {stage.timeout_s:.1f} s for {stage.goal}; the force is {arm.force_n:.2f} N'
+                )
+        except MotionAborted as trouble:
+            self.abort(str(trouble))
+            return None
+        return command

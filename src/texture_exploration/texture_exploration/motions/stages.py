@@ -1,0 +1,238 @@
+"""The stages of which motions are made: each knows what to command, and when it is over."""
+
+from __future__ import annotations
+
+import math
+
+from texture_core.errors import MotionAborted
+from texture_core.exploration import Phase
+from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+from texture_exploration.motions.path import STEADY_S, PathFollower, ramp_s, smooth
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+NEAR_M = 0.0005
+PROMISE_S = 0.1  # the longest promise a slide gives; ending it early takes as long
+
+
+class Stage:
+    """One part of a motion.
+
+    Parameters
+    ----------
+    phase
+        What the stage is to the outside.
+    timeout_s
+        The motion aborts when the stage takes longer.
+    goal
+        What is waited for, for the sentence about a timeout.
+    """
+
+    def __init__(self, phase: Phase, timeout_s: float, goal: str) -> None:
+        self.phase = phase
+        self.timeout_s = timeout_s
+        self.goal = goal
+        self.steady_s = 0.0
+        self._begin_ns = 0
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """Note time and place of the start."""
+        self._begin_ns = time_ns
+
+    def elapsed_s(self, time_ns: int) -> float:
+        """Return the time since the start."""
+        return (time_ns - self._begin_ns) * 1e-9
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Return what to do now, None when the stage is over; MotionAborted if its goal cannot be reached."""
+        raise NotImplementedError
+
+
+class GoHome(Stage):
+    """Rise to the height of the start, then go above the surface to where the motion begins."""
+
+    def __init__(self, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
+        super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to reach the start')
+        self._home = home
+        self._touch = touch
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Rise first; then speed up and slow down at half the allowed acceleration."""
+        x, y, z = (goal - at for goal, at in zip(self._home, arm.position, strict=True))
+        if z > NEAR_M:
+            return ArmCommand(normal_m_s=self._touch.lift_speed_m_s)
+        distance = math.hypot(x, y)
+        if distance < NEAR_M:
+            return None
+        if arm.force_n > self._touch.contact_force_n:
+            raise MotionAborted(f'the finger met something on the way to the start, {arm.force_n:.2f} N')
+        gentle = 0.5 * self._touch.acceleration_m_s2
+        speed = min(self._touch.travel_speed_m_s, math.sqrt(2 * gentle * distance), gentle * self.elapsed_s(time_ns))
+        return ArmCommand(tangential_m_s=(speed * x / distance, speed * y / distance))
+
+
+class Approach(Stage):
+    """Come down until the finger feels the surface."""
+
+    def __init__(self, touch: TouchParams, limits: SafetyLimits) -> None:
+        super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to meet the surface')
+        self._touch = touch
+        self._start_m = 0.0
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """Note the height at the start."""
+        super().begin(time_ns, arm)
+        self._start_m = arm.position[2]
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Go down, but no further than allowed."""
+        if arm.force_n > self._touch.contact_force_n:
+            return None
+        if self._start_m - arm.position[2] > self._touch.approach_travel_m:
+            raise MotionAborted(
+                f'no surface within {self._touch.approach_travel_m:g} m below the start; '
+                "bring the finger closer or raise 'approach_travel_m'"
+            )
+        return ArmCommand(normal_m_s=-self._touch.approach_speed_m_s)
+
+
+class Settle(Stage):
+    """Press until the force has stayed within its tolerance for a while."""
+
+    def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
+        super().__init__(Phase.CONTACT, limits.contact_timeout_s, f'the force to settle at {force_n:g} N')
+        self._force_n = force_n
+        self._touch = touch
+        self._outside_ns = 0
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """Nothing has settled yet."""
+        super().begin(time_ns, arm)
+        self._outside_ns = time_ns
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Hold the force."""
+        if abs(arm.force_n - self._force_n) > self._touch.force_tolerance * self._force_n:
+            self._outside_ns = time_ns
+        if (time_ns - self._outside_ns) * 1e-9 >= self._touch.settle_s and time_ns > self._outside_ns:
+            return None
+        return ArmCommand(force_n=self._force_n)
+
+
+class Accelerate(Stage):
+    """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
+
+    def __init__(
+        self, follower: PathFollower, speed_m_s: float, force_n: float, touch: TouchParams, limits: SafetyLimits
+    ) -> None:
+        self._ramp_s = ramp_s(speed_m_s, touch.acceleration_m_s2)
+        super().__init__(
+            Phase.CONTACT,
+            self._ramp_s + limits.contact_timeout_s,
+            f'the finger to slide at {speed_m_s:g} m/s with {force_n:g} N',
+        )
+        self._follower = follower
+        self._speed_m_s = speed_m_s
+        self._force_n = force_n
+        self._touch = touch
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Follow the ramp, then wait for the arm to follow."""
+        self._follower.update(arm)
+        elapsed_s = self.elapsed_s(time_ns)
+        if elapsed_s >= self._ramp_s + STEADY_S and self._reached(arm):
+            return None
+        speed = self._speed_m_s * smooth(elapsed_s / self._ramp_s)
+        return ArmCommand(self._follower.velocity(speed), force_n=self._force_n)
+
+    def _reached(self, arm: ArmState) -> bool:
+        speed = math.hypot(*arm.velocity[:2])
+        fast = abs(speed - self._speed_m_s) <= self._touch.speed_tolerance * self._speed_m_s
+        # Sliding makes the force fluctuate: twice the tolerance of the finger at rest.
+        return fast and abs(arm.force_n - self._force_n) <= 2 * self._touch.force_tolerance * self._force_n
+
+
+class Slide(Stage):
+    """Keep speed and force for the length of the path."""
+
+    def __init__(self, follower: PathFollower, speed_m_s: float, force_n: float, limits: SafetyLimits) -> None:
+        planned_s = follower.path.length_m / speed_m_s
+        super().__init__(Phase.SLIDE, planned_s + limits.slide_overtime_s, 'the slide to end')
+        self._follower = follower
+        self._speed_m_s = speed_m_s
+        self._force_n = force_n
+        self._start_m = 0.0
+        self._promised_ns = 0
+        self._finish = False
+        self.progress = 0.0
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """The slide counts from here."""
+        super().begin(time_ns, arm)
+        self._start_m = self._follower.travelled_m
+
+    def finish(self) -> None:
+        """End as soon as what was promised is kept."""
+        self._finish = True
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Keep on sliding, and promise how long."""
+        self._follower.update(arm)
+        left_s = self._left_s(time_ns, arm)
+        # Anything shorter than a microsecond is rounding, not sliding.
+        if left_s < 1e-6:
+            self.steady_s = 0.0
+            return None
+        self.steady_s = min(PROMISE_S, left_s)
+        self._promised_ns = max(self._promised_ns, time_ns + int(self.steady_s * 1e9))
+        return ArmCommand(self._follower.velocity(self._speed_m_s), force_n=self._force_n)
+
+    def _left_s(self, time_ns: int, arm: ArmState) -> float:
+        age_s = max(0.0, (time_ns - arm.time_ns) * 1e-9)
+        slid_m = self._follower.travelled_m - self._start_m + self._speed_m_s * age_s
+        length_m = self._follower.path.length_m
+        self.progress = min(1.0, slid_m / length_m)
+        by_length = (length_m - slid_m) / self._speed_m_s
+        return min(by_length, (self._promised_ns - time_ns) * 1e-9) if self._finish else by_length
+
+
+class Brake(Stage):
+    """Lose speed smoothly along the path, still pressing: a finger that lifts at speed is plucked off."""
+
+    def __init__(
+        self, follower: PathFollower, speed_m_s: float, force_n: float, touch: TouchParams, limits: SafetyLimits
+    ) -> None:
+        super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to come to rest')
+        self._follower = follower
+        self._speed_m_s = speed_m_s
+        self._force_n = force_n
+        self._ramp_s = ramp_s(speed_m_s, touch.acceleration_m_s2)
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Follow the ramp down."""
+        self._follower.update(arm)
+        share = self.elapsed_s(time_ns) / self._ramp_s
+        if share >= 1.0:
+            return None
+        return ArmCommand(self._follower.velocity(self._speed_m_s * smooth(1.0 - share)), force_n=self._force_n)
+
+
+class Lift(Stage):
+    """Leave the surface along its normal, to the height of the start or at least by the clearance."""
+
+    def __init__(self, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
+        super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to be lifted')
+        self._goal_m = home[2]
+        self._touch = touch
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """Choose the height."""
+        super().begin(time_ns, arm)
+        if arm.force_n > self._touch.contact_force_n:
+            self._goal_m = max(self._goal_m, arm.position[2] + self._touch.clearance_m)
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Go up."""
+        if arm.position[2] >= self._goal_m - NEAR_M:
+            return None
+        return ArmCommand(normal_m_s=self._touch.lift_speed_m_s)

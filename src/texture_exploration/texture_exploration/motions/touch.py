@@ -1,0 +1,23 @@
+"""How the finger comes to the surface, presses and leaves: the same for every motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from texture_core.parameters import param
+
+
+@dataclass(frozen=True)
+class TouchParams:
+    """How the finger comes to the surface, presses, gains speed and leaves."""
+
+    travel_speed_m_s: float = param(0.2, 'Speed above the surface, back to the start.', unit='m/s', low=0.01, high=1.0)
+    approach_speed_m_s: float = param(0.02, 'Speed towards the surface.', unit='m/s', low=0.001, high=0.1)
+    approach_travel_m: float = param(0.05, 'Give up when no surface was met within.', unit='m', low=0.001, high=0.5)
+    contact_force_n: float = param(0.2, 'Force that counts as contact.', unit='N', low=0.02, high=5.0)
+    force_tolerance: float = param(0.1, 'The force has settled within this share.', low=0.01, high=0.5)
+    speed_tolerance: float = param(0.05, 'The speed is reached within this share.', low=0.005, high=0.5)
+    settle_s: float = param(0.1, 'So long the force must stay within its tolerance.', unit='s', low=0.0, high=2.0)
+    acceleration_m_s2: float = param(1.0, 'Highest acceleration along the surface.', unit='m/s²', low=0.05, high=10.0)
+    lift_speed_m_s: float = param(0.05, 'Speed away from the surface.', unit='m/s', low=0.005, high=0.5)
+    clearance_m: float = param(0.005, 'The finger is lifted at least so far.', unit='m', low=0.001, high=0.1)

@@ -1,0 +1,194 @@
+"""Move the finger over the surface as asked, and say what was felt."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+from texture_msgs import action, msg, srv
+
+from texture_core.catalogue import find
+from texture_core.errors import DeviceError, MotionRefused, UnknownName
+from texture_core.estimates import RoughnessEstimate, TextureEstimate
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.parameters import param
+from texture_core.ros.conversions import from_msg, request_from_msg, to_msg
+from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.parameters import declare
+from texture_core.ros.qos import ESTIMATE_QOS, STATE_QOS
+from texture_core.ros.run import run
+from texture_exploration.arms.catalogue import ARMS
+from texture_exploration.estimates import CertaintyParams, Estimates
+from texture_exploration.exploration import Exploration
+from texture_exploration.explorer import Explorer
+from texture_exploration.identity import Identities
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+FEEDBACK_PERIOD_S = 0.05
+IDLE_PERIOD_S = 1.0
+# One exploration that runs, one that waits for its last estimate, one that is being refused, and all the rest.
+THREADS = 4
+
+
+@dataclass(frozen=True)
+class ArmParams:
+    """Which arm carries the finger."""
+
+    arm: str = param('simulated', f"Name of the arm ({', '.join(ARMS)}), or 'module:Class' of your own.")
+
+
+class ExplorerNode(Node):
+    """Explore on request, as a service or as an action; publish what the finger is doing."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('explorer', **kwargs)
+        self._certainty = declare(self, CertaintyParams)
+        self._explorer = self._make_explorer()
+        self._identities = Identities(np.random.default_rng())
+        self._open: dict[str, Estimates] = {}  # explorations whose caller still waits, by id
+        self._publishing = threading.Lock()
+        self._closing = False
+        self._states = self.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
+        self.create_subscription(msg.TextureEstimate, 'texture', self._on_estimate, ESTIMATE_QOS)
+        self.create_subscription(msg.RoughnessEstimate, 'roughness', self._on_estimate, ESTIMATE_QOS)
+        group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
+        self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
+        self.create_service(Trigger, 'stop', self._on_stop, callback_group=group)
+        ActionServer(
+            self, action.Explore, 'explore', self._on_goal, callback_group=group, cancel_callback=_accept_cancel
+        )
+        self.create_timer(IDLE_PERIOD_S, self._publish_idle)
+        Diagnostics(self, self._report)
+        self._publish_idle()
+
+    def shutdown(self) -> None:
+        """Lift the finger, let the arm go, leave nobody waiting."""
+        self._closing = True
+        for estimates in list(self._open.values()):
+            estimates.give_up()
+        self._explorer.close()
+
+    def _make_explorer(self) -> Explorer:
+        arm_class = find(ARMS, declare(self, ArmParams).arm, 'arm')
+        arm = arm_class(declare(self, arm_class.Params))
+        explorer = Explorer(arm, declare(self, TouchParams), declare(self, SafetyLimits), self._on_state)
+        try:
+            explorer.connect()
+        except DeviceError as error:
+            self.get_logger().error(f'{error}; the next request tries again')
+        return explorer
+
+    def _on_service(self, request: srv.Explore.Request, response: srv.Explore.Response) -> srv.Explore.Response:
+        return self._explore(request, response, lambda exploration: exploration.ended.wait())
+
+    def _on_goal(self, goal: Any) -> action.Explore.Result:
+        result = self._explore(
+            goal.request, action.Explore.Result(), lambda exploration: self._attend(goal, exploration)
+        )
+        if goal.is_cancel_requested:
+            goal.canceled()
+        elif result.success:
+            goal.succeed()
+        else:
+            goal.abort()
+        return result
+
+    def _explore(self, request: Any, result: Any, attend: Callable[[Exploration], None]) -> Any:
+        """Begin, attend to it until the finger is lifted, and fill the result of the service or the action."""
+        try:
+            identity = self._identities.next(self.get_clock().now().nanoseconds)
+            exploration = self._explorer.begin(identity, request_from_msg(request))
+        except (MotionRefused, UnknownName) as error:
+            result.message = str(error)
+            self.get_logger().warning(f'refused: {error}')
+            return result
+        estimates = self._open[exploration.exploration_id] = Estimates(exploration.exploration_id)
+        attend(exploration)
+        self._wait_for_last_word(exploration, estimates)
+        del self._open[exploration.exploration_id]
+        result.success, result.message = exploration.outcome.success, exploration.outcome.message
+        result.exploration_id = exploration.exploration_id
+        result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
+        self.get_logger().info(f'{exploration.exploration_id}: {result.message}')
+        return result
+
+    def _attend(self, goal: Any, exploration: Exploration) -> None:
+        """Tell the client how it goes; stop when it no longer wants it."""
+        while not exploration.ended.wait(FEEDBACK_PERIOD_S):
+            if goal.is_cancel_requested:
+                exploration.stop('cancelled by the client')
+            estimates = self._open[exploration.exploration_id]
+            state = self._stamped(exploration.state)
+            goal.publish_feedback(action.Explore.Feedback(state=to_msg(state), texture=to_msg(estimates.texture)))
+
+    def _wait_for_last_word(self, exploration: Exploration, estimates: Estimates) -> None:
+        if exploration.outcome.slid and not self._closing:
+            kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
+            estimates.wait_until_final(kinds, self._certainty.estimate_timeout_s)
+
+    def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        stopped = self._explorer.stop('stopped on request')
+        response.success = True
+        response.message = 'stopping; the finger is being lifted' if stopped else 'nothing is moving'
+        return response
+
+    def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
+        estimate: TextureEstimate | RoughnessEstimate = from_msg(message)
+        if estimate.exploration_id not in self._open:
+            return
+        self._open[estimate.exploration_id].update(estimate)
+        current = self._explorer.current
+        wanted = current is not None and current.request.stop_when_certain
+        ours = current is not None and current.exploration_id == estimate.exploration_id
+        if wanted and ours and isinstance(estimate, TextureEstimate) and self._certainty.certain(estimate):
+            current.finish(
+                f"ended early: '{estimate.label}' is certain with {estimate.confidence:.2f} "
+                f'after {estimate.windows} windows'
+            )
+
+    def _on_state(self, state: ExplorationState) -> None:
+        with self._publishing:
+            self._publish(self._stamped(state))
+
+    def _publish_idle(self) -> None:
+        with self._publishing:
+            if self._explorer.current is None:
+                self._publish(ExplorationState(self.get_clock().now().nanoseconds, '', '', Phase.IDLE))
+
+    def _publish(self, state: ExplorationState) -> None:
+        # After a shutdown of ROS nobody listens any more, but the finger still has to be lifted.
+        if self.context.ok():
+            self._states.publish(to_msg(state))
+
+    def _stamped(self, state: ExplorationState) -> ExplorationState:
+        """Return the state with its stamp on the clock of ROS instead of CLOCK_MONOTONIC."""
+        age_ns = self._explorer.now_ns() - state.stamp_ns
+        return replace(state, stamp_ns=self.get_clock().now().nanoseconds - age_ns)
+
+    def _report(self) -> Report:
+        current, trouble = self._explorer.current, self._explorer.trouble()
+        numbers = {
+            'phase': current.state.phase.value if current else Phase.IDLE.value,
+            'exploration': current.exploration_id if current else '',
+            'arm_trouble': trouble or 'none',
+            'arm_state_age_s': self._explorer.arm_age_s(),
+            **self._explorer.counts,
+        }
+        return ('ERROR', trouble, numbers) if trouble else ('OK', 'the arm answers', numbers)
+
+
+def _accept_cancel(_goal: Any) -> CancelResponse:
+    return CancelResponse.ACCEPT
+
+
+def main() -> None:
+    """Run the node."""
+    run(ExplorerNode, threads=THREADS)

@@ -1,0 +1,106 @@
+"""What an exploration may ask for, and what ends it at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from texture_core.errors import InvalidParameter, MotionRefused
+from texture_core.exploration import ExplorationRequest
+from texture_core.parameters import param
+from texture_exploration.arms.protocol import ArmState, Vector
+
+
+@dataclass(frozen=True)
+class SafetyLimits:
+    """Limits of what is asked, of what is measured, and of how long each phase may take."""
+
+    min_speed_m_s: float = param(0.002, 'Lowest speed that may be asked for.', unit='m/s', low=1e-4)
+    max_speed_m_s: float = param(0.25, 'Highest speed that may be asked for.', unit='m/s', low=1e-4, high=1.0)
+    min_force_n: float = param(0.1, 'Lowest force that may be asked for.', unit='N', low=0.01)
+    max_force_n: float = param(6.0, 'Highest force that may be asked for.', unit='N', low=0.01, high=50.0)
+    force_limit_n: float = param(10.0, 'A higher measured force aborts.', unit='N', low=0.1, high=100.0)
+    min_distance_m: float = param(0.002, 'Shortest slide that may be asked for.', unit='m', low=1e-4)
+    max_distance_m: float = param(1.0, 'Longest slide that may be asked for.', unit='m', low=1e-3)
+    x_low_m: float = param(-0.2, 'Lowest x the finger may reach.', unit='m', low=-2.0, high=2.0)
+    x_high_m: float = param(0.2, 'Highest x the finger may reach.', unit='m', low=-2.0, high=2.0)
+    y_low_m: float = param(-0.2, 'Lowest y the finger may reach.', unit='m', low=-2.0, high=2.0)
+    y_high_m: float = param(0.2, 'Highest y the finger may reach.', unit='m', low=-2.0, high=2.0)
+    z_low_m: float = param(-0.02, 'Lowest z the finger may reach.', unit='m', low=-2.0, high=2.0)
+    z_high_m: float = param(0.2, 'Highest z the finger may reach.', unit='m', low=-2.0, high=2.0)
+    stale_s: float = param(0.15, 'An older arm state aborts.', unit='s', low=0.01, high=2.0)
+    approach_timeout_s: float = param(10.0, 'Time to reach the surface.', unit='s', low=0.1)
+    contact_timeout_s: float = param(3.0, 'Time to settle the force, and to reach the speed.', unit='s', low=0.1)
+    slide_overtime_s: float = param(2.0, 'Time a slide may take beyond its plan.', unit='s', low=0.1)
+    lift_timeout_s: float = param(5.0, 'Time to brake, and to lift.', unit='s', low=0.1)
+
+    def __post_init__(self) -> None:
+        for axis, (low, high) in self.workspace.items():
+            if not low < high:
+                raise InvalidParameter(
+                    f"parameter '{axis}_low_m' is {low:g}; it must be below '{axis}_high_m', which is {high:g} m"
+                )
+        if self.force_limit_n <= self.max_force_n:
+            raise InvalidParameter(
+                f"parameter 'force_limit_n' is {self.force_limit_n}; "
+                f"it must be above 'max_force_n', which is {self.max_force_n} N"
+            )
+
+    @property
+    def workspace(self) -> dict[str, tuple[float, float]]:
+        """Lowest and highest coordinate along each axis, m."""
+        return {
+            'x': (self.x_low_m, self.x_high_m),
+            'y': (self.y_low_m, self.y_high_m),
+            'z': (self.z_low_m, self.z_high_m),
+        }
+
+    def check(self, request: ExplorationRequest, names: Iterable[str]) -> None:
+        """Refuse a request in which one of the named numbers is out of its range.
+
+        Raises
+        ------
+        MotionRefused
+            With the allowed range.
+        """
+        for name in names:
+            low_name, high_name, unit = RANGES[name]
+            value, low, high = getattr(request, name), getattr(self, low_name), getattr(self, high_name)
+            if not low <= value <= high:
+                raise MotionRefused(f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}')
+
+    @staticmethod
+    def refuse_unused(request: ExplorationRequest, names: Iterable[str]) -> None:
+        """Refuse a request that gives a number which the motion does not know: it means another motion."""
+        given = [name for name in names if getattr(request, name) != 0.0]
+        if given:
+            raise MotionRefused(f'{request.motion} knows no {" and no ".join(given)}; leave it at 0')
+
+    def room_m(self, start: Vector, direction_rad: float) -> float:
+        """Return how far the finger can go from `start` along the surface before it leaves the workspace, m."""
+        steps = (math.cos(direction_rad), math.sin(direction_rad))
+        rooms = [
+            ((high if step > 0 else low) - at) / step
+            for step, at, (low, high) in zip(steps, start, self.workspace.values(), strict=False)
+            if abs(step) > 1e-9
+        ]
+        return max(0.0, min(rooms))
+
+    def violation(self, arm: ArmState) -> str:
+        """Return in a sentence which limit the finger has passed, '' if none."""
+        # Written so that a force of NaN is a violation too.
+        if not arm.force_n <= self.force_limit_n:
+            return f'the force of {arm.force_n:.2f} N is above the limit of {self.force_limit_n:g} N'
+        for at, (axis, (low, high)) in zip(arm.position, self.workspace.items(), strict=True):
+            if not low <= at <= high:
+                return f'the finger left the workspace: {axis} is {at:.4f} m, allowed is {low:g} to {high:g} m'
+        return ''
+
+
+# What can be asked for: its limits in SafetyLimits and its unit.
+RANGES = {
+    'speed_m_s': ('min_speed_m_s', 'max_speed_m_s', 'm/s'),
+    'force_n': ('min_force_n', 'max_force_n', 'N'),
+    'distance_m': ('min_distance_m', 'max_distance_m', 'm'),
+}
