@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+
+from texture_core.estimates import TextureEstimate
+from texture_evaluation import metrics
+from texture_evaluation.metrics import SlideResult
+
+
+def slide(surface: str, decisions: str, *, confidences: tuple[float, ...] = (), known: bool = True) -> SlideResult:
+    """Return a slide whose windows of 0.5 s every 0.1 s decide letter by letter, each alone as with the evidence."""
+    sure = confidences or (0.5,) * len(decisions)
+    estimates = [
+        TextureEstimate(0, 'e', label, known, sure[k], windows=k + 1, evidence_s=0.5 + 0.1 * k)
+        for k, label in enumerate(decisions)
+    ]
+    return SlideResult(surface, list(decisions), estimates)
+
+
+RESULTS = [slide('a', 'abaaaa'), slide('b', 'aaabbb')]
+
+
+def test_window_accuracy_counts_every_window() -> None:
+    assert metrics.window_accuracy(RESULTS) == pytest.approx(8 / 12)
+
+
+@pytest.mark.parametrize(('seconds', 'accuracy'), [(0.5, 0.5), (0.6, 0.0), (0.64, 0.0), (0.7, 0.5), (1.0, 1.0)])
+def test_accuracy_at_a_time_is_that_of_the_last_decision_by_then(seconds: float, accuracy: float) -> None:
+    assert metrics.accuracy_at(RESULTS, seconds) == pytest.approx(accuracy)
+
+
+def test_slides_that_are_too_short_are_left_out_and_without_any_there_is_no_accuracy() -> None:
+    assert metrics.accuracy_at([*RESULTS, slide('c', 'a')], 1.0) == 1.0
+    assert metrics.accuracy_at_times(RESULTS) == {'0.5': 0.5, '1.0': 1.0, '2.5': None, '5.0': None}
+    assert metrics.accuracy_at(RESULTS, 0.3) is None
+
+
+def test_a_decision_is_early_when_certain_but_not_before_three_windows() -> None:
+    sure_at_once = slide('a', 'bbaa', confidences=(0.99, 0.99, 0.96, 0.5))
+    never_sure = slide('a', 'aaab')
+    assert metrics.early_decision([sure_at_once]) == {'accuracy': 1.0, 'mean_s': pytest.approx(0.7)}
+    assert metrics.early_decision([never_sure]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.8)}
+
+
+def test_unknown_surfaces_count_as_accepted_if_the_last_estimate_takes_them_for_known() -> None:
+    assert metrics.unknown_accepted([slide('x', 'a'), slide('y', 'a', known=False)]) == 0.5
+    assert metrics.unknown_accepted([]) is None
+
+
+def test_rows_of_the_confusion_table_are_the_true_surfaces() -> None:
+    np.testing.assert_array_equal(metrics.confusion(RESULTS, ('a', 'b')), [[5, 1], [3, 3]])
+
+
+def test_the_curve_ends_where_the_shortest_slide_ends() -> None:
+    seconds, accuracy = metrics.curve([*RESULTS, slide('a', 'aaa')])
+    assert seconds == pytest.approx([0.5, 0.6, 0.7])
+    assert accuracy == pytest.approx([2 / 3, 1 / 3, 2 / 3])

@@ -1,0 +1,175 @@
+"""Charts that a stranger can read: what is shown stands in the title, units on the axes, colours safe for all eyes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from scipy.signal import welch
+
+from texture_core.arrays import AnyArray, Array, Samples
+from texture_core.estimates import TextureEstimate
+
+# Okabe & Ito 2008: told apart by all kinds of colour vision.
+COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000')
+STYLE: Any = {
+    'font.size': 9,
+    'axes.titlesize': 10,
+    'axes.titlelocation': 'left',
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.grid': True,
+    'grid.alpha': 0.3,
+    'legend.frameon': False,
+}
+DPI = 130
+MANY = 25  # more labels than this: no numbers in the cells
+SHOWN_LABELS = 4
+SHOWN_S = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Tour:
+    """One slide from the first sample to the decision, and how often such decisions are right.
+
+    Parameters
+    ----------
+    source
+        Where the signal comes from, in words, such as 'simulated TSF-85'.
+    surface
+        What the finger slid over.
+    samples : (n_samples,)
+        One channel of the slide.
+    rate_hz, unit
+        Of the samples.
+    estimates
+        The growing evidence, after each window.
+    labels, table
+        Confusion of test windows, as `metrics.confusion` counts it.
+    """
+
+    source: str
+    surface: str
+    samples: Array
+    rate_hz: float
+    unit: str
+    estimates: Sequence[TextureEstimate]
+    labels: Sequence[str]
+    table: AnyArray
+
+
+def picture(tour: Tour, path: str | Path) -> Path:
+    """Draw one slide in four panels: signal, spectrum, evidence and confusion."""
+    with _chart(path, (11.0, 8.0)) as figure:
+        figure.suptitle(
+            f'How a slide over {tour.surface} is recognised ({tour.source})', x=0.02, ha='left', fontweight='bold'
+        )
+        (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
+        _signal(signal, tour)
+        _spectrum(spectrum, tour)
+        _evidence(evidence, tour)
+        _table(table, tour.labels, tour.table)
+        table.set_title('4. All test slides: what each single window was taken for')
+    return Path(path)
+
+
+def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: str | Path) -> Path:
+    """Draw a confusion table; each row is a surface and adds up to 100 %."""
+    side = 3.5 + 0.28 * len(labels)
+    with _chart(path, (side + 0.8, side)) as figure:
+        axes = figure.subplots()
+        _table(axes, labels, table)
+        axes.set_title(title)
+    return Path(path)
+
+
+def evidence_chart(series: Mapping[str, tuple[Array, Array]], title: str, path: str | Path) -> Path:
+    """Draw the share of slides recognised over the sliding time used, one line a method."""
+    with _chart(path, (7.0, 4.2)) as figure:
+        axes = figure.subplots()
+        for (name, (seconds, accuracy)), style in zip(series.items(), _styles(), strict=False):
+            axes.plot(seconds, 100 * np.asarray(accuracy), label=name, marker='.', **style)
+        axes.set(xlabel='sliding time used (s)', ylabel='slides recognised (%)', title=title)
+        axes.set_xlim(left=0)
+        axes.set_ylim(top=100.5)
+        axes.legend(loc='lower right')
+    return Path(path)
+
+
+@contextmanager
+def _chart(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
+    """Give an empty figure and save it at the end; no display is needed and no global state is touched."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=size, layout='constrained')
+        FigureCanvasAgg(figure)
+        yield figure
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=DPI)
+
+
+def _styles() -> Iterator[dict[str, Any]]:
+    for dashes in ('-', '--', ':'):
+        for colour in COLOURS:
+            yield {'color': colour, 'linestyle': dashes}
+
+
+def _signal(axes: Any, tour: Tour) -> None:
+    shown = tour.samples[: round(SHOWN_S * tour.rate_hz)]
+    axes.plot(np.arange(len(shown)) / tour.rate_hz, shown, color=COLOURS[0], linewidth=0.8)
+    axes.set(xlabel='time since the slide began (s)', ylabel=f'signal ({tour.unit or "no unit"})')
+    axes.set_title(f'1. The fingertip vibrates while it slides: the first {SHOWN_S} s')
+
+
+def _spectrum(axes: Any, tour: Tour) -> None:
+    samples: Samples = np.asarray(tour.samples, dtype=float)
+    n_segment = min(len(samples), round(tour.rate_hz / 2))
+    hertz, power = welch(samples, fs=tour.rate_hz, nperseg=n_segment)
+    axes.semilogy(hertz[1:], power[1:], color=COLOURS[0], linewidth=1)
+    unit = f'{tour.unit}²/Hz' if tour.unit else '1/Hz'
+    axes.set(xlabel='frequency (Hz)', ylabel=f'power density ({unit})')
+    axes.set_title('2. Its spectrum is the mark of the surface')
+
+
+def _evidence(axes: Any, tour: Tour) -> None:
+    labels = tour.estimates[-1].labels
+    seconds = [estimate.evidence_s for estimate in tour.estimates]
+    probabilities = 100 * np.array([estimate.probabilities for estimate in tour.estimates])
+    shown = np.argsort(-probabilities.max(axis=0))[:SHOWN_LABELS]
+    for column, style in zip(sorted(shown, key=lambda c: -probabilities[-1, c]), _styles(), strict=False):
+        axes.plot(seconds, probabilities[:, column], marker='.', label=labels[column], **style)
+    axes.set(xlabel='sliding time used (s)', ylabel='probability (%)', ylim=(-3, 103))
+    axes.set_xlim(left=0)
+    axes.set_title(f'3. Evidence grows until it says: {tour.estimates[-1].label}')
+    axes.legend(loc='center right', title='surface')
+
+
+def _table(axes: Any, labels: Sequence[str], table: AnyArray) -> None:
+    totals = np.maximum(table.sum(axis=1, keepdims=True), 1)
+    percent = 100 * table / totals
+    image = axes.imshow(percent, cmap='Blues', vmin=0, vmax=100)
+    axes.grid(visible=False)
+    axes.set_xticks(range(len(labels)), labels, rotation=90 if len(labels) > 6 else 30, ha='center')
+    axes.set_yticks(range(len(labels)), labels)
+    axes.set(xlabel='taken for', ylabel='surface under the finger')
+    axes.figure.colorbar(image, ax=axes, label='windows of the surface (%)', fraction=0.046)
+    if len(labels) > MANY:
+        return
+    size = 8 if len(labels) <= 12 else 6
+    for row, column in np.argwhere(percent >= 0.5):
+        value = percent[row, column]
+        axes.text(
+            column,
+            row,
+            f'{value:.0f}',
+            ha='center',
+            va='center',
+            fontsize=size,
+            color='white' if value > 60 else 'black',
+        )

@@ -1,0 +1,98 @@
+"""What is measured on the growing evidence of slides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.arrays import AnyArray, Array
+from texture_core.estimates import TextureEstimate
+
+TIMES_S = (0.5, 1.0, 2.5, 5.0)
+CONFIDENT = 0.95
+LEAST_WINDOWS = 3
+TOLERANCE_S = 1e-6  # sums of hops are not exact
+
+
+@dataclass(frozen=True, eq=False)
+class SlideResult:
+    """What a model said during one slide.
+
+    Parameters
+    ----------
+    surface
+        The true label.
+    window_labels : (n_windows,)
+        What each window alone looks like.
+    estimates : (n_windows,)
+        The estimate after each window, from all evidence so far.
+    """
+
+    surface: str
+    window_labels: Sequence[str]
+    estimates: Sequence[TextureEstimate]
+
+    def after(self, seconds: float) -> TextureEstimate | None:
+        """Return the estimate after so much sliding; None if the slide has less or the first window is longer."""
+        if not self.estimates or self.estimates[-1].evidence_s < seconds - TOLERANCE_S:
+            return None
+        heard = [estimate for estimate in self.estimates if estimate.evidence_s <= seconds + TOLERANCE_S]
+        return heard[-1] if heard else None
+
+    def early(self) -> TextureEstimate:
+        """Return the first estimate that is certain, else the last one."""
+        certain = (e for e in self.estimates if e.confidence >= CONFIDENT and e.windows >= LEAST_WINDOWS)
+        return next(certain, self.estimates[-1])
+
+
+def window_accuracy(results: Sequence[SlideResult]) -> float:
+    """Return the share of windows that are recognised each by itself."""
+    right = [label == result.surface for result in results for label in result.window_labels]
+    return float(np.mean(right))
+
+
+def accuracy_at(results: Sequence[SlideResult], seconds: float) -> float | None:
+    """Return the share of slides that are recognised after so much sliding; None if no slide is long enough."""
+    decided = [(result.surface, result.after(seconds)) for result in results]
+    right = [estimate.label == surface for surface, estimate in decided if estimate is not None]
+    return float(np.mean(right)) if right else None
+
+
+def accuracy_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
+    """Return `accuracy_at` the usual times, keyed '0.5', '1.0' and so on."""
+    return {f'{seconds:.1f}': accuracy_at(results, seconds) for seconds in TIMES_S}
+
+
+def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
+    """Return accuracy and mean time of decisions taken as soon as they are certain."""
+    decisions = [(result.surface, result.early()) for result in results]
+    return {
+        'accuracy': float(np.mean([estimate.label == surface for surface, estimate in decisions])),
+        'mean_s': float(np.mean([estimate.evidence_s for _, estimate in decisions])),
+    }
+
+
+def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
+    """Return the share of slides over surfaces the model was never taught that it took for known; None without any."""
+    return float(np.mean([result.estimates[-1].known for result in results])) if results else None
+
+
+def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray:
+    """Return how many windows of each surface (row) were taken for each label (column), (n_labels, n_labels)."""
+    place = {label: index for index, label in enumerate(labels)}
+    table = np.zeros((len(labels), len(labels)), dtype=int)
+    for result in results:
+        for label in result.window_labels:
+            table[place[result.surface], place[label]] += 1
+    return table
+
+
+def curve(results: Sequence[SlideResult]) -> tuple[Array, Array]:
+    """Return seconds of sliding and the share of slides recognised after them, as far as every slide reaches."""
+    shortest = min((result.estimates[-1].evidence_s for result in results), default=0.0)
+    times = sorted({round(e.evidence_s, 6) for result in results for e in result.estimates})
+    times = [seconds for seconds in times if seconds <= shortest + TOLERANCE_S]
+    points = [(seconds, accuracy) for seconds in times if (accuracy := accuracy_at(results, seconds)) is not None]
+    return np.array([seconds for seconds, _ in points]), np.array([accuracy for _, accuracy in points])
