@@ -89,6 +89,12 @@ def test_a_group_keeps_its_changes_to_itself_and_an_unscoped_one_does_not(launch
     assert launch(f'<let name="n" value="outer"/><group scoped="false">{change}</group>{node}')[0].namespace == '/left'
 
 
+def test_an_empty_namespace_is_the_root(launch) -> None:
+    (node,) = launch('<push_ros_namespace namespace=""/><node pkg="p" exec="e" name="n"/>')
+    assert (node.namespace, node.parameter_key, node.label) == ('/', '/n', 'n')
+    assert launch('<node pkg="p" exec="e" namespace=""/>')[0].namespace == '/'
+
+
 def test_an_include_gets_its_arguments_and_leaves_them_set_as_upstream_does(launch) -> None:
     inner = launch.folder / 'inner.launch.xml'
     inner.write_text('<launch><arg name="n" default="none"/><node pkg="p" exec="e" name="$(var n)"/></launch>')

@@ -29,7 +29,7 @@ def read_node(element: Element, scope: Scope) -> NodeDescription:
         package=texts['pkg'],
         executable=texts['exec'],
         name=texts['name'],
-        namespace=joined_namespace(scope.namespace, texts['namespace']),
+        namespace=joined_namespace(scope.namespace, texts['namespace']) or '/' * ('namespace' in element.attrib),
         arguments=command_line(element.get('args', ''), scope),
         parameters=tuple(_parameters(item, scope) for item in element.findall('param')),
         remappings=tuple(_remapping(item, scope) for item in element.findall('remap')),

@@ -126,7 +126,7 @@ def _read_set_env(element: Element, scope: Scope, _reading: Reading) -> None:
 
 
 def _read_namespace(element: Element, scope: Scope, _reading: Reading) -> None:
-    scope.namespace = joined_namespace(scope.namespace, scope.expand(attribute(element, 'namespace')))
+    scope.namespace = joined_namespace(scope.namespace, scope.expand(attribute(element, 'namespace'))) or '/'
 
 
 def _read_group(element: Element, scope: Scope, reading: Reading) -> None:
