@@ -16,7 +16,7 @@ from binascii import crc_hqx
 from struct import Struct
 from typing import NamedTuple
 
-from cobs import cobs
+from texture_drivers.cobs import stuff, unstuff
 
 HEADER = Struct('<BBHIBB')
 CRC = Struct('<H')
@@ -99,12 +99,11 @@ class Deframer:
 
 def unpack(piece: bytes) -> Frame | None:
     """Return the frame in what stood between two zero bytes, or None if it is damaged."""
-    try:
-        raw = cobs.decode(piece)
-    except cobs.DecodeError:
+    raw = unstuff(piece)
+    if raw is None or len(raw) < HEADER.size + CRC.size:
         return None
     checked = raw[: -CRC.size]
-    if len(checked) < HEADER.size or CRC.unpack(raw[-CRC.size :]) != (crc_hqx(checked, CRC_START),):
+    if CRC.unpack(raw[-CRC.size :]) != (crc_hqx(checked, CRC_START),):
         return None
     kind, version, sequence, time_us, rows, columns = HEADER.unpack_from(checked)
     return Frame(kind, version, sequence, time_us, rows, columns, checked[HEADER.size :])
@@ -112,19 +111,10 @@ def unpack(piece: bytes) -> Frame | None:
 
 def pack(frame: Frame) -> bytes:
     """Return the bytes of a frame on the line, the zero after it included; sequence and time are cut to their bits."""
-    checked = (
-        HEADER.pack(
-            frame.kind,
-            frame.version,
-            frame.sequence % (1 << SEQUENCE_BITS),
-            frame.time_us % (1 << TIME_BITS),
-            frame.rows,
-            frame.columns,
-        )
-        + frame.body
-    )
-    stuffed: bytes = cobs.encode(checked + CRC.pack(crc_hqx(checked, CRC_START)))
-    return stuffed + DELIMITER
+    sequence, time_us = frame.sequence % (1 << SEQUENCE_BITS), frame.time_us % (1 << TIME_BITS)
+    header = HEADER.pack(frame.kind, frame.version, sequence, time_us, frame.rows, frame.columns)
+    checked = header + frame.body
+    return stuff(checked + CRC.pack(crc_hqx(checked, CRC_START))) + DELIMITER
 
 
 class WrappingCounter:
