@@ -92,14 +92,30 @@ def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: st
 
 def evidence_chart(series: Mapping[str, tuple[Array, Array]], title: str, path: str | Path) -> Path:
     """Draw the share of slides recognised over the sliding time used, one line a method."""
+    percent = {name: (seconds, 100 * np.asarray(accuracy)) for name, (seconds, accuracy) in series.items()}
+    return line_chart(percent, title, ('sliding time used (s)', 'slides recognised (%)'), path)
+
+
+def line_chart(
+    series: Mapping[str, tuple[Array, Array]],
+    title: str,
+    axis_labels: tuple[str, str],
+    path: str | Path,
+    *,
+    logarithmic: bool = False,
+) -> Path:
+    """Draw lines of percentages over x, on a logarithmic x axis if wanted; (x, y) by the name of each line."""
     with _chart(path, (7.0, 4.2)) as figure:
         axes = figure.subplots()
-        for (name, (seconds, accuracy)), style in zip(series.items(), _styles(), strict=False):
-            axes.plot(seconds, 100 * np.asarray(accuracy), label=name, marker='.', **style)
-        axes.set(xlabel='sliding time used (s)', ylabel='slides recognised (%)', title=title)
-        axes.set_xlim(left=0)
-        axes.set_ylim(top=100.5)
-        axes.legend(loc='lower right')
+        for (name, (x, y)), style in zip(series.items(), _styles(), strict=False):
+            axes.plot(x, y, label=name, marker='.', **style)
+        axes.set(xlabel=axis_labels[0], ylabel=axis_labels[1], title=title)
+        if logarithmic:
+            axes.set_xscale('log')
+        else:
+            axes.set_xlim(left=0)
+        axes.set_ylim(top=101)
+        axes.legend(loc='best')
     return Path(path)
 
 

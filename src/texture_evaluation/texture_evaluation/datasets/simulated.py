@@ -14,7 +14,7 @@ from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_evaluation.bags import BagWriter
 from texture_simulation.offline import simulate_exploration
-from texture_simulation.scene import load_scene
+from texture_simulation.scene import Scene, load_scene
 
 START_NS = 1_000_000_000 * NANOSECONDS
 PAUSE_NS = NANOSECONDS
@@ -50,24 +50,26 @@ def write_simulated(
     """
     table = load_scene(scene)
     chosen = [table.surface(name).name for name in surfaces] or list(table.surfaces)
-    paths = []
     start_ns = START_NS
     for surface in chosen:
-        path = Path(out) / surface
-        with BagWriter(path) as bag:
-            first: dict[str, int] = {}
-            for number in range(1, plan.slides + 1):
-                states, signals = simulate_exploration(
-                    table, surface, plan.speed_m_s, plan.force_n, plan.slide_s,
-                    start_ns=start_ns, exploration_id=f'{surface}/slide{number:02d}', rng=rng,
-                )  # fmt: skip
-                streams = {topic: _running_on(batches, first, topic) for topic, batches in signals.items()}
-                logged = _in_order(states, streams)
-                for log_ns, topic, value in logged:
-                    bag.write(topic, value, log_ns)
-                    start_ns = log_ns + PAUSE_NS
-        paths.append(path)
-    return paths
+        start_ns = _write_surface(Path(out) / surface, table, plan, start_ns, rng)
+    return [Path(out) / surface for surface in chosen]
+
+
+def _write_surface(path: Path, scene: Scene, plan: SlidePlan, start_ns: int, rng: np.random.Generator) -> int:
+    """Write the bag of one surface, named as the path; return when the next one may start."""
+    first: dict[str, int] = {}
+    with BagWriter(path) as bag:
+        for number in range(1, plan.slides + 1):
+            states, signals = simulate_exploration(
+                scene, path.name, plan.speed_m_s, plan.force_n, plan.slide_s,
+                start_ns=start_ns, exploration_id=f'{path.name}/slide{number:02d}', rng=rng,
+            )  # fmt: skip
+            streams = {topic: _running_on(batches, first, topic) for topic, batches in signals.items()}
+            for log_ns, topic, value in _in_order(states, streams):
+                bag.write(topic, value, log_ns)
+            start_ns = log_ns + PAUSE_NS
+    return start_ns
 
 
 def _running_on(batches: Iterable[TactileSignal], first: dict[str, int], topic: str) -> list[TactileSignal]:

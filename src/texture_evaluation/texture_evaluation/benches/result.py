@@ -1,0 +1,71 @@
+"""What a benchmark hands back: numbers as JSON, with the machine, the data and the split they were got from."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+CPU_INFO = Path('/proc/cpuinfo')
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Where a benchmark writes, where recorded data lies, and whether to hurry.
+
+    Parameters
+    ----------
+    out
+        Folder for the JSON and the chart.
+    data
+        Folder that holds the recorded data sets, each in its own folder; None if there is none.
+    seed
+        Of everything random.
+    quick
+        Fewer repetitions, for tests; such numbers are not for publishing.
+    """
+
+    out: Path
+    data: Path | None = None
+    seed: int = 0
+    quick: bool = False
+
+
+@dataclass(frozen=True)
+class BenchResult:
+    """The numbers of one benchmark, and in one line each what was measured on what."""
+
+    name: str
+    measured: str
+    data: str
+    split: str
+    numbers: Mapping[str, Any]
+    charts: tuple[Path, ...] = field(default=())
+
+    def write(self, out: Path) -> Path:
+        """Write the JSON and return its path."""
+        out.mkdir(parents=True, exist_ok=True)
+        content = {
+            'name': self.name,
+            'measured': self.measured,
+            'data': self.data,
+            'split': self.split,
+            'machine': machine(),
+            'numbers': self.numbers,
+            'charts': [chart.name for chart in self.charts],
+        }
+        path = out / f'{self.name}.json'
+        path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + '\n', encoding='utf-8')
+        return path
+
+
+def machine() -> str:
+    """Return the processor, how many of its cores there are, and the Python in use."""
+    lines = CPU_INFO.read_text(encoding='utf-8', errors='replace').splitlines() if CPU_INFO.exists() else []
+    models = [line.partition(':')[2].strip() for line in lines if line.startswith('model name')]
+    model = models[0] if models else platform.machine()
+    return f'{model}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}'
