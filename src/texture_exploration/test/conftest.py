@@ -28,9 +28,17 @@ class Table:
         self.touch, self.limits = touch, limits
         self.states, self.places = [], []
         self.exploration = None
+        self.asleep_ns = 0
         self.when = {}  # what to do at the third state of a phase
 
+    def sleep(self):
+        """Let the whole machine sleep: time goes on, arm and exploration do not."""
+        self.asleep_ns = 400_000_000
+
     def pace(self):
+        if self.asleep_ns:
+            self.now_ns, self.asleep_ns = self.now_ns + self.asleep_ns, 0
+            return
         for _ in range(2):
             self.now_ns += ARM_STEP_NS
             self.arm.step(ARM_STEP_NS * 1e-9)

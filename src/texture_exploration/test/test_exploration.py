@@ -61,6 +61,12 @@ def test_an_arm_that_hangs_aborts_within_the_allowed_age(table, phase):
     assert table.phases[-1] is Phase.ABORTED
 
 
+def test_a_machine_that_slept_does_not_take_the_arm_for_dead(table):
+    table.when[Phase.SLIDE] = table.sleep
+    assert table.explore().success
+    assert table.exploration.gaps == 1
+
+
 def test_a_fault_of_the_arm_aborts_and_is_told(table):
     table.when[Phase.SLIDE] = lambda: table.arm.fail('protective stop')
     assert 'the arm reports a fault: protective stop' in table.explore().message

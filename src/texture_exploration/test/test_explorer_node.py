@@ -163,7 +163,7 @@ def test_stop_works_while_the_service_is_busy(world):
 
 
 def test_the_action_tells_how_it_goes(world):
-    goal = world.goal(**QUICK)
+    goal = world.goal(**{**QUICK, 'distance_m': 0.1})
     result = world.result(goal.get_result_async())
     assert result.status == GoalStatus.STATUS_SUCCEEDED
     assert result.result.success
@@ -217,7 +217,8 @@ def test_estimates_of_another_exploration_are_left_alone(make_world):
 
 
 def test_the_diagnostics_count_what_happened(world):
-    world.result(world.call(**QUICK))
+    response = world.result(world.call(**QUICK))
+    assert response.success, response.message
     world.result(world.call(motion='nothing'))
 
     def numbers():

@@ -47,7 +47,7 @@ def test_the_force_error_decays_with_the_time_constant_of_the_admittance(clock):
 
 
 def test_force_control_is_stable_however_stiff_the_surface_and_long_the_step(clock):
-    arm = make(clock, stiffness_n_m=1e5, start_height_m=0.0)
+    arm = make(clock, stiffness_n_m=1e5, start_height_m=0.0, command_timeout_s=1.0)
     run(arm, clock, ArmCommand(force_n=1.0), 5.0, dt=0.1)
     assert arm.state().force_n == pytest.approx(1.0)
 
@@ -56,6 +56,15 @@ def test_above_the_surface_force_control_comes_down(clock):
     arm = make(clock, start_height_m=0.002)
     run(arm, clock, ArmCommand(force_n=1.0), 1.0)
     assert arm.state().force_n == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_command_moves_the_arm_no_longer_than_it_holds_however_late_the_step(clock):
+    arm = make(clock, command_timeout_s=0.1)
+    arm.command(ArmCommand(normal_m_s=0.02))
+    clock.now_ns += 1_000_000_000
+    arm.step(1.0)
+    assert arm.state().position[2] == pytest.approx(0.01 + 0.02 * 0.1)
+    assert arm.state().velocity == (0.0, 0.0, 0.0)
 
 
 def test_a_frozen_arm_grows_old_until_it_is_connected_again(clock):

@@ -14,6 +14,8 @@ from texture_exploration.motions.protocol import Motion, MotionStep
 from texture_exploration.safety import SafetyLimits
 
 STATE_PERIOD_NS = 20_000_000
+# After a longer gap between two steps it was we who slept: the age of the arm's state says nothing about the arm.
+GAP_NS = 50_000_000
 # A tick that comes a little early must not wait for the next one.
 STATE_SLACK_NS = 5_000_000
 
@@ -47,6 +49,8 @@ class Exploration:
         Set by whoever calls `run` when all is over, for those who wait.
     outcome, state
         How it ended, and the newest state.
+    gaps
+        How often a step came far too late, because the machine was busy.
     """
 
     def __init__(
@@ -64,6 +68,7 @@ class Exploration:
         self.request = request
         self.outcome = Outcome(False, 'it broke off through an internal error; see the log', False)
         self.ended = threading.Event()
+        self.gaps = 0
         self.state = ExplorationState(clock(), exploration_id, request.motion, Phase.IDLE)
         self._arm = arm
         self._motion = motion
@@ -74,6 +79,7 @@ class Exploration:
         self._finish_reason = ''
         self._slid = False
         self._next_state_ns = 0
+        self._last_ns = self._awake_ns = clock()
 
     def run(self, pace: Callable[[], None]) -> Outcome:
         """Go through the whole motion; `pace` returns when the next step is due."""
@@ -99,7 +105,8 @@ class Exploration:
     def _tick(self) -> bool:
         """Do one step; return whether the exploration has ended."""
         arm, now_ns = self._arm.state(), self._clock()
-        trouble = cannot_move(arm, now_ns, self._limits)
+        self._note_gap(now_ns)
+        trouble = cannot_move(arm, now_ns, self._limits, self._awake_ns)
         if trouble:
             self._give_up(f'{trouble}; the finger was not lifted')
             return True
@@ -112,6 +119,12 @@ class Exploration:
         self._arm.command(step.command)
         self._tell(now_ns, step, arm)
         return step.phase in ENDED
+
+    def _note_gap(self, now_ns: int) -> None:
+        if now_ns - self._last_ns > GAP_NS:
+            self._awake_ns = now_ns
+            self.gaps += 1
+        self._last_ns = now_ns
 
     def _tell(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
         """Report the state if its phase is new or the time has come."""
@@ -156,9 +169,12 @@ class Exploration:
         self._on_state(state)
 
 
-def cannot_move(arm: ArmState, now_ns: int, limits: SafetyLimits) -> str:
-    """Return in words why the arm would not follow a command, '' if it would."""
-    age_s = (now_ns - arm.time_ns) * 1e-9
+def cannot_move(arm: ArmState, now_ns: int, limits: SafetyLimits, awake_ns: int = 0) -> str:
+    """Return in words why the arm would not follow a command, '' if it would.
+
+    Silence of the arm counts from `awake_ns` on at the earliest: before, nobody listened.
+    """
+    age_s = (now_ns - max(arm.time_ns, awake_ns)) * 1e-9
     if arm.fault:
         return f'the arm reports a fault: {arm.fault}'
     if age_s > limits.stale_s:

@@ -45,7 +45,7 @@ class Explorer:
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self.arm = arm
-        self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0)
+        self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, late_steps=0)
         self._touch = touch
         self._limits = limits
         self._on_state = on_state
@@ -165,6 +165,7 @@ class Explorer:
             exploration.run(Pacer(PERIOD_S, self._clock))
         finally:
             self.counts['done' if exploration.outcome.success else 'aborted'] += 1
+            self.counts['late_steps'] += exploration.gaps
             exploration.ended.set()
 
 

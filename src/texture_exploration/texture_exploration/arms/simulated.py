@@ -28,7 +28,7 @@ class SimulatedArmParams:
         0.01, 'Normal speed per force error of the force control.', unit='m/s/N', low=1e-4, high=1.0
     )
     start_height_m: float = param(0.01, 'Height of the finger at the start.', unit='m', low=0.0, high=0.2)
-    command_timeout_s: float = param(0.25, 'Stand still when no command came for so long.', unit='s', low=0.02)
+    command_timeout_s: float = param(0.1, 'A command holds so long.', unit='s', low=0.02, high=2.0)
     finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
 
 
@@ -56,8 +56,7 @@ class SimulatedArm:
         self._params = params
         self._clock = clock
         self._own_thread = own_thread
-        self._command = STANDSTILL
-        self._command_ns = clock()
+        self._order = (STANDSTILL, clock())  # the command, and when it came
         self._state = ArmState(clock(), (0.0, 0.0, params.start_height_m), (0.0, 0.0, 0.0), 0.0)
         self._frozen = False
         self._fault = ''
@@ -80,7 +79,7 @@ class SimulatedArm:
 
     def close(self) -> None:
         """Stop and end the thread."""
-        self._command = STANDSTILL
+        self.stop()
         self._closing.set()
         self._wake.set()
         if self._thread is not None:
@@ -96,15 +95,14 @@ class SimulatedArm:
         """Follow a command from the next step on."""
         if self._closing.is_set():
             raise DeviceError('the simulated arm is not connected; connect it first')
-        was_resting = self._command == STANDSTILL
-        self._command_ns = self._clock()
-        self._command = command
+        was_resting = self._resting
+        self._order = (command, self._clock())
         if was_resting:
             self._wake.set()
 
     def stop(self) -> None:
         """Stand still."""
-        self._command = STANDSTILL
+        self._order = (STANDSTILL, self._clock())
 
     def freeze(self) -> None:
         """Behave like a controller that hangs: the state grows old, commands do nothing, until connected again."""
@@ -119,20 +117,26 @@ class SimulatedArm:
         self._push_n = force_n
 
     def step(self, dt_s: float) -> None:
-        """Move for `dt_s` as commanded; the new state carries the clock's present time."""
+        """Move for `dt_s` up to the clock's present time, as commanded and as long as the command holds."""
         if self._frozen:
             return
         now_ns = self._clock()
-        unheard = (now_ns - self._command_ns) * 1e-9 > self._params.command_timeout_s
-        if unheard or self._fault:
-            self._command = STANDSTILL
-        command = self._command
+        command, given_ns = self._order if not self._fault else (STANDSTILL, now_ns)
+        left_s = self._params.command_timeout_s + (given_ns - now_ns) * 1e-9
+        moving_s = max(0.0, dt_s + min(0.0, left_s))
         (vx, vy), (x, y, z) = command.tangential_m_s, self._state.position
-        dz = self._normal_step(command, dt_s)
-        position = (x + vx * dt_s, y + vy * dt_s, z + dz)
-        velocity: Vector = (vx, vy, dz / dt_s if dt_s > 0 else 0.0)
+        dz = self._normal_step(command, moving_s)
+        position = (x + vx * moving_s, y + vy * moving_s, z + dz)
+        velocity: Vector = (vx, vy, dz / moving_s if moving_s > 0 else 0.0)
+        if left_s < 0:
+            velocity = (0.0, 0.0, 0.0)
+            self._order = (STANDSTILL, now_ns)
         self._state = ArmState(now_ns, position, velocity, self._force(position[2]), self._fault)
         self._report.send(self._state)
+
+    @property
+    def _resting(self) -> bool:
+        return self._order[0] == STANDSTILL
 
     def _force(self, height_m: float) -> float:
         return self._params.stiffness_n_m * max(0.0, -height_m) + self._push_n
@@ -153,12 +157,11 @@ class SimulatedArm:
     def _run(self) -> None:
         last_ns = self._clock()
         while not self._closing.is_set():
-            resting = self._command == STANDSTILL
-            # A command ends the rest at once; while moving, the clock alone sets the pace.
-            if resting:
+            if self._resting:
+                # A command ends the rest at once, and counts from now on.
                 self._wake.wait(RESTING_PERIOD_S)
                 self._wake.clear()
-                last_ns = self._clock() if self._command != STANDSTILL else last_ns
+                last_ns = self._clock()
             else:
                 self._closing.wait(1 / RATE_HZ)
             now_ns = self._clock()
