@@ -8,20 +8,20 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, groupby
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
 from texture_core.arrays import Array
-from texture_core.catalogue import find, unknown
+from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter
 from texture_core.features import FeatureVector
 from texture_core.parameters import from_mapping
 from texture_core.resources import find_file
 from texture_core.window import Window
 from texture_features.catalogue import FEATURES
+from texture_features.choice import choose
 from texture_features.feature import Feature, Windows
 from texture_features.windows import CutWindow, Piece, SlideEnd, WindowParams
 
@@ -211,11 +211,6 @@ def read_recipe(name_or_path: str) -> Mapping[str, Any]:
     return content
 
 
-def recipe_name(name_or_path: str) -> str:
-    """Return the name of a recipe: that of its file."""
-    return Path(name_or_path).stem
-
-
 def _input(topic: str, section: Any, where: str) -> InputFeatures:
     place = f"{where}, input '{topic}'"
     if not isinstance(section, Mapping) or not isinstance(section.get('features'), list) or not section['features']:
@@ -223,18 +218,7 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
     for key in section:
         if key != 'features':
             raise InvalidParameter(f'{place}: {unknown(str(key), ["features"], "key")}')
-    return InputFeatures(topic, tuple(_feature(entry, place) for entry in section['features']))
-
-
-def _feature(entry: Any, where: str) -> tuple[str, Feature]:
-    """Build a feature from 'name' or {name: {parameter: value}}."""
-    if isinstance(entry, str):
-        entry = {entry: {}}
-    if not isinstance(entry, Mapping) or len(entry) != 1:
-        raise InvalidParameter(f"{where}: came {entry!r}; a feature is written 'name' or 'name: {{parameter: value}}'")
-    [(name, values)] = entry.items()
-    cls = find(FEATURES, str(name), 'feature')
-    return str(name), from_mapping(cls, values or {}, f"{where}, feature '{name}'")
+    return InputFeatures(topic, tuple(choose(FEATURES, entry, 'feature', place) for entry in section['features']))
 
 
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:

@@ -1,0 +1,101 @@
+"""Evidence about a surface, growing window by window while the finger slides."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from texture_core.estimates import TextureEstimate
+from texture_core.features import FeatureVector
+from texture_core.signal import NANOSECONDS
+from texture_estimation.fingerprint import difference
+from texture_estimation.model import Model
+
+NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
+NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
+
+
+class Evidence:
+    """Join the judgements of the windows of one slide; the same code on the robot and on recordings.
+
+    A new exploration id, or a vector after the `last` one, begins anew. `known` is set whenever there is a label:
+    unknown surfaces are not rejected yet.
+
+    Parameters
+    ----------
+    model
+        What judges each window; None answers the end of every slide with a sentence that no model is loaded.
+    """
+
+    def __init__(self, model: Model | None) -> None:
+        self.model = model
+        self.refused = 0
+        self.not_finite = 0
+        self._over = True
+        self._exploration_id = ''
+
+    def update(self, vector: FeatureVector) -> TextureEstimate:
+        """Return the estimate after one more window, or the final one after the `last` vector."""
+        if self._over or vector.exploration_id != self._exploration_id:
+            self._start(vector.exploration_id)
+        if vector.last:
+            self._over = True
+            return self._estimate(vector, final=True)
+        if self.model is not None:
+            self._judge(vector, self.model)
+        return self._estimate(vector, final=False)
+
+    def _start(self, exploration_id: str) -> None:
+        self._exploration_id = exploration_id
+        self._over = False
+        self._windows = 0
+        self._evidence_ns = 0
+        self._window_ns = 0
+        self._end_ns = 0
+        self._message = '' if self.model else NO_MODEL
+        self._sum = np.zeros(len(self.model.labels) if self.model else 0)
+
+    def _judge(self, vector: FeatureVector, model: Model) -> None:
+        if vector.feature_set != model.feature_set:
+            self.refused += 1
+            self._message = f"model '{model.name}' does not fit: {difference(vector.feature_set, model.feature_set)}"
+            return
+        if not np.isfinite(vector.values).all():
+            self.not_finite += 1
+            bad = vector.names[int((~np.isfinite(vector.values)).argmax())]
+            self._message = f"a window was left out: its feature '{bad}' is not finite"
+            return
+        self._sum += model.predict_log_proba(vector.values)
+        self._windows += 1
+        self._window_ns = round(vector.window_s * NANOSECONDS)
+        end = vector.start_ns + self._window_ns
+        self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
+        self._end_ns = max(end, self._end_ns)
+
+    def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
+        model = self.model
+        base = TextureEstimate(
+            stamp_ns=self._end_ns or vector.start_ns,
+            exploration_id=vector.exploration_id,
+            final=final,
+            model=model.name if model else '',
+            message=self._message or (NO_WINDOW if final and not self._windows else ''),
+        )
+        if model is None or not self._windows:
+            return base
+        # Overlapping windows are worth only the sliding time that they add.
+        worth = self._evidence_ns / self._window_ns
+        mean = self._sum / self._windows
+        probabilities = np.exp(model.recipe.evidence.log_posterior(mean, worth, model.growth))
+        best = int(probabilities.argmax())
+        return dataclasses.replace(
+            base,
+            label=model.labels[best],
+            known=True,
+            confidence=float(probabilities[best]),
+            labels=model.labels,
+            probabilities=tuple(probabilities.tolist()),
+            windows=self._windows,
+            evidence_s=self._evidence_ns / NANOSECONDS,
+        )

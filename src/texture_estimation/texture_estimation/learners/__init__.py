@@ -1,0 +1,1 @@
+"""What learns textures, one a file; `catalogue` lists them."""

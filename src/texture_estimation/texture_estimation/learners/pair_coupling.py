@@ -1,0 +1,95 @@
+"""From decisions between two labels each to calibrated probabilities of all labels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+
+from texture_core.arrays import Array
+from texture_estimation.learners.learner import Codes
+from texture_estimation.log_probabilities import log_loss, log_softmax
+
+# exp(500) is far from overflow, and no calibrated margin comes near.
+LARGEST = 500.0
+
+
+@dataclass(frozen=True, eq=False)
+class PairCoupling:
+    """Sigmoids of the pairwise decision values, coupled in closed form.
+
+    With r_ij = 1 / (1 + exp(-(slope_ij f_ij + offset_ij))), the probability of label i among all is proportional to
+    (1 / (Σ_j 1/r_ij - (n - 2)))^(1/temperature) = (1 / (1 + Σ_j exp(-(slope_ij f_ij + offset_ij))))^(1/temperature).
+
+    Source: Platt 1999 for the sigmoids; Price, Knerr, Personnaz & Dreyfus 1995, eq. 5, for the coupling.
+
+    Parameters
+    ----------
+    slopes, offsets : (n_pairs,)
+        Pairs in the order (0, 1), (0, 2), …, (1, 2), …; a positive decision value speaks for the first.
+    temperature
+        Above 1: the probabilities are drawn together.
+    """
+
+    n_labels: int
+    slopes: Array
+    offsets: Array
+    temperature: float
+
+    def __post_init__(self) -> None:
+        pairs = np.array(list(combinations(range(self.n_labels), 2)))
+        sides = np.zeros((2 * len(pairs), self.n_labels))
+        sides[np.arange(len(pairs)), pairs[:, 0]] = 1.0
+        sides[np.arange(len(pairs)) + len(pairs), pairs[:, 1]] = 1.0
+        object.__setattr__(self, '_sides', sides)
+
+    def __call__(self, decisions: Array) -> Array:
+        """Return log-probabilities, (..., n_labels), of decision values, (..., n_pairs)."""
+        return log_softmax(self.scores(decisions) / self.temperature)
+
+    def scores(self, decisions: Array) -> Array:
+        """Return -log(1 + Σ_j exp(-margin)), (..., n_labels)."""
+        margins = decisions * self.slopes + self.offsets
+        both = np.concatenate((-margins, margins), axis=-1)
+        odds = np.exp(np.minimum(both, LARGEST))
+        scores: Array = -np.log1p(odds @ self._sides)  # type: ignore[attr-defined]
+        return scores
+
+
+def uncalibrated(n_labels: int) -> PairCoupling:
+    """Return the coupling with middling sigmoids, for when nothing can be held out."""
+    n_pairs = n_labels * (n_labels - 1) // 2
+    return PairCoupling(n_labels, np.full(n_pairs, 2.0), np.zeros(n_pairs), 1.0)
+
+
+def fit_coupling(decisions: Array, codes: Codes, n_labels: int) -> PairCoupling:
+    """Fit sigmoids and temperature to held-out decision values, (n, n_pairs), and label numbers, (n,)."""
+    pairs = combinations(range(n_labels), 2)
+    sigmoids = np.array([_fit_sigmoid(decisions[:, number], codes, *pair) for number, pair in enumerate(pairs)])
+    coupling = PairCoupling(n_labels, sigmoids[:, 0], sigmoids[:, 1], 1.0)
+    scores = coupling.scores(decisions)
+    best = minimize_scalar(
+        lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), codes), bounds=(-2.0, 4.0), method='bounded'
+    )
+    return PairCoupling(n_labels, coupling.slopes, coupling.offsets, float(np.exp(best.x)))
+
+
+def _fit_sigmoid(decisions: Array, codes: Codes, first: int, second: int) -> Array:
+    """Return slope and offset of the sigmoid that gives the probability of `first` against `second`."""
+    chosen = (codes == first) | (codes == second)
+    values = decisions[chosen]
+    is_first = codes[chosen] == first
+    n_first, n_second = int(is_first.sum()), int((~is_first).sum())
+    # Platt's targets: never quite 0 or 1, so that separable pairs keep a finite slope.
+    targets = np.where(is_first, (n_first + 1.0) / (n_first + 2.0), 1.0 / (n_second + 2.0))
+
+    def loss(line: Array) -> tuple[float, Array]:
+        margins = line[0] * values + line[1]
+        error = 1.0 / (1.0 + np.exp(-np.clip(margins, -LARGEST, LARGEST))) - targets
+        total = np.logaddexp(0.0, margins).sum() - targets @ margins
+        return float(total), np.array([error @ values, error.sum()])
+
+    result: Array = minimize(loss, np.array([2.0, 0.0]), jac=True, method='BFGS').x
+    return np.array([max(result[0], 1e-3), result[1]])

@@ -1,0 +1,77 @@
+"""RBF support vector machine, one against one, with calibrated probabilities."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_estimation.learners.array_svm import ArraySvm, export
+from texture_estimation.learners.folds import divide
+from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.pair_coupling import PairCoupling, fit_coupling, uncalibrated
+
+CACHE_MB = 500
+
+
+@dataclass(frozen=True)
+class SvmRbf:
+    """Standardised features, RBF kernel, one against one; probabilities calibrated on slides held out.
+
+    Not scikit-learn's SVC(probability=True): its inner cross-validation mixes the windows of one slide.
+    """
+
+    c: float = param(10.0, 'Penalty of a training error (box constraint).', low=1e-6, high=1e9)
+    gamma: float = param(
+        0.0, 'Width of the kernel exp(-gamma d²); 0 means 1 / (n_features · variance).', low=0.0, high=1e9
+    )
+    folds: int = param(5, 'Parts into which the slides are divided to calibrate.', low=2, high=50)
+
+    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
+        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
+        coupling, held_out, note = self._calibrate(values, codes, groups)
+        scaler, svc = self._fit_svc(values, codes)
+        parts = {
+            'scaler': scaler,
+            'svc': svc,
+            'slopes': coupling.slopes,
+            'offsets': coupling.offsets,
+            'temperature': coupling.temperature,
+        }
+        return Fitted(parts, held_out, note)
+
+    @staticmethod
+    def array_form(parts: Mapping[str, Any]) -> ArraySvm:
+        """Return what judges, from the stored parts."""
+        coupling = PairCoupling(
+            len(parts['svc'].n_support_), parts['slopes'], parts['offsets'], float(parts['temperature'])
+        )
+        return export(parts['scaler'], parts['svc'], coupling)
+
+    def _calibrate(self, values: Array, codes: Codes, groups: Codes) -> tuple[PairCoupling, Array | None, str]:
+        n_labels = int(codes.max()) + 1
+        division = divide(codes, groups, self.folds)
+        if division is None:
+            return uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
+        parts, note = division
+        decisions = np.empty((len(codes), n_labels * (n_labels - 1) // 2))
+        for part in np.unique(parts):
+            held = parts == part
+            svm = export(*self._fit_svc(values[~held], codes[~held]), uncalibrated(n_labels))
+            decisions[held] = svm.decisions(values[held])
+        coupling = fit_coupling(decisions, codes, n_labels)
+        return coupling, coupling(decisions), note
+
+    def _fit_svc(self, values: Array, codes: Codes) -> tuple[Any, Any]:
+        # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
+        from sklearn.svm import SVC  # noqa: PLC0415
+
+        scaler = StandardScaler().fit(values)
+        gamma = self.gamma or 1.0 / (values.shape[1] * max(float(scaler.transform(values).var()), 1e-12))
+        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(scaler.transform(values), codes)
+        return scaler, svc

@@ -1,0 +1,20 @@
+"""Logarithms of probabilities, the textures along the last axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+
+
+def log_softmax(scores: Array) -> Array:
+    """Return scores less the logarithm of the sum of their exponentials, (..., n_labels)."""
+    shifted = scores - np.maximum.reduce(scores, axis=-1, keepdims=True)
+    result: Array = shifted - np.log(np.add.reduce(np.exp(shifted), axis=-1, keepdims=True))
+    return result
+
+
+def log_loss(log_probabilities: Array, codes: NDArray[np.intp]) -> float:
+    """Return the mean negative log-probability of the true textures; (n, n_labels) and (n,) of their numbers."""
+    return float(-np.take_along_axis(log_probabilities, codes[:, None], axis=-1).mean())

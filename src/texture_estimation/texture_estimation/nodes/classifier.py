@@ -1,0 +1,87 @@
+"""Node that says what surface is being felt, with the evidence so far."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from dataclasses import dataclass
+
+from rclpy.node import Node
+from texture_msgs import msg
+
+from texture_core.errors import InvalidParameter, TextureError
+from texture_core.parameters import param
+from texture_core.ros.conversions import from_msg, to_msg
+from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.parameters import declare, on_change
+from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
+from texture_core.ros.run import run
+from texture_estimation.evidence import NO_MODEL, Evidence
+from texture_estimation.model import load_model
+
+
+@dataclass(frozen=True)
+class ClassifierParams:
+    """What the classifier judges by."""
+
+    model: str = param(
+        '', "Path of a trained model (NAME.skops or NAME.json); '' for none yet. May be changed at any time."
+    )
+
+
+class Classifier(Node):
+    """Turn feature vectors into texture estimates."""
+
+    def __init__(self) -> None:
+        super().__init__('classifier')
+        self._evidence = _evidence(declare(self, ClassifierParams))
+        on_change(self, ClassifierParams, self._change)
+        self._estimates = 0
+        self._broken = 0
+        self._processing_s = 0.0
+        self._publisher = self.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
+        self.create_subscription(msg.FeatureVector, 'features', self._on_features, FEATURE_QOS)
+        self._diagnostics = Diagnostics(self, self._report)
+
+    def _on_features(self, message: msg.FeatureVector) -> None:
+        began = time.perf_counter()
+        try:
+            vector = from_msg(message)
+        except TextureError as error:
+            self._broken += 1
+            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            return
+        estimate = self._evidence.update(vector)
+        self._processing_s = time.perf_counter() - began
+        self._publisher.publish(to_msg(dataclasses.replace(estimate, processing_s=self._processing_s)))
+        self._estimates += 1
+
+    def _change(self, params: ClassifierParams) -> None:
+        try:
+            self._evidence = _evidence(params)
+        except TextureError as error:
+            raise InvalidParameter(str(error)) from error
+
+    def _report(self) -> Report:
+        evidence = self._evidence
+        numbers = {
+            'model': evidence.model.name if evidence.model else '',
+            'estimates': self._estimates,
+            'refused_vectors': evidence.refused,
+            'not_finite_vectors': evidence.not_finite,
+            'broken_messages': self._broken,
+            'processing_s': self._processing_s,
+        }
+        if evidence.model is None:
+            return 'WARN', NO_MODEL, numbers
+        faults = evidence.refused + evidence.not_finite + self._broken
+        return ('WARN', 'some feature vectors could not be used', numbers) if faults else ('OK', 'judging', numbers)
+
+
+def _evidence(params: ClassifierParams) -> Evidence:
+    return Evidence(load_model(params.model) if params.model else None)
+
+
+def main() -> None:
+    """Run the node."""
+    run(Classifier)

@@ -1,0 +1,98 @@
+"""A recipe: windows, inputs and features, learner and evidence rule, in one YAML file."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from texture_core.catalogue import unknown
+from texture_core.errors import InvalidParameter
+from texture_core.parameters import from_mapping, param
+from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
+from texture_estimation.learners.catalogue import LEARNERS
+from texture_estimation.learners.learner import Learner
+from texture_features.choice import choose
+from texture_features.feature_set import FeatureSet, read_recipe
+from texture_features.windows import WindowParams
+
+KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
+
+
+@dataclass(frozen=True)
+class TrainingParams:
+    """How the examples for training are cut."""
+
+    hop_s: float = param(
+        0.25,
+        'Distance between the windows learnt from: closer ones add time, hardly knowledge.',
+        unit='s',
+        low=0.001,
+        high=60.0,
+    )
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What turns a signal into a decision, before anything is learnt."""
+
+    name: str
+    feature_set: FeatureSet
+    learner_name: str
+    learner: Learner
+    evidence_name: str
+    evidence: EvidenceRule
+    training: TrainingParams = dataclasses.field(default_factory=TrainingParams)
+    description: str = ''
+
+    @property
+    def training_windows(self) -> WindowParams:
+        """How to cut the windows that `train` learns from."""
+        return dataclasses.replace(self.feature_set.windows, hop_s=self.training.hop_s)
+
+    @classmethod
+    def from_mapping(cls, content: Mapping[str, Any], name: str) -> Recipe:
+        """Build from what a recipe file holds.
+
+        Raises
+        ------
+        InvalidParameter, UnknownName
+            With the place in the recipe and what is allowed there.
+        """
+        where = f"recipe '{name}'"
+        for key in content:
+            if key not in KEYS:
+                raise InvalidParameter(f'{where}: {unknown(str(key), KEYS, "key")}')
+        learner = choose(LEARNERS, content.get('learner', 'svm_rbf'), 'learner', where)
+        evidence = choose(EVIDENCE_RULES, content.get('evidence', 'soft_vote'), 'evidence rule', where)
+        return cls(
+            name,
+            FeatureSet.from_mapping(content, where),
+            *learner,
+            *evidence,
+            from_mapping(TrainingParams, content.get('training') or {}, f'{where}, training'),
+            str(content.get('description', '')),
+        )
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Return the recipe as a file writes it, every parameter spelt out."""
+        return {
+            'description': self.description,
+            **self.feature_set.as_mapping(),
+            'learner': {self.learner_name: dataclasses.asdict(self.learner)},
+            'evidence': {self.evidence_name: dataclasses.asdict(self.evidence)},
+            'training': dataclasses.asdict(self.training),
+        }
+
+
+def load_recipe(name_or_path: str) -> Recipe:
+    """Read a shipped recipe by name, or any by path; a model's card holds one too.
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        With one sentence that says what is wrong and what is allowed.
+    """
+    return Recipe.from_mapping(read_recipe(name_or_path), Path(name_or_path).stem)

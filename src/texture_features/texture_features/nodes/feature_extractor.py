@@ -1,0 +1,85 @@
+"""Node that cuts windows of sliding from the tactile streams and describes them."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from functools import partial
+
+from rclpy.node import Node
+from texture_msgs import msg
+
+from texture_core.errors import TextureError
+from texture_core.parameters import param
+from texture_core.ros.conversions import from_msg, to_msg
+from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.parameters import declare
+from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
+from texture_core.ros.run import run
+from texture_features.feature_set import FeatureSet
+from texture_features.windows import Piece, WindowCutter
+
+SILENCE_PERIOD_S = 0.1
+
+
+@dataclass(frozen=True)
+class ExtractorParams:
+    """What the feature extractor makes of the streams."""
+
+    recipe: str = param('default', "Name of a shipped recipe, or path of a recipe (YAML) or of a model's card (JSON).")
+
+
+class FeatureExtractor(Node):
+    """Publish the features of each window as soon as its last sample has arrived."""
+
+    def __init__(self) -> None:
+        super().__init__('feature_extractor')
+        self._feature_set = FeatureSet.load(declare(self, ExtractorParams).recipe)
+        self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.topics)
+        self._broken = 0
+        self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
+        self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
+        for topic in self._feature_set.topics:
+            self.create_subscription(msg.TactileSignal, topic, partial(self._on_signal, topic), SENSOR_QOS)
+        self.create_timer(SILENCE_PERIOD_S, self._on_silence_timer)
+        self._diagnostics = Diagnostics(self, self._report)
+
+    def _on_signal(self, topic: str, message: msg.TactileSignal) -> None:
+        try:
+            self._cutter.add_signal(topic, from_msg(message))
+        except TextureError as error:
+            self._refuse(error)
+            return
+        self._publish(self._cutter.take())
+
+    def _on_state(self, message: msg.ExplorationState) -> None:
+        try:
+            self._cutter.add_state(from_msg(message))
+        except TextureError as error:
+            self._refuse(error)
+            return
+        self._publish(self._cutter.take())
+
+    def _on_silence_timer(self) -> None:
+        self._publish(self._cutter.silence(time.monotonic()))
+
+    def _publish(self, pieces: list[Piece]) -> None:
+        for piece in pieces:
+            self._publisher.publish(to_msg(self._feature_set.describe(piece)))
+
+    def _refuse(self, error: TextureError) -> None:
+        self._broken += 1
+        self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+
+    def _report(self) -> Report:
+        numbers = {**self._cutter.counts, 'broken_messages': self._broken}
+        waiting = self._cutter.waiting_for
+        if waiting:
+            return 'WARN', f'nothing has come yet on {", ".join(waiting)}', numbers
+        faults = sum(numbers.values()) - numbers['windows']
+        return ('WARN', 'samples or messages were lost', numbers) if faults else ('OK', 'describing', numbers)
+
+
+def main() -> None:
+    """Run the node."""
+    run(FeatureExtractor)
