@@ -1,0 +1,25 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from texture_core.rotation import rotation_matrix
+
+
+def test_a_quarter_turn_about_z_brings_x_to_y() -> None:
+    assert rotation_matrix([0.0, 0.0, np.pi / 2]) @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0])
+
+
+def test_no_rotation_is_the_identity() -> None:
+    assert rotation_matrix([0.0, 0.0, 0.0]) == pytest.approx(np.eye(3))
+
+
+def test_a_rotation_keeps_lengths_and_handedness() -> None:
+    matrix = rotation_matrix([0.3, -2.0, 1.1])
+    assert matrix @ matrix.T == pytest.approx(np.eye(3))
+    assert np.linalg.det(matrix) == pytest.approx(1.0)
+
+
+def test_the_axis_of_a_rotation_stays_where_it_is() -> None:
+    axis = np.array([0.3, -2.0, 1.1])
+    assert rotation_matrix(axis) @ axis == pytest.approx(axis)
