@@ -52,8 +52,7 @@ def test_stopping_lifts_the_finger(explorer):
 
 def test_an_arm_that_failed_is_connected_again_by_the_next_request(explorer):
     explorer.arm.fail('protective stop')
-    while not explorer.trouble():
-        pass
+    assert explorer.trouble() == 'the arm reports a fault: protective stop'
     exploration = explorer.begin('one', QUICK)
     assert exploration.ended.wait(DEADLINE_S)
     assert exploration.outcome.success, exploration.outcome.message

@@ -216,6 +216,14 @@ def test_estimates_of_another_exploration_are_left_alone(make_world):
     assert world.result(world.call(**QUICK)).texture.label == ''
 
 
+def test_a_changed_limit_holds_for_the_next_request(world):
+    slower = Parameter('max_speed_m_s', value=0.05)
+    assert world.explorer.set_parameters([slower])[0].successful
+    assert 'allowed is 0.002 to 0.05 m/s' in world.result(world.call(**QUICK)).message
+    wrong = world.explorer.set_parameters([Parameter('force_limit_n', value=1.0)])[0]
+    assert "it must be above 'max_force_n'" in wrong.reason
+
+
 def test_the_diagnostics_count_what_happened(world):
     response = world.result(world.call(**QUICK))
     assert response.success, response.message

@@ -45,9 +45,8 @@ class Explorer:
         clock: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self.arm = arm
+        self.touch, self.limits = touch, limits  # may be replaced; a running exploration keeps its own
         self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, late_steps=0)
-        self._touch = touch
-        self._limits = limits
         self._on_state = on_state
         self._clock = clock
         self._lock = threading.Lock()
@@ -87,7 +86,7 @@ class Explorer:
             state = self.arm.state()
         except DeviceError as error:
             return str(error)
-        return cannot_move(state, self._clock(), self._limits)
+        return cannot_move(state, self._clock(), self.limits)
 
     @property
     def current(self) -> Exploration | None:
@@ -140,13 +139,13 @@ class Explorer:
             )
         plan = find(MOTIONS, request.motion, 'motion')
         home = self._ready()
-        motion = plan(request, home, self._touch, self._limits)
+        motion = plan(request, home, self.touch, self.limits)
         return Exploration(
             exploration_id,
             request,
             arm=self.arm,
             motion=motion,
-            limits=self._limits,
+            limits=self.limits,
             clock=self._clock,
             on_state=self._on_state,
         )

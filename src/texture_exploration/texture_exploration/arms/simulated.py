@@ -7,7 +7,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from texture_core.errors import DeviceError
 from texture_core.finger import FingerState
@@ -111,6 +111,7 @@ class SimulatedArm:
     def fail(self, reason: str) -> None:
         """Behave like an arm in a protective stop: stand still and report the reason, until connected again."""
         self._fault = reason
+        self._state = replace(self._state, velocity=(0.0, 0.0, 0.0), fault=reason)
 
     def push(self, force_n: float) -> None:
         """Add a force as if somebody pushed the finger, until connected again."""

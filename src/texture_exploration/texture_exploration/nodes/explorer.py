@@ -5,9 +5,11 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
@@ -21,7 +23,7 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.parameters import param
 from texture_core.ros.conversions import from_msg, request_from_msg, to_msg
 from texture_core.ros.diagnostics import Diagnostics, Report
-from texture_core.ros.parameters import declare
+from texture_core.ros.parameters import declare, on_change
 from texture_core.ros.qos import ESTIMATE_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_exploration.arms.catalogue import ARMS
@@ -52,6 +54,7 @@ class ExplorerNode(Node):
         super().__init__('explorer', **kwargs)
         self._certainty = declare(self, CertaintyParams)
         self._explorer = self._make_explorer()
+        self._follow_parameters()
         self._identities = Identities(np.random.default_rng())
         self._open: dict[str, Estimates] = {}  # explorations whose caller still waits, by id
         self._publishing = threading.Lock()
@@ -86,13 +89,17 @@ class ExplorerNode(Node):
             self.get_logger().error(f'{error}; the next request tries again')
         return explorer
 
+    def _follow_parameters(self) -> None:
+        """Let changed parameters hold from the next exploration on; those of the arm are fixed."""
+        on_change(self, CertaintyParams, partial(setattr, self, '_certainty'))
+        on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
+        on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))
+
     def _on_service(self, request: srv.Explore.Request, response: srv.Explore.Response) -> srv.Explore.Response:
         return self._explore(request, response, lambda exploration: exploration.ended.wait())
 
     def _on_goal(self, goal: Any) -> action.Explore.Result:
-        result = self._explore(
-            goal.request, action.Explore.Result(), lambda exploration: self._attend(goal, exploration)
-        )
+        result = self._explore(goal.request, action.Explore.Result(), partial(self._attend, goal))
         if goal.is_cancel_requested:
             goal.canceled()
         elif result.success:
@@ -111,13 +118,16 @@ class ExplorerNode(Node):
             self.get_logger().warning(f'refused: {error}')
             return result
         estimates = self._open[exploration.exploration_id] = Estimates(exploration.exploration_id)
-        attend(exploration)
-        self._wait_for_last_word(exploration, estimates)
-        del self._open[exploration.exploration_id]
+        try:
+            attend(exploration)
+            self._wait_for_last_word(exploration, estimates)
+        finally:
+            del self._open[exploration.exploration_id]
         result.success, result.message = exploration.outcome.success, exploration.outcome.message
         result.exploration_id = exploration.exploration_id
         result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
-        self.get_logger().info(f'{exploration.exploration_id}: {result.message}')
+        if not self._closing:
+            self.get_logger().info(f'{exploration.exploration_id}: {result.message}')
         return result
 
     def _attend(self, goal: Any, exploration: Exploration) -> None:
@@ -164,9 +174,12 @@ class ExplorerNode(Node):
                 self._publish(ExplorationState(self.get_clock().now().nanoseconds, '', '', Phase.IDLE))
 
     def _publish(self, state: ExplorationState) -> None:
-        # After a shutdown of ROS nobody listens any more, but the finger still has to be lifted.
-        if self.context.ok():
+        try:
             self._states.publish(to_msg(state))
+        except RCLError:
+            # After a shutdown of ROS nobody listens any more, but the finger still has to be lifted.
+            if self.context.ok():
+                raise
 
     def _stamped(self, state: ExplorationState) -> ExplorationState:
         """Return the state with its stamp on the clock of ROS instead of CLOCK_MONOTONIC."""
