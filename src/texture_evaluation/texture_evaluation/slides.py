@@ -14,6 +14,7 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_evaluation.bags import find_bags, read_bag
 
 RANGE = re.compile(r'(\d+)(?:-(\d+))?')
+Message = tuple[str, int, Any]
 SIGNALS = ('signal', 'signal_static', 'exploration')
 
 
@@ -33,9 +34,33 @@ class Slide:
     stop_ns: int | None
     namespace: str | None = None
 
-    def messages(self) -> Iterator[tuple[str, int, Any]]:
-        """Yield (topic, log time in ns, data class) of the signals and states of this slide, in order."""
-        return read_bag(self.bag, SIGNALS, self.namespace, self.start_ns, self.stop_ns)
+    @property
+    def name(self) -> str:
+        """Surface and number, such as 'cork/3': unlike exploration ids, unique over all bags."""
+        return f'{self.surface}/{self.number}'
+
+
+def read_slides(slides: Sequence[Slide]) -> Iterator[tuple[Slide, list[Message]]]:
+    """Yield each slide with its (topic, log time in ns, data class) of signals and states; each bag is read once.
+
+    Slides of one bag come in the order recorded.
+    """
+    for bag in dict.fromkeys(slide.bag for slide in slides):
+        inside = sorted((slide for slide in slides if slide.bag == bag), key=lambda slide: slide.start_ns)
+        first, last = inside[0], inside[-1]
+        messages = read_bag(bag, SIGNALS, first.namespace, first.start_ns, last.stop_ns)
+        yield from _share_out(messages, inside)
+
+
+def _share_out(messages: Iterator[Message], slides: Sequence[Slide]) -> Iterator[tuple[Slide, list[Message]]]:
+    following = next(messages, None)
+    for slide in slides:
+        mine: list[Message] = []
+        while following and (slide.stop_ns is None or following[1] < slide.stop_ns):
+            if following[1] >= slide.start_ns:
+                mine.append(following)
+            following = next(messages, None)
+        yield slide, mine
 
 
 def parse_selection(text: str) -> frozenset[int] | None:

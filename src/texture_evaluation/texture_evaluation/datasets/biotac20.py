@@ -32,6 +32,7 @@ STATIC_COLUMNS = (0, 1, 2, *range(25, 44))
 # speed from the first frame on.
 SLIDE_FRAMES = 600
 BATCH_FRAMES = 2
+STATE_BATCHES = 5  # a state every 0.1 s
 LOST_AFTER_S = 0.025  # frame times jitter by up to 8 ms; a larger step is a loss
 PAUSE_NS = NANOSECONDS
 DELAY_NS = 100_000  # a batch is logged this long after its last sample
@@ -149,18 +150,21 @@ def _write_slide(bag: BagWriter, recording: Recording, start_ns: int, indices: A
     vibration = restore_sign(frames[:, PAC_COLUMNS].ravel()).astype(np.float32)[:, None]
     static = frames[:, STATIC_COLUMNS].astype(np.float32)
     motion = _Motion.of(recording)
-    for part in _batches(indices):
+    stop_ns = start_ns + int(indices[-1] - indices[0] + 1) * FRAME_NS
+    for count, part in enumerate(_batches(indices)):
         first = int(indices[part.start])
         stamp_ns = start_ns + (first - int(indices[0])) * FRAME_NS
         end_ns = stamp_ns + (part.stop - part.start) * FRAME_NS
-        bag.write('exploration', motion.state(start_ns, stamp_ns, end_ns), stamp_ns)
+        if count % STATE_BATCHES == 0:
+            until_ns = min(stamp_ns + STATE_BATCHES * BATCH_FRAMES * FRAME_NS, stop_ns)
+            bag.write('exploration', motion.state(start_ns, stamp_ns, until_ns), stamp_ns)
         fast = vibration[part.start * PAC_PER_FRAME : part.stop * PAC_PER_FRAME]
         bag.write('signal', _signal('pac', ('pac',), stamp_ns, first * PAC_PER_FRAME, fast), end_ns + DELAY_NS)
         if channels == 'all':
             slow = _signal('slow', STATIC_CHANNELS, stamp_ns, first, static[part])
             bag.write('signal_static', slow, end_ns + 2 * DELAY_NS)
     for count, phase in enumerate((Phase.LIFT, Phase.DONE)):
-        after_ns = end_ns + count * BATCH_FRAMES * FRAME_NS
+        after_ns = stop_ns + count * BATCH_FRAMES * FRAME_NS
         state = replace(motion.named, stamp_ns=after_ns, phase=phase, progress=1.0)
         bag.write('exploration', state, after_ns + 3 * DELAY_NS)
 

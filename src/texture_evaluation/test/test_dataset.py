@@ -1,0 +1,57 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidData, ModelMismatch
+from texture_evaluation.bags import BagWriter, read_bag
+from texture_evaluation.dataset import describe
+from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
+from texture_features.feature_set import FeatureSet
+from texture_features.windows import cut_recording
+
+FEATURES = FeatureSet.load('vibration-and-taxels')
+
+
+def test_a_bag_gives_the_features_of_the_recording_itself(simulated: Path) -> None:
+    recording = {
+        topic: [value for _, _, value in read_bag(simulated / 'glass', (topic,))]
+        for topic in ('exploration', *FEATURES.topics)
+    }
+    states = recording.pop('exploration')
+    direct = [FEATURES.describe(piece) for piece in cut_recording(recording, states, FEATURES.windows)]
+    from_bag = describe([simulated / 'glass'], FEATURES)
+    np.testing.assert_array_equal(from_bag.values, [vector.values for vector in direct if not vector.last])
+    assert from_bag.names == direct[0].names
+    # Windows of 0.5 s every 0.1 s in 1.2 s: the first starts at 0, the last at 0.7 s.
+    assert len(from_bag.labels) == 6 * 8
+
+
+def test_slides_are_chosen_for_each_surface(simulated: Path) -> None:
+    examples = describe([simulated], FEATURES, '2,5-6')
+    assert set(examples.groups) == {f'{surface}/{k}' for surface in set(examples.labels) for k in (2, 5, 6)}
+
+
+def test_a_missing_input_is_named(simulated: Path, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag') as bag:
+        for topic, log_ns, value in read_bag(simulated / 'glass', ('signal', 'exploration')):
+            bag.write(topic, value, log_ns)
+    with pytest.raises(ModelMismatch, match="has no 'signal_static', only signal; the windows need"):
+        describe([tmp_path / 'bag'], FEATURES)
+
+
+def test_slides_without_a_whole_window_are_refused_with_a_sentence(tmp_path: Path) -> None:
+    bags = write_simulated(tmp_path, SlidePlan(slides=1, slide_s=0.3), np.random.default_rng(0), surfaces=('glass',))
+    with pytest.raises(InvalidData, match='none of the 1 slides has a whole window'):
+        describe(bags, FEATURES)
+
+
+def test_lost_samples_leave_windows_out_and_no_more(simulated: Path, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag') as bag:
+        for count, (topic, log_ns, value) in enumerate(read_bag(simulated / 'glass')):
+            if not (topic == 'signal' and 30 <= count < 40):
+                bag.write(topic, value, log_ns)
+    whole, broken = describe([simulated / 'glass'], FEATURES), describe([tmp_path / 'bag'], FEATURES)
+    assert 0 < len(broken.labels) < len(whole.labels)
+    kept = {row.tobytes() for row in whole.values}
+    assert all(row.tobytes() in kept for row in broken.values)

@@ -1,0 +1,144 @@
+"""Test a model on labelled bags, slide by slide, as if each were felt now."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import AnyArray, Array
+from texture_core.errors import InvalidParameter, ModelMismatch
+from texture_core.estimates import TextureEstimate
+from texture_core.features import FeatureVector
+from texture_estimation.evidence import Evidence
+from texture_estimation.fingerprint import difference
+from texture_estimation.model import Model, load_model
+from texture_evaluation import metrics
+from texture_evaluation.dataset import cut_slides, no_window
+from texture_evaluation.metrics import SlideResult
+from texture_evaluation.slides import Slide, find_slides
+from texture_features.windows import Piece
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """How well a model recognises the surfaces in bags.
+
+    Parameters
+    ----------
+    labels
+        Surfaces that the model knows.
+    known, unknown
+        Results of the slides over these surfaces, and over others.
+    latency_us : (n_windows,)
+        Computing time of each window, from samples to estimate.
+    unusable
+        Names of slides without a usable window, which count nowhere.
+    """
+
+    labels: tuple[str, ...]
+    known: Sequence[SlideResult]
+    unknown: Sequence[SlideResult]
+    latency_us: Array
+    unusable: tuple[str, ...] = ()
+
+    @property
+    def confusion(self) -> AnyArray:
+        """How many windows of each surface (row) were taken for each label (column)."""
+        return metrics.confusion(self.known, self.labels)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures; null where no slide tells."""
+        nothing = {'accuracy': None, 'mean_s': None}
+        median, p99 = np.percentile(self.latency_us, (50, 99))
+        return {
+            'window_accuracy': metrics.window_accuracy(self.known) if self.known else None,
+            'accuracy_at_s': metrics.accuracy_at_times(self.known),
+            'early': metrics.early_decision(self.known) if self.known else nothing,
+            'unknown_accepted': metrics.unknown_accepted(self.unknown),
+            'labels': list(self.labels),
+            'confusion': self.confusion.tolist(),
+            'latency_us': {'median': float(median), 'p99': float(p99)},
+        }
+
+    def write(self, path: str | Path) -> None:
+        """Write the figures as JSON."""
+        try:
+            Path(path).write_text(json.dumps(self.as_json(), indent=1) + '\n', encoding='utf-8')
+        except OSError as error:
+            raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another file") from error
+
+
+def evaluate_bags(model: str | Path, bags: Iterable[str | Path], slides: str = '') -> Report:
+    """Load a model and `evaluate` it."""
+    return evaluate(load_model(model), bags, slides)
+
+
+def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '') -> Report:
+    """Return how a model does on the labelled slides of bags.
+
+    Parameters
+    ----------
+    model
+        Whose feature set cuts and describes the windows.
+    bags
+        Bags, or folders of bags.
+    slides
+        Which slides of each surface, such as '31-40'; '' for all. Surfaces the model was not taught are unknown ones.
+
+    Raises
+    ------
+    ModelMismatch
+        If inputs, rates or channels in the bags are not those that the model was trained on.
+    InvalidData
+        If a bag cannot be read or no slide is usable.
+    """
+    chosen = find_slides(bags, slides)
+    tested = {slide: _test(model, slide, pieces) for slide, pieces in cut_slides(chosen, model.recipe.feature_set)}
+    results = {slide: result for slide, (result, _) in tested.items() if result.estimates}
+    if not results:
+        raise no_window(chosen, model.recipe.feature_set)
+    return Report(
+        labels=model.labels,
+        known=[result for slide, result in results.items() if slide.surface in model.labels],
+        unknown=[result for slide, result in results.items() if slide.surface not in model.labels],
+        latency_us=np.concatenate([latency for _, latency in tested.values()]),
+        unusable=tuple(slide.name for slide in tested if slide not in results),
+    )
+
+
+def judge(model: Model, pieces: Iterable[Piece]) -> tuple[list[FeatureVector], list[TextureEstimate], Array]:
+    """Return vector, estimate and computing time (µs) of each window and of the end of one slide, one by one."""
+    evidence = Evidence(model)
+    vectors, estimates, taken_us = [], [], []
+    for piece in pieces:
+        start = time.perf_counter()
+        vector = model.recipe.feature_set.describe(piece)
+        estimate = evidence.update(vector)
+        taken_us.append(1e6 * (time.perf_counter() - start))
+        vectors.append(vector)
+        estimates.append(estimate)
+    return vectors, estimates, np.array(taken_us)
+
+
+def _test(model: Model, slide: Slide, pieces: Sequence[Piece]) -> tuple[SlideResult, Array]:
+    """Return what the model says of each usable window of a slide, and the computing times of all."""
+    vectors, estimates, taken_us = judge(model, pieces)
+    used, heard, before = [], [], 0
+    for vector, estimate in zip(vectors, estimates, strict=True):
+        if not vector.last and vector.feature_set != model.feature_set:
+            raise ModelMismatch(
+                f"model '{model.name}' does not fit slide '{slide.name}' in '{slide.bag}': "
+                f'{difference(vector.feature_set, model.feature_set)}'
+            )
+        if estimate.windows > before and not vector.last:
+            used.append(vector.values)
+            heard.append(estimate)
+        before = estimate.windows
+    alone = model.predict_log_proba(np.stack(used)).argmax(axis=1) if used else []
+    return SlideResult(slide.surface, [model.labels[index] for index in alone], heard), taken_us

@@ -1,0 +1,79 @@
+"""Train a model from labelled bags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from texture_core.errors import InvalidParameter
+from texture_estimation.model import Model
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.training import train
+from texture_evaluation.bags import find_bags
+from texture_evaluation.dataset import describe
+
+FAST_TOPIC = 'signal'
+CHANNELS = ('fast', 'all')
+
+
+def train_from_bags(
+    recipe: str,
+    bags: Sequence[str | Path],
+    slides: str = '',
+    out: str | Path | None = None,
+    *,
+    channels: str = 'all',
+    name: str = '',
+) -> Model:
+    """Return a model trained on the labelled slides of bags, and save it.
+
+    Parameters
+    ----------
+    recipe
+        Name of a shipped recipe, or path of any.
+    bags
+        Bags, or folders of bags.
+    slides
+        Which slides of each surface, such as '1-30'; '' for all.
+    out
+        Path of the model, with or without .skops; not saved if None.
+    channels
+        'fast' leaves all inputs of the recipe but `signal` out.
+    name
+        Of the model; that of the file, or else of the recipe, if ''.
+
+    Raises
+    ------
+    TextureError
+        With one sentence, if recipe, bags, slides or place are wrong.
+    """
+    plan = with_channels(load_recipe(recipe), channels)
+    windows = replace(plan.feature_set, windows=plan.training_windows)
+    examples = describe(bags, windows, slides)
+    default = Path(out).name.removesuffix('.skops') if out else plan.name
+    model = train(plan, examples, name or default)
+    if out is not None:
+        _save(model, Path(out), bags, slides)
+    return model
+
+
+def with_channels(recipe: Recipe, channels: str) -> Recipe:
+    """Return the recipe as it is for 'all' channels, with the input `signal` alone for 'fast'."""
+    if channels not in CHANNELS:
+        raise InvalidParameter(f"channels are '{channels}'; 'fast' or 'all' is needed")
+    if channels == 'all':
+        return recipe
+    inputs = tuple(item for item in recipe.feature_set.inputs if item.topic == FAST_TOPIC)
+    if not inputs:
+        raise InvalidParameter(f"recipe '{recipe.name}' has no input '{FAST_TOPIC}'; use it with all channels")
+    feature_set = replace(recipe.feature_set, inputs=inputs, _layouts={})
+    return replace(recipe, feature_set=feature_set)
+
+
+def _save(model: Model, out: Path, bags: Sequence[str | Path], slides: str) -> None:
+    data = {'bags': [path.name for path in find_bags(bags)], 'slides': slides or 'all'}
+    try:
+        model.save(out, {'data': data})
+    except OSError as error:
+        raise InvalidParameter(f"the model cannot be saved at '{out}': {error.strerror}; name another place") from error
