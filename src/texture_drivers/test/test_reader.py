@@ -1,0 +1,103 @@
+import threading
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from texture_core.errors import DeviceError
+from texture_core.signal import TactileSignal
+from texture_drivers.health import Health
+from texture_drivers.reader import Reader
+
+DEADLINE_S = 10.0
+
+
+class Scripted:
+    """A sensor that delivers batches of ten samples, with a fault in the middle."""
+
+    expected_rates_hz: Mapping[str, float] = {'signal': 1000.0}
+
+    def __init__(self, script: str) -> None:
+        self.counts = {'samples': 0, 'lost': 0, 'bogus': 0, 'reopened': -1}
+        self.script = list(script)
+        self.closed = 0
+
+    def open(self) -> None:
+        self.counts['reopened'] += 1
+        if self.script and self.script[0] == 'X':
+            self.script.pop(0)
+            raise DeviceError('it is not there')
+
+    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
+        step = self.script.pop(0) if self.script else '.'
+        if step == 'x':
+            raise DeviceError('it is gone')
+        threading.Event().wait(0.001)
+        first = self.counts['samples']
+        self.counts['samples'] += 10
+        return {'signal': [TactileSignal(0, 's', ('a',), '', 1000.0, first, np.zeros((10, 1), np.float32))]}
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def run(script: str, batches: int) -> tuple[Scripted, Reader, list[str]]:
+    sensor, told, enough, came = Scripted(script), [], threading.Event(), []
+
+    def deliver(topic: str, batch: TactileSignal) -> None:
+        came.append(batch)
+        if len(came) >= batches:
+            enough.set()
+
+    reader = Reader(sensor, deliver, told.append)
+    reader.start()
+    assert enough.wait(DEADLINE_S)
+    reader.stop()
+    return sensor, reader, told
+
+
+def test_batches_are_handed_on_and_the_sensor_is_closed_in_the_end() -> None:
+    sensor, reader, told = run('', 3)
+    assert sensor.closed >= 1
+    assert reader.published['signal'] == sensor.counts['samples']
+    assert told == ['the sensor delivers']
+
+
+def test_a_sensor_that_is_gone_is_opened_again_and_told_of_once() -> None:
+    sensor, reader, told = run('..xXX..', 4)
+    assert sensor.counts['reopened'] == 3
+    assert [sentence.split('.')[0] for sentence in told] == [
+        'the sensor delivers',
+        'it is gone',
+        'it is not there',
+        'the sensor delivers',
+    ]
+    assert reader.fault == ''
+
+
+def health_after(period_s: float, **changes: int) -> tuple[str, str]:
+    sensor = Scripted('')
+    reader = Reader(sensor, lambda *_: None)
+    reader.fault = ''
+    health = Health(reader, 100.0)
+    reader.published['signal'] += changes.pop('published', 1000)
+    for name, change in changes.items():
+        sensor.counts[name] += change
+    level, message, numbers = health.report(100.0 + period_s)
+    assert 'signal rate [Hz]' in numbers
+    return level, message
+
+
+def test_health_is_ok_at_the_expected_rate() -> None:
+    assert health_after(1.0) == ('OK', 'streaming')
+
+
+def test_losses_a_wrong_rate_bad_packets_and_a_reopening_are_warnings() -> None:
+    assert health_after(1.0, lost=3) == ('WARN', '3 samples lost since the last report')
+    assert health_after(1.0, published=900)[0] == 'WARN'
+    assert health_after(1.0, bogus=6)[0] == 'WARN'
+    assert health_after(1.0, bogus=4)[0] == 'OK'
+    assert health_after(1.0, reopened=1)[0] == 'WARN'
+
+
+def test_silence_is_an_error() -> None:
+    assert health_after(1.5, published=0)[0] == 'ERROR'

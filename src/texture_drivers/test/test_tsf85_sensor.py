@@ -1,0 +1,197 @@
+"""The sensor on a pseudo-terminal fed with packets made by hand."""
+
+import os
+import struct
+import time
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.errors import DeviceError
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_drivers.params import SensorParams
+from texture_drivers.tsf85.sensor import Tsf85
+
+DEADLINE_S = 10.0
+
+
+class Wire:
+    """The device's end of a pseudo-terminal behind a link."""
+
+    def __init__(self, link: Path) -> None:
+        self.link = link
+        self.plug()
+
+    def plug(self) -> None:
+        self.device, self.host = os.openpty()
+        tty.setraw(self.host)
+        os.set_blocking(self.device, False)
+        self.link.unlink(missing_ok=True)
+        self.link.symlink_to(os.ttyname(self.host))
+
+    def unplug(self) -> None:
+        os.close(self.device)
+        os.close(self.host)
+
+    def heard(self) -> bytes:
+        try:
+            return os.read(self.device, 100)
+        except BlockingIOError:
+            return b''
+
+    def say(self, stamp_ms: int, dynamic: int, image: list[int] | None = None) -> None:
+        items = b'\x70' + struct.pack('>Q', stamp_ms) + b'\x20' + struct.pack('>h', dynamic)
+        if image:
+            items += b'\x10' + struct.pack('>28H', *image)
+        os.write(self.device, bytes([0x9A, 0, 0x58, len(items)]) + items)
+
+
+class Clock:
+    """The host's clock, advanced by the test."""
+
+    def __init__(self) -> None:
+        self.now_ns = 1_700_000_000 * NANOSECONDS
+
+    def __call__(self) -> int:
+        return self.now_ns
+
+
+@pytest.fixture
+def wire(tmp_path: Path) -> Iterator[Wire]:
+    made = Wire(tmp_path / 'tsf85')
+    yield made
+    made.unplug()
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def sensor(wire: Wire, clock: Clock) -> Iterator[Tsf85]:
+    made = Tsf85(SensorParams(device=str(wire.link), batch_s=0.001), clock)
+    yield made
+    made.close()
+
+
+class Feeder:
+    """Send milliseconds at the pace of the clock and collect what the sensor delivers."""
+
+    def __init__(self, wire: Wire, sensor: Tsf85, clock: Clock) -> None:
+        self.wire, self.sensor, self.clock = wire, sensor, clock
+        self.signal: list[TactileSignal] = []
+        self.static: list[TactileSignal] = []
+        self.stamp_ms = 5000
+
+    def run(self, milliseconds: int, missing: tuple[int, ...] = (), image: list[int] | None = None) -> None:
+        sent = 0
+        for first in range(0, milliseconds, 10):
+            for ms in range(first, min(first + 10, milliseconds)):
+                if ms not in missing:
+                    self.wire.say(self.stamp_ms, ms % 1000, image)
+                    sent += 1
+                self.stamp_ms += 1
+                self.clock.now_ns += NANOSECONDS // 1000
+            self.read()
+
+    def read(self) -> None:
+        batches = self.sensor.read()
+        self.signal += batches.get('signal', [])
+        self.static += batches.get('signal_static', [])
+
+
+@pytest.fixture
+def feeder(wire: Wire, sensor: Tsf85, clock: Clock) -> Feeder:
+    sensor.open()
+    return Feeder(wire, sensor, clock)
+
+
+def indices(batches: list[TactileSignal]) -> list[int]:
+    return [batch.first_sample + i for batch in batches for i in range(len(batch.samples))]
+
+
+def test_it_starts_the_stream_on_opening_and_stops_it_on_closing(wire: Wire, sensor: Tsf85) -> None:
+    sensor.open()
+    assert wire.heard() == bytes.fromhex('9A 00 58 01 01')
+    sensor.close()
+    sensor.close()
+    assert wire.heard() == bytes.fromhex('9A 00 58 01 00')
+
+
+def test_samples_come_out_in_order_contiguous_and_stamped_by_the_device(feeder: Feeder) -> None:
+    feeder.run(400)
+    numbers = indices(feeder.signal)
+    assert numbers == list(range(numbers[0], numbers[-1] + 1))
+    values = np.concatenate([batch.samples[:, 0] for batch in feeder.signal])
+    assert values.tolist() == [number % 1000 for number in numbers]
+    for before, after in zip(feeder.signal, feeder.signal[1:], strict=False):
+        assert abs(after.stamp_ns - before.end_ns) < 1000
+    # The last sample was written 1 ms before the clock's present time.
+    assert feeder.clock.now_ns - feeder.signal[-1].end_ns == pytest.approx(0, abs=2e6)
+    assert feeder.sensor.counts['lost'] == 0
+
+
+def test_the_index_jumps_by_what_was_lost(feeder: Feeder) -> None:
+    feeder.run(400, missing=(200, 201, 202, 305))
+    assert sorted(set(range(indices(feeder.signal)[0], 400)) - set(indices(feeder.signal))) == [200, 201, 202, 305]
+    assert feeder.sensor.counts['lost'] == 4
+    assert feeder.sensor.counts['samples'] == len(indices(feeder.signal))
+
+
+def test_an_image_repeated_each_millisecond_is_published_at_60_hz(feeder: Feeder) -> None:
+    feeder.run(1100, image=list(range(9000, 9028)))
+    numbers = indices(feeder.static)
+    assert numbers == list(range(numbers[0], numbers[-1] + 1))
+    assert len(numbers) == pytest.approx(60, abs=2)
+    assert feeder.static[-1].samples.tolist() == [list(range(9000, 9028))]
+    ahead_ns = feeder.static[-1].stamp_ns - feeder.signal[0].stamp_ns
+    assert ahead_ns / NANOSECONDS == pytest.approx(numbers[-1] / 60 - feeder.signal[0].first_sample / 1000, abs=1e-5)
+
+
+def test_an_image_that_has_not_come_for_long_is_not_published(feeder: Feeder) -> None:
+    feeder.run(200, image=list(range(28)))
+    feeder.run(1000)
+    assert len(feeder.static) < 25
+
+
+def test_unplugging_is_told_and_the_gap_counted_by_the_host_clock(feeder: Feeder) -> None:
+    feeder.run(300)
+    feeder.wire.unplug()
+    with pytest.raises(DeviceError, match='plugged in'):
+        feeder.read()
+    feeder.sensor.close()
+    with pytest.raises(DeviceError, match='tsf85'):
+        feeder.sensor.open()
+    feeder.clock.now_ns += 2 * NANOSECONDS
+    feeder.wire.plug()
+    feeder.sensor.open()
+    last, feeder.signal, feeder.stamp_ms = feeder.signal[-1], [], 0
+    feeder.run(300)
+    first = feeder.signal[0]
+    missing = first.first_sample - last.next_sample
+    assert missing == feeder.sensor.counts['lost']
+    assert 2000 <= missing <= 2200
+    assert missing / 1000 == pytest.approx((first.stamp_ns - last.end_ns) / NANOSECONDS, abs=0.002)
+    assert feeder.sensor.counts['reopened'] == 1
+
+
+def test_a_silent_device_is_stopped_and_started_and_given_up_at_last(wire: Wire, clock: Clock) -> None:
+    sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.05), clock)
+    sensor.open()
+    deadline = time.monotonic() + DEADLINE_S
+    with pytest.raises(DeviceError, match='replug'):
+        while time.monotonic() < deadline:
+            sensor.read()
+    sensor.close()
+    assert sensor.counts['revived'] == 3
+    assert wire.heard().count(bytes.fromhex('9A 00 58 01 01')) == 4
+
+
+def test_a_second_program_cannot_open_the_device(wire: Wire, sensor: Tsf85, clock: Clock) -> None:
+    sensor.open()
+    with pytest.raises(DeviceError, match='no other program'):
+        Tsf85(SensorParams(device=str(wire.link)), clock).open()

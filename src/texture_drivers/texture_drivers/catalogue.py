@@ -1,0 +1,29 @@
+"""The sensors by name; a user's own is 'module:Class'."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Protocol
+
+from texture_core.protocols import Sensor
+from texture_drivers.biotac.sensor import BioTac
+from texture_drivers.biotac.tables import LAYOUTS
+from texture_drivers.params import SensorParams
+from texture_drivers.tsf85.sensor import Tsf85
+
+
+class MakeSensor(Protocol):
+    """How a sensor is made: from its parameters and a clock, ns since the epoch of the stamps. Opens nothing yet."""
+
+    def __call__(self, params: SensorParams, now_ns: Callable[[], int]) -> Sensor:
+        """Return the sensor."""
+        ...
+
+
+SENSORS: Mapping[str, MakeSensor] = {
+    'tsf85': Tsf85,  # Robotiq TSF-85 / CoRo fingertip
+    'biotac': BioTac,  # SynTouch BioTac, 19 electrodes
+    'biotac_sp': partial(BioTac, layout=LAYOUTS['biotac_sp']),  # 24 electrodes
+    'biotac_hand': partial(BioTac, fingers=(0, 1, 2)),  # all places of a board; topics finger0/signal and so on
+}

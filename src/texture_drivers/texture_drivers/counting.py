@@ -1,0 +1,98 @@
+"""Give every sample its running index, so that a jump of the index is exactly what was lost."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+
+SHORT_COUNTER = 1 << 16
+
+
+class Verdict(enum.Enum):
+    """What a stamp is, seen with its neighbours."""
+
+    GOOD = enum.auto()
+    DAMAGED = enum.auto()
+    ANEW = enum.auto()  # the device counts from another start
+    OPEN = enum.auto()  # odd, and the next stamp is not known yet
+
+
+class SampleCounter:
+    """Count samples through the device's own stamps, one tick a sample.
+
+    A stamp that does not follow its forerunner is a loss if the next stamp goes on from there, and a damaged stamp if
+    not; so the last one given is left open when it is odd. A sample that comes one tick early (a device that samples a
+    trifle faster than its clock ticks) is numbered through, and evens out a tick skipped later.
+
+    Parameters
+    ----------
+    longest_gap
+        A jump above this, or backwards, that the next stamp confirms is no loss: the device began anew.
+    """
+
+    def __init__(self, longest_gap: int = 2000) -> None:
+        self.next_index = 0
+        self.lost = 0
+        self.damaged_stamps = 0
+        self._longest_gap = longest_gap
+        self._last: int | None = None
+        self._early = 0
+
+    def resume(self, index: int) -> None:
+        """Go on with `index` after an interruption, whatever the next stamp is; what lies between is lost."""
+        index = max(index, self.next_index)
+        self.lost += index - self.next_index
+        self.next_index = index
+        self._last = None
+        self._early = 0
+
+    def place(self, stamps: Sequence[int | None]) -> tuple[list[int], bool]:
+        """Return the index of each stamp's sample as far as decided, and whether the device began anew after those.
+
+        Parameters
+        ----------
+        stamps : (n_samples,)
+            Ticks of the device, of 64 bits or wrapping at 16; None for a sample without.
+        """
+        indices: list[int] = []
+        for position, stamp in enumerate(stamps):
+            verdict = self._judge(stamp, stamps[position + 1 : position + 2])
+            if verdict in (Verdict.ANEW, Verdict.OPEN):
+                return indices, verdict is Verdict.ANEW
+            self.damaged_stamps += verdict is Verdict.DAMAGED
+            indices.append(self._take(stamp if verdict is Verdict.GOOD else None))
+        return indices, False
+
+    def _judge(self, stamp: int | None, following: Sequence[int | None]) -> Verdict:
+        step = _ticks(self._last, stamp)
+        if step in (0, 1):
+            return Verdict.GOOD
+        if not following:
+            return Verdict.OPEN
+        onward = _ticks(stamp, following[0])
+        if 1 < step <= self._longest_gap:
+            return Verdict.GOOD if 1 <= onward <= self._longest_gap else Verdict.DAMAGED
+        return Verdict.ANEW if onward == 1 else Verdict.DAMAGED
+
+    def _take(self, stamp: int | None) -> int:
+        """Return the index of the next sample; without a stamp it follows directly."""
+        step = _ticks(self._last, stamp)
+        if step == 0:
+            self._early = 1
+        skipped = max(0, step - 1)
+        evened = min(self._early, skipped)
+        self._early -= evened
+        self.lost += skipped - evened
+        index = self.next_index + skipped - evened
+        self.next_index = index + 1
+        self._last = stamp if stamp is not None or self._last is None else self._last + 1
+        return index
+
+
+def _ticks(last: int | None, stamp: int | None) -> int:
+    """Return how many ticks a stamp lies after another, 1 if either is unknown."""
+    if last is None or stamp is None:
+        return 1
+    ticks = stamp - last
+    wrapped = last < SHORT_COUNTER and ticks < -SHORT_COUNTER // 2
+    return ticks + SHORT_COUNTER if wrapped else ticks

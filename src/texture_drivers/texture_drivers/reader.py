@@ -1,0 +1,72 @@
+"""Keep a sensor open and reading, whatever happens to it, and know how it fares."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from texture_core.errors import DeviceError
+from texture_core.protocols import Sensor
+from texture_core.signal import TactileSignal
+
+RETRY_S = 0.2
+Deliver = Callable[[str, TactileSignal], None]
+Tell = Callable[[str], None]
+
+
+class Reader:
+    """A thread that reads a sensor, hands each batch on, and opens the sensor again when it is gone.
+
+    Parameters
+    ----------
+    sensor
+        What is read; used by this thread alone.
+    deliver
+        Called with topic and batch, in the thread.
+    tell
+        Called with one sentence when the sensor goes or comes back, not at each retry.
+    """
+
+    def __init__(self, sensor: Sensor, deliver: Deliver, tell: Tell = lambda _: None) -> None:
+        self.sensor = sensor
+        self.fault = 'not opened yet'  # '' while all is well
+        self.published: dict[str, int] = dict.fromkeys(sensor.expected_rates_hz, 0)
+        self._deliver = deliver
+        self._tell = tell
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='sensor reader', daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and close the sensor; returns when both are done."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            self._read_until_gone()
+            self.sensor.close()
+            self._stop.wait(RETRY_S)
+
+    def _read_until_gone(self) -> None:
+        try:
+            self.sensor.open()
+            while not self._stop.is_set():
+                for topic, batches in self.sensor.read().items():
+                    self._hand_on(topic, batches)
+        except DeviceError as error:
+            if self.fault != str(error):
+                self._tell(f'{error}. Trying again every {RETRY_S} s')
+            self.fault = str(error)
+
+    def _hand_on(self, topic: str, batches: Sequence[TactileSignal]) -> None:
+        for batch in batches:
+            self._deliver(topic, batch)
+            self.published[topic] += len(batch.samples)
+        if batches and self.fault:
+            self._tell('the sensor delivers')
+            self.fault = ''

@@ -1,0 +1,68 @@
+"""A serial port that fails in one way: DeviceError, whatever pyserial, the kernel or termios raise."""
+
+from __future__ import annotations
+
+import contextlib
+import termios
+import time
+from collections.abc import Iterator
+
+import serial
+
+from texture_core.errors import DeviceError
+
+# An unplugged port raises termios.error from tcflush, which is no OSError.
+FAULTS = (serial.SerialException, OSError, termios.error)
+MODEM_SETTLE_S = 0.2  # the vendor's pause between raising DTR and the first command
+
+
+class SerialPort:
+    """An exclusively opened serial device in raw mode.
+
+    Raises
+    ------
+    DeviceError
+        From every method but `close`, once the device is gone.
+    """
+
+    def __init__(self, device: str, baud: int = 115200) -> None:
+        self._device = device
+        with self._faults():
+            self._serial = serial.Serial(baudrate=baud, exclusive=True, timeout=0, write_timeout=0.5)
+            self._serial.port = device
+            self._serial.rts = False  # as the vendor does; pyserial raises DTR and passes over ports without the lines
+            self._serial.open()
+            if self._has_modem_lines():
+                time.sleep(MODEM_SETTLE_S)
+            self._serial.reset_input_buffer()
+
+    def _has_modem_lines(self) -> bool:
+        try:
+            return self._serial.cts or True
+        except OSError:  # a pseudo-terminal: ENOTTY
+            return False
+
+    def read(self) -> bytes:
+        """Return what has arrived, without waiting."""
+        with self._faults():
+            return bytes(self._serial.read(self._serial.in_waiting))
+
+    def write(self, data: bytes) -> None:
+        """Send."""
+        with self._faults():
+            self._serial.write(data)
+
+    def close(self) -> None:
+        """Close; never raises."""
+        with contextlib.suppress(*FAULTS):
+            self._serial.close()
+
+    @contextlib.contextmanager
+    def _faults(self) -> Iterator[None]:
+        try:
+            yield
+        except FAULTS as error:
+            raise DeviceError(
+                f"device '{self._device}' cannot be used ({error}); check that it is plugged in, that you may open it, "
+                'and that no other program has it open'
+            ) from error
