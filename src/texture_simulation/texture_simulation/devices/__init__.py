@@ -1,0 +1,1 @@
+"""Devices emulated where the real ones are reached."""

@@ -1,0 +1,29 @@
+"""Bytes lost, added and changed on the way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.parameters import param
+
+
+@dataclass(frozen=True)
+class ByteFaults:
+    """How likely each byte is to suffer."""
+
+    drop: float = param(0.0, 'Probability that a byte is lost.', low=0.0, high=1.0)
+    insert: float = param(0.0, 'Probability that a random byte is added before a byte.', low=0.0, high=1.0)
+    flip: float = param(0.0, 'Probability that one bit of a byte is changed.', low=0.0, high=1.0)
+
+    def apply(self, data: bytes, rng: np.random.Generator) -> bytes:
+        """Return what arrives of `data`."""
+        if not (self.drop or self.insert or self.flip):
+            return data
+        values = np.frombuffer(data, dtype=np.uint8).copy()
+        flipped = rng.random(len(values)) < self.flip
+        values[flipped] ^= np.uint8(1) << rng.integers(0, 8, flipped.sum(), dtype=np.uint8)
+        values = values[rng.random(len(values)) >= self.drop]
+        places = np.flatnonzero(rng.random(len(values)) < self.insert)
+        return np.insert(values, places, rng.integers(0, 256, len(places), dtype=np.uint8)).tobytes()

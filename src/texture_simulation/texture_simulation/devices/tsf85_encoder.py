@@ -1,0 +1,78 @@
+"""What a TSF-85 puts on the wire, written from its protocol and not from the driver's code.
+
+Packets: `9A 00 58 length payload`; payload items big-endian, item byte = type | finger << 2. Firmware from 1.1.7 on
+stamps with 64 bits and sends an image when there is a new one; older firmware stamps with 16 bits and repeats the
+images every millisecond in packets of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+Counts = NDArray[np.int16]
+Image = NDArray[np.uint16]
+
+TAXELS = 28
+FINGERS = 2
+RESTING_ACCELERATION = b'\x00\x00\x00\x00\x40\x00'  # 1 g along z at 16384 counts/g
+RESTING_ROTATION = bytes(6)
+
+
+class Tsf85Encoder:
+    """Make the bytes of consecutive milliseconds; one finger feels, the other one and the inertial sensors rest.
+
+    Parameters
+    ----------
+    finger
+        The finger that feels, 0 or 1.
+    long_stamps
+        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
+    """
+
+    def __init__(self, finger: int = 0, long_stamps: bool = True) -> None:
+        self._finger = finger
+        self._long_stamps = long_stamps
+        self._stamp_type = '>u8' if long_stamps else '>u2'
+        self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
+        self._stamp_at = slice(5, 5 + np.dtype(self._stamp_type).itemsize)
+        dynamic_at = self._stamp_at.stop + finger * 17 + 1
+        self._dynamic_at = slice(dynamic_at, dynamic_at + 2)
+
+    def _resting_packet(self) -> bytes:
+        items = b'\x70' + bytes(8 if self._long_stamps else 2)
+        for finger in range(FINGERS):
+            head = finger << 2
+            items += bytes([0x20 | head, 0, 0])
+            items += bytes([0x30 | head]) + RESTING_ACCELERATION + bytes([0x40 | head]) + RESTING_ROTATION
+        return bytes([0x9A, 0x00, 0x58, len(items)]) + items
+
+    def encode(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> bytes:
+        """Return the bytes of some milliseconds.
+
+        Parameters
+        ----------
+        first_ms
+            The device's clock at the first of them.
+        dynamic : (n,)
+        image : (28,)
+        image_is_new
+            Whether it has changed since the last call.
+        """
+        rows = np.tile(self._template, (len(dynamic), 1))
+        stamps = (first_ms + np.arange(len(dynamic))).astype(self._stamp_type)  # 16 bits wrap, as they do in the device
+        rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
+        rows[:, self._dynamic_at] = dynamic.astype('>i2')[:, None].view(np.uint8)
+        return b''.join(self._interleave(rows, self._image_packet(image), image_is_new))
+
+    def _interleave(self, rows: Bytes, image: bytes, image_is_new: bool) -> Iterator[bytes]:
+        for number, row in enumerate(rows):
+            if not self._long_stamps or (image_is_new and number == 0):
+                yield image
+            yield row.tobytes()
+
+    def _image_packet(self, image: Image) -> bytes:
+        return bytes([0x9A, 0x00, 0x58, 1 + 2 * TAXELS, 0x10 | self._finger << 2]) + image.astype('>u2').tobytes()

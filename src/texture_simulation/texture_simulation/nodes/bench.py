@@ -1,0 +1,52 @@
+"""The node of the emulated bench."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from rclpy.node import Node
+
+from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.ros.diagnostics import Diagnostics
+from texture_core.ros.parameters import declare, on_change
+from texture_core.ros.run import run
+from texture_simulation.bench import Bench, BenchParams
+
+
+class BenchNode(Node):
+    """Hold the bench, and let its operator swap the sample by setting `surface`."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('bench', **kwargs)
+        self._params = declare(self, BenchParams)
+        self._bench = Bench(self._params)
+        self._bench.start()
+        on_change(self, BenchParams, self._change)
+        self._diagnostics = Diagnostics(self, self._report, hardware_id=self._params.tsf85_link)
+        self.get_logger().info(
+            f"'{self._params.surface}' lies under the finger; TSF-85 at {self._params.tsf85_link}, "
+            f'finger states at UDP port {self._bench.finger_port}'
+        )
+
+    def shutdown(self) -> None:
+        """Stop the bench and remove its devices."""
+        self._bench.stop()
+
+    def _change(self, params: BenchParams) -> None:
+        if dataclasses.replace(params, surface=self._params.surface) != self._params:
+            raise InvalidParameter("only 'surface' can be changed while the bench runs; start it again for the others")
+        try:
+            self._bench.set_surface(params.surface)
+        except UnknownName as error:
+            raise InvalidParameter(str(error)) from error
+        self._params = params
+
+    def _report(self) -> tuple[str, str, dict[str, Any]]:
+        state = 'streaming' if self._bench.tsf85.streaming else 'waiting for a driver'
+        return 'OK', f"{state}; '{self._bench.surface}' lies under the finger", dict(self._bench.counts)
+
+
+def main() -> None:
+    """Run the node."""
+    run(BenchNode)

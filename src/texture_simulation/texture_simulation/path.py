@@ -1,0 +1,44 @@
+"""Where a finger goes over a surface, finely sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Places and forces at consecutive times of a constant rate.
+
+    Parameters
+    ----------
+    x_m, y_m : (n,)
+        In the frame of the surface.
+    force_n : (n,)
+        Normal force, 0 in the air.
+    """
+
+    x_m: Array
+    y_m: Array
+    force_n: Array
+
+    def __len__(self) -> int:
+        return len(self.x_m)
+
+    def moved(self, x_m: float, y_m: float) -> Path:
+        """Return the same path starting elsewhere."""
+        return Path(self.x_m + x_m, self.y_m + y_m, self.force_n)
+
+    def at(self, indices: NDArray[np.intp]) -> Path:
+        """Return some of its points."""
+        return Path(self.x_m[indices], self.y_m[indices], self.force_n[indices])
+
+
+def straight(start: tuple[float, float, float], end: tuple[float, float, float], n_points: int) -> Path:
+    """Return `n_points` on the way from (x, y, force) to another, the start left out and the end included."""
+    shares = np.arange(1, n_points + 1) / n_points
+    return Path(*(first + (last - first) * shares for first, last in zip(start, end, strict=True)))
