@@ -15,12 +15,14 @@ from texture_exploration.safety import SafetyLimits
 collect_ignore = [] if importlib.util.find_spec('rclpy') else ['test_explorer_node.py']
 
 ARM_STEP_NS = 5_000_000
+ARM, TOUCH, LIMITS = SimulatedArmParams(), TouchParams(), SafetyLimits()
+LINEAR = ExplorationRequest('linear_slide')
 
 
 class Table:
     """An arm over a surface, and what the exploration on it reported."""
 
-    def __init__(self, arm=SimulatedArmParams(), touch=TouchParams(), limits=SafetyLimits()):  # noqa: B008 (frozen)
+    def __init__(self, arm=ARM, touch=TOUCH, limits=LIMITS):
         self.now_ns = 1_000_000_000
         self.arm = SimulatedArm(arm, clock=lambda: self.now_ns, own_thread=False)
         self.arm.connect()
@@ -43,7 +45,7 @@ class Table:
             self.now_ns += ARM_STEP_NS
             self.arm.step(ARM_STEP_NS * 1e-9)
 
-    def explore(self, request=ExplorationRequest('linear_slide')):  # noqa: B008 (frozen)
+    def explore(self, request=LINEAR):
         motion = MOTIONS[request.motion](request, self.home, self.touch, self.limits)
         self.exploration = Exploration(
             'one',

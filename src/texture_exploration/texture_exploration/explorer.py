@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 import time
@@ -114,9 +115,11 @@ class Explorer:
             return exploration
 
     def stop(self, reason: str) -> bool:
-        """Abort the running exploration; return whether there was one."""
+        """Abort the running exploration; return whether there was one. Without one, the arm stands still anyway."""
         current = self.current
         if current is None:
+            with contextlib.suppress(DeviceError):
+                self.arm.stop()
             return False
         current.stop(reason)
         return True

@@ -152,9 +152,10 @@ class ExplorerNode(Node):
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
         estimate: TextureEstimate | RoughnessEstimate = from_msg(message)
-        if estimate.exploration_id not in self._open:
+        estimates = self._open.get(estimate.exploration_id)
+        if estimates is None:
             return
-        self._open[estimate.exploration_id].update(estimate)
+        estimates.update(estimate)
         current = self._explorer.current
         wanted = current is not None and current.request.stop_when_certain
         ours = current is not None and current.exploration_id == estimate.exploration_id

@@ -1,0 +1,22 @@
+from pathlib import Path
+
+import pytest
+
+from texture_core.parameters import markdown_table
+from texture_exploration.arms.simulated import SimulatedArmParams
+from texture_exploration.estimates import CertaintyParams
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+README = (Path(__file__).parent.parent / 'README.md').read_text()
+
+
+@pytest.mark.parametrize('params', [SimulatedArmParams, TouchParams, SafetyLimits, CertaintyParams])
+def test_the_readme_lists_the_parameters_as_they_are(params):
+    assert markdown_table(params) in README
+
+
+@pytest.mark.parametrize('name', MOTIONS)
+def test_the_readme_names_every_motion(name):
+    assert f'| `{name}` |' in README

@@ -1,0 +1,135 @@
+"""An arm of Universal Robots, reached through ur-rtde in a process of its own."""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from collections.abc import Mapping
+
+from texture_core.errors import DeviceError
+from texture_exploration.arms.protocol import ArmCommand, ArmState
+from texture_exploration.arms.surface_frame import SurfaceFrame
+from texture_exploration.arms.ur_link import WorkerLink
+from texture_exploration.arms.ur_messages import RECOVER, STOP, Report, Wish
+from texture_exploration.arms.ur_params import UrArmParams
+from texture_exploration.arms.ur_probe import check_ready, unlock_protective_stop
+from texture_exploration.arms.ur_tables import SAFETY_FAULTS
+
+STANDSTILL = ArmCommand()
+RECOVERY_S = 6.0
+POLL_S = 0.01
+
+
+class UrArm:
+    """The arm as the explorer uses it. Nothing here waits for the controller longer than it says.
+
+    Parameters
+    ----------
+    params
+        The arm, the surface and the supervision.
+    """
+
+    Params = UrArmParams
+
+    def __init__(self, params: UrArmParams = UrArmParams()) -> None:  # noqa: B008 (frozen)
+        self._params = params
+        self._frame = SurfaceFrame(params.surface_pose)
+        self._link: WorkerLink | None = None
+
+    def connect(self) -> None:
+        """Reach the controller and start its control program; a protective stop is released if the parameters say so."""
+        self.close()
+        if importlib.util.find_spec('rtde_control') is None:
+            raise DeviceError(
+                "the arm 'ur' needs the package ur-rtde, which is not installed here: 'pip install ur-rtde==1.6.5'; "
+                'it exists for Python up to 3.12 on Linux with an x86-64 processor'
+            )
+        params = self._params
+        check_ready(params.ip, params.probe_timeout_s, params.unlock_protective_stop)
+        link = WorkerLink(params)
+        try:
+            link.wait_for_report()
+        except DeviceError:
+            link.end()
+            raise
+        self._link = link
+
+    def close(self) -> None:
+        """Stop and end the worker process."""
+        if self._link is not None:
+            self._link.end()
+            self._link = None
+
+    def state(self) -> ArmState:
+        """Return the newest state."""
+        report = self._report()
+        frame = self._frame
+        return ArmState(
+            time_ns=report.time_ns,
+            position=frame.place(report.position_m),
+            velocity=frame.direction(report.velocity_m_s),
+            force_n=frame.direction(report.force_n)[2],
+            fault=self._fault(report),
+        )
+
+    def command(self, command: ArmCommand) -> None:
+        """Hand a command to the worker."""
+        if command == STANDSTILL:
+            self.stop()
+            return
+        normal_m_s = command.normal_m_s if command.force_n is None else 0.0
+        height_m = self._frame.place(self._report().position_m)[2]
+        wish = Wish(
+            velocity_m_s=self._frame.to_base((*command.tangential_m_s, normal_m_s)),
+            force_n=command.force_n,
+            zero_first=height_m > self._params.zero_above_m,
+        )
+        self._connected().send(wish.to_bytes())
+
+    def stop(self) -> None:
+        """Let the worker stop the arm."""
+        self._connected().send(STOP)
+
+    def recover(self) -> None:
+        """Release a protective stop and start the control program again, without connecting anew.
+
+        Whoever calls this has made sure that the arm may move.
+
+        Raises
+        ------
+        DeviceError
+            If the controller does not allow it.
+        """
+        link = self._connected()
+        if self._report().safety_mode in SAFETY_FAULTS:
+            unlock_protective_stop(self._params.ip, self._params.probe_timeout_s)
+        link.send(RECOVER)
+        end_s = time.monotonic() + RECOVERY_S
+        while fault := self._fault(self._report()):
+            if time.monotonic() > end_s:
+                raise DeviceError(f'the arm did not recover: {fault}; look at the pendant')
+            time.sleep(POLL_S)
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Of this connection: gaps of more than 20 ms in what the controller sends, and commands it did not take."""
+        report = self._report()
+        return {'late': report.late, 'refused': report.refused}
+
+    def _connected(self) -> WorkerLink:
+        if self._link is None:
+            raise DeviceError('the arm is not connected; connect it first')
+        return self._link
+
+    def _report(self) -> Report:
+        link = self._connected()
+        link.check()
+        assert link.report is not None
+        return link.report
+
+    def _fault(self, report: Report) -> str:
+        if report.silent:
+            return f'the controller is silent for more than {self._params.silence_s * 1e3:.0f} ms'
+        if report.safety_mode in SAFETY_FAULTS:
+            return SAFETY_FAULTS[report.safety_mode]
+        return '' if report.playing else 'its control program was stopped, by hand or by its watchdog'

@@ -1,0 +1,47 @@
+"""What can be chosen about an arm of Universal Robots."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from texture_core.errors import InvalidParameter
+from texture_core.parameters import param
+
+
+@dataclass(frozen=True)
+class UrArmParams:
+    """Where the controller is, where the surface is, and how the arm is supervised."""
+
+    ip: str = param('127.0.0.2', 'Address of the controller; the default is that of the emulated one.')
+    surface_pose: list[float] = param(
+        [0.4, 0.0, 0.1, 0.0, 0.0, 0.0],
+        'Pose of the surface in the base frame: x, y, z in m, rotation vector in rad; its z axis points away from it.',
+    )
+    rate_hz: float = param(250.0, 'Rate of commands and states.', unit='Hz', low=50.0, high=500.0)
+    arm_acceleration_m_s2: float = param(2.0, 'Acceleration towards a new velocity.', unit='m/s²', low=0.1, high=10.0)
+    force_speed_m_s: float = param(0.05, 'Highest normal speed under force control.', unit='m/s', low=0.001, high=0.25)
+    command_timeout_s: float = param(0.2, 'A command holds so long.', unit='s', low=0.02, high=2.0)
+    watchdog_hz: float = param(
+        10.0, 'The controller stops the arm when it hears less often from here.', unit='Hz', low=1.0, high=50.0
+    )
+    silence_s: float = param(0.1, 'A controller that is silent for longer is a fault.', unit='s', low=0.02, high=2.0)
+    zero_above_m: float = param(
+        0.005,
+        'The force sensor is zeroed whenever the arm moves off from higher than this.',
+        unit='m',
+        low=0.0,
+        high=1.0,
+    )
+    unlock_protective_stop: bool = param(
+        False, 'Release a protective stop when connecting; if not, a person does it on the pendant.'
+    )
+    probe_timeout_s: float = param(1.5, 'The controller must show that it is one within.', unit='s', low=0.1, high=10.0)
+    connect_timeout_s: float = param(10.0, 'The arm must be ready to move within.', unit='s', low=0.5, high=60.0)
+
+    def __post_init__(self) -> None:
+        if len(self.surface_pose) != 6 or not all(map(math.isfinite, self.surface_pose)):
+            raise InvalidParameter(
+                f"parameter 'surface_pose' is {list(self.surface_pose)}; six finite numbers are needed: "
+                'x, y, z in m and a rotation vector in rad'
+            )

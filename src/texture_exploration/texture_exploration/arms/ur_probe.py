@@ -1,0 +1,182 @@
+"""Find out in plain Python, within a fixed time, whether a UR controller is there and ready.
+
+ur-rtde waits without a limit for a controller that does not answer; so it is only told to connect where one does.
+"""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from types import TracebackType
+
+from texture_core.errors import DeviceError
+from texture_exploration.arms.ur_tables import (
+    CONTROLLER_VERSION,
+    DASHBOARD_BANNER,
+    DASHBOARD_PORT,
+    FIRST_WITH_REMOTE_CONTROL,
+    FIRST_WITHOUT_DASHBOARD,
+    PROTOCOL_VERSION,
+    REQUEST_VERSION,
+    RTDE_PORT,
+)
+
+HEADER = struct.Struct('>HB')
+FREE_MODES = ('NORMAL', 'REDUCED')
+UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
+UNLOCK_RETRY_S = 0.25
+
+
+class Line:
+    """A TCP connection on which every wait ends in time, and every failure is a sentence."""
+
+    def __init__(self, ip: str, port: int, timeout_s: float) -> None:
+        self._where = f'{ip}:{port}'
+        self._timeout_s = timeout_s
+        self._end_s = time.monotonic() + timeout_s
+        try:
+            self._socket = socket.create_connection((ip, port), timeout_s)
+        except ConnectionRefusedError as error:
+            raise DeviceError(
+                f"nothing listens on {self._where}; is the controller on, and is parameter 'ip' its address?"
+            ) from error
+        except TimeoutError as error:
+            raise DeviceError(
+                f'{self._where} cannot be reached within {timeout_s:g} s; check the cable, the network and parameter '
+                "'ip'"
+            ) from error
+        except OSError as error:
+            raise DeviceError(f"{self._where} cannot be reached: {error}; check parameter 'ip'") from error
+
+    def __enter__(self) -> Line:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._socket.close()
+
+    def send(self, data: bytes) -> None:
+        """Send all of it."""
+        try:
+            self._socket.sendall(data)
+        except OSError as error:
+            raise self._silent() from error
+
+    def read(self, size: int) -> bytes:
+        """Return exactly so many bytes."""
+        data = b''
+        while len(data) < size:
+            try:
+                self._socket.settimeout(max(0.001, self._end_s - time.monotonic()))
+                chunk = self._socket.recv(size - len(data))
+            except OSError as error:
+                raise self._silent() from error
+            if not chunk:
+                raise DeviceError(f'{self._where} ended the conversation; is it a UR controller, and has it started?')
+            data += chunk
+        return data
+
+    def read_line(self) -> str:
+        """Return the next line."""
+        line = b''
+        while not line.endswith(b'\n'):
+            line += self.read(1)
+        return line.decode('utf-8', 'replace').strip()
+
+    def _silent(self) -> DeviceError:
+        return DeviceError(
+            f'{self._where} takes connections but does not answer as a UR controller within {self._timeout_s:g} s; '
+            "wait until it has started, restart it, or correct parameter 'ip'"
+        )
+
+
+def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
+    """Return the major and minor version of the controller.
+
+    Raises
+    ------
+    DeviceError
+        If there is none, or it does not answer in time.
+    """
+    with Line(ip, RTDE_PORT, timeout_s) as line:
+        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
+        answer = _ask(line, CONTROLLER_VERSION, b'')
+    if len(answer) < 8:
+        raise DeviceError(f'{ip}:{RTDE_PORT} does not tell its version; is it a UR controller?')
+    major, minor = struct.unpack_from('>2I', answer)
+    return major, minor
+
+
+def _ask(line: Line, kind: int, payload: bytes) -> bytes:
+    """Send a message and return the payload of the answer of the same type; others, such as texts, are passed over."""
+    line.send(HEADER.pack(HEADER.size + len(payload), kind) + payload)
+    while True:
+        size, answered = HEADER.unpack(line.read(HEADER.size))
+        answer = line.read(max(0, size - HEADER.size))
+        if answered == kind:
+            return answer
+
+
+class Dashboard(Line):
+    """The dashboard server of a controller: a line is asked, a line is answered."""
+
+    def __init__(self, ip: str, timeout_s: float) -> None:
+        super().__init__(ip, DASHBOARD_PORT, timeout_s)
+        banner = self.read_line()
+        if DASHBOARD_BANNER not in banner:
+            raise DeviceError(f"{self._where} greets with '{banner}' and not as the dashboard of a UR controller")
+
+    def ask(self, line: str) -> str:
+        """Return the answer to a command."""
+        self.send(line.encode() + b'\n')
+        return self.read_line()
+
+
+def check_ready(ip: str, timeout_s: float, unlock: bool) -> None:
+    """Return if the controller is there and its arm can move; release a protective stop if `unlock` says so.
+
+    Raises
+    ------
+    DeviceError
+        With what stands in the way, and what to do.
+    """
+    end_s = time.monotonic() + timeout_s
+    version = rtde_version(ip, timeout_s)
+    if version[0] >= FIRST_WITHOUT_DASHBOARD:
+        return
+    with Dashboard(ip, max(0.1, end_s - time.monotonic())) as dashboard:
+        mode = dashboard.ask('robotmode')
+        if 'RUNNING' not in mode:
+            raise DeviceError(f"the arm at {ip} answers '{mode}'; switch it on and release its brakes")
+        if version >= FIRST_WITH_REMOTE_CONTROL and 'true' not in dashboard.ask('is in remote control'):
+            raise DeviceError(f'the arm at {ip} is under local control; switch the pendant to remote control')
+        safety = dashboard.ask('safetymode').rpartition(' ')[2]
+    if safety in FREE_MODES:
+        return
+    if safety != 'PROTECTIVE_STOP' or not unlock:
+        raise DeviceError(
+            f'the arm at {ip} is held by its safety system ({safety}); find out why, release it on the pendant, '
+            'and ask again'
+        )
+    unlock_protective_stop(ip, timeout_s)
+
+
+def unlock_protective_stop(ip: str, timeout_s: float) -> None:
+    """Release a protective stop, as soon as the controller allows it.
+
+    Raises
+    ------
+    DeviceError
+        If it does not.
+    """
+    end_s = time.monotonic() + UNLOCK_WAIT_S
+    while True:
+        with Dashboard(ip, timeout_s) as dashboard:
+            answer = dashboard.ask('unlock protective stop')
+        if 'releasing' in answer:
+            return
+        if time.monotonic() > end_s:
+            raise DeviceError(f"the controller at {ip} does not release the protective stop: '{answer}'")
+        time.sleep(UNLOCK_RETRY_S)
