@@ -1,0 +1,89 @@
+"""The node that turns the messages of other BioTac drivers into the suite's signals."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+from texture_msgs import msg
+
+from texture_core.catalogue import find
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.parameters import param
+from texture_core.ros.conversions import to_msg
+from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.parameters import declare
+from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros.run import run
+from texture_drivers.biotac.messages import MESSAGES, MessageStream
+
+TOPICS = ('signal', 'signal_static')
+
+
+@dataclass(frozen=True)
+class AdaptorParams:
+    """Whose messages are read."""
+
+    message_type: str = param('biotac_sensors/msg/BioTacHand', 'Type of the messages, package/msg/Type.')
+    topic: str = param('biotac_pub', 'Topic of the messages.')
+    finger: int = param(0, 'Place of the finger: 0 is the first.', low=0, high=4)
+    frame_id: str = param('fingertip', 'Frame of the fingertip, for the headers.')
+
+
+class BiotacAdaptor(Node):
+    """Publish one finger out of the messages of another driver."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('biotac_adaptor', **kwargs)
+        self._params = declare(self, AdaptorParams)
+        layout = find(MESSAGES, self._params.message_type.rpartition('/')[2], 'layout of BioTac messages')
+        self._stream = MessageStream(layout, self._params.finger, self._params.frame_id)
+        self._messages = self._refused = 0
+        self._fault = ''
+        self._signals = {topic: self.create_publisher(msg.TactileSignal, topic, SENSOR_QOS) for topic in TOPICS}
+        message_class = import_message(self._params.message_type)
+        self.create_subscription(message_class, self._params.topic, self._on_message, SENSOR_QOS)
+        self._diagnostics = Diagnostics(self, self._report)
+
+    def _on_message(self, message: Any) -> None:
+        self._messages += 1
+        try:
+            batches = self._stream.update(message)
+        except InvalidData as error:
+            self._refused += 1
+            self._fault = str(error)
+            return
+        self._fault = ''
+        for topic, batch in batches.items():
+            self._signals[topic].publish(to_msg(batch))
+
+    def _report(self) -> Report:
+        if self._stream.serial:
+            self._diagnostics.hardware_id = self._stream.serial
+        new, self._messages = self._messages, 0
+        numbers = {'samples': self._stream.samples, 'lost': self._stream.lost, 'refused messages': self._refused}
+        verdicts = (
+            (bool(self._fault), 'ERROR', self._fault),
+            (new == 0, 'ERROR', f"no message on '{self._params.topic}'; start the driver, or set the parameter topic"),
+        )
+        level, sentence = next(((level, text) for holds, level, text in verdicts if holds), ('OK', 'converting'))
+        return level, sentence, numbers
+
+
+def import_message(message_type: str) -> Any:
+    """Return the class of 'package/msg/Type'; InvalidParameter if it is not installed."""
+    package, _, name = message_type.partition('/msg/')
+    try:
+        return getattr(importlib.import_module(f'{package}.msg'), name)
+    except (ImportError, AttributeError) as error:
+        raise InvalidParameter(
+            f"parameter 'message_type' is '{message_type}', which cannot be imported ({error}); build the package with "
+            'these messages and source it, or name the type as package/msg/Type'
+        ) from error
+
+
+def main() -> None:
+    """Run the node."""
+    run(BiotacAdaptor)

@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from texture_drivers.biotac.protocol import decode
+from texture_drivers.biotac.tables import LAYOUTS, sampling_command
+from texture_drivers.framing import Deframer
+from texture_simulation.devices.biotac_encoder import commands, encode_replies, reply_frame, serials_frame, stuff
+
+
+@pytest.mark.parametrize('kind', LAYOUTS)
+def test_the_emulator_and_the_driver_agree_on_every_value(kind: str) -> None:
+    layout = LAYOUTS[kind]
+    n_slots = len(layout.slots)
+    values = np.resize(np.arange(4096), (100, n_slots, 2)).astype(np.uint16)
+    assert commands(layout.electrodes).tolist() == [sampling_command(channel) for channel in layout.slots]
+    replies = decode(encode_replies(values).tobytes(), layout, fingers=2)
+    assert not replies.damaged.any()
+    assert (replies.pac == values[:, 1::2].reshape(-1, 2)).all()
+    assert (replies.slow == values[:, list(layout.slow_slots)]).all()
+
+
+def test_an_absent_biotac_is_a_line_that_stays_low() -> None:
+    values = np.full((1, 44, 2), 100, dtype=np.uint16)
+    replies = decode(encode_replies(values, absent=[0]).tobytes(), LAYOUTS['biotac'], fingers=2)
+    assert replies.damaged.tolist() == [44, 0]
+
+
+def test_no_frames_are_no_replies() -> None:
+    assert encode_replies(np.empty((0, 44, 2), dtype=np.uint16)).shape == (0, 44 * 6)
+
+
+def test_the_driver_reads_the_emulators_frames() -> None:
+    values = np.zeros((44, 3), dtype=np.uint16)
+    body = encode_replies(values[None])[0].tobytes()
+    stream = reply_frame(65_537, 2**32 + 5, values, body) + serials_frame(3, 7, ['BT-1', '', 'BT-3'])
+    reply, serials = Deframer().feed(stream)
+    assert (reply.kind, reply.sequence, reply.time_us, reply.rows, reply.columns, reply.body) == (
+        ord('B'), 1, 5, 44, 3, body,
+    )  # fmt: skip
+    assert (serials.kind, serials.body) == (ord('S'), b'BT-1,,BT-3')
+
+
+@given(st.binary(max_size=1200))
+def test_stuffed_bytes_hold_no_zero_and_cost_one_in_254(content: bytes) -> None:
+    stuffed = stuff(content)
+    assert b'\x00' not in stuffed
+    assert len(content) < len(stuffed) <= len(content) + 1 + len(content) // 254 + 1
