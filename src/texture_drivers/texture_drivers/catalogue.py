@@ -9,7 +9,10 @@ from typing import Protocol
 from texture_core.protocols import Sensor
 from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.biotac.tables import LAYOUTS
+from texture_drivers.daq.sensor import daq
+from texture_drivers.file.player import FilePlayer
 from texture_drivers.params import SensorParams
+from texture_drivers.pvdf.sensor import Pvdf
 from texture_drivers.tsf85.sensor import Tsf85
 
 
@@ -26,4 +29,7 @@ SENSORS: Mapping[str, MakeSensor] = {
     'biotac': BioTac,  # SynTouch BioTac, 19 electrodes
     'biotac_sp': partial(BioTac, layout=LAYOUTS['biotac_sp']),  # 24 electrodes
     'biotac_hand': partial(BioTac, fingers=(0, 1, 2)),  # all places of a board; topics finger0/signal and so on
+    'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
+    'pvdf': Pvdf,  # PVDF film and force sensor, Hu et al. 2014
+    'file': FilePlayer,  # a recording: CSV, WAV, NumPy
 }

@@ -1,0 +1,70 @@
+"""The data acquisition finger as a sensor of the suite: all its channels on 'signal'."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.errors import InvalidParameter
+from texture_core.parameters import from_mapping, param
+from texture_drivers.daq import tables
+from texture_drivers.framed_sensor import FramedSensor
+from texture_drivers.params import SensorParams
+from texture_drivers.sample_line import Stream
+from texture_drivers.settings import read_settings
+
+DEFAULT_SETTINGS = 'daq'
+
+
+@dataclass(frozen=True)
+class DaqChannel:
+    """What is wired to one input of the converter: sample = gain · count + offset."""
+
+    name: str = param('', 'Name of the channel.')
+    unit: str = param('V', 'Unit of the samples.')
+    gain: float = param(1.0, 'Unit per count.')
+    offset: float = param(0.0, 'What 0 counts mean, in the unit.')
+
+
+@dataclass(frozen=True)
+class DaqSettings:
+    """The converter; its channels stand beside it in the file."""
+
+    baud: int = param(tables.BAUD, 'Baud rate of a real UART; USB ignores it.', low=9600, high=12_000_000)
+    rate_hz: float = param(tables.RATE_HZ, 'Samples of each channel a second.', unit='Hz', low=1.0, high=1e5)
+
+
+def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> FramedSensor:
+    """Return the sensor; its settings are `config/sensors/daq.yaml` unless `params.config` says otherwise."""
+    settings, channels = load_daq(params.config or DEFAULT_SETTINGS)
+    return FramedSensor(params, now_ns, [stream(settings.rate_hz, channels)], settings.baud)
+
+
+def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:
+    """Return the converter and its channels; see `texture_drivers.settings.load_settings`."""
+    content = read_settings(config)
+    listed = content.pop('channels', None)
+    if not isinstance(listed, list) or not listed:
+        raise InvalidParameter(f'settings {config} have the `channels` {listed!r}; list one for each input')
+    channels = [from_mapping(DaqChannel, item, f'settings {config}, channel {i + 1}') for i, item in enumerate(listed)]
+    if len({channel.name for channel in channels} - {''}) < len(channels):
+        raise InvalidParameter(f'settings {config}: give each channel a `name` of its own')
+    return from_mapping(DaqSettings, content, f'settings {config}'), channels
+
+
+def stream(rate_hz: float, channels: Sequence[DaqChannel]) -> Stream:
+    """Return what the device sends, as the line understands it; units that differ are listed in one text."""
+    units = [channel.unit for channel in channels]
+    return Stream(
+        topic=tables.TOPIC,
+        kind=tables.KIND,
+        sensor=tables.SENSOR,
+        rate_hz=rate_hz,
+        channels=tuple(channel.name for channel in channels),
+        unit=units[0] if len(set(units)) == 1 else ', '.join(units),
+        gains=np.array([channel.gain for channel in channels]),
+        offsets=np.array([channel.offset for channel in channels]),
+    )

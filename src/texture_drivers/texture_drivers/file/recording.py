@@ -1,0 +1,183 @@
+"""Recordings in files that other programs write: CSV, WAV, NumPy."""
+
+from __future__ import annotations
+
+import struct
+import tokenize
+import warnings
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.io import wavfile
+
+from texture_core.arrays import Array, Samples
+from texture_core.errors import InvalidData
+
+TIME_COLUMNS = ('time_s', 'time', 't')
+# What the readers of numpy and scipy raise at files that are damaged or something else, found by trying.
+FAULTS = (
+    ValueError,
+    KeyError,
+    EOFError,
+    ArithmeticError,
+    MemoryError,
+    NotImplementedError,
+    SyntaxError,
+    UnboundLocalError,
+    struct.error,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+UNEVEN = 0.1  # deviation of a time step from their median above which a recording is not evenly sampled
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Samples from a file.
+
+    Parameters
+    ----------
+    samples : (n_samples, n_channels)
+    rate_hz
+        None if the file does not tell.
+    channels
+        () if the file does not tell.
+    """
+
+    samples: Samples
+    rate_hz: float | None = None
+    channels: tuple[str, ...] = ()
+
+
+def load_recording(path: Path) -> Recording:
+    """Return what is recorded in a .csv, .wav, .npy or .npz file; no file can run code.
+
+    Raises
+    ------
+    InvalidData
+        If there is no such file, or it holds something else.
+    """
+    if path.suffix.lower() not in LOADERS:
+        raise InvalidData(f"recording '{path}' ends in '{path.suffix}'; allowed are {', '.join(LOADERS)}")
+    try:
+        recording = LOADERS[path.suffix.lower()](path)
+    except OSError as error:
+        raise InvalidData(f"recording '{path}' cannot be read: {error.strerror or error}; give another path") from error
+    except FAULTS as error:
+        raise InvalidData(f"recording '{path}' is not usable: {error}") from error
+    return _checked(path, recording)
+
+
+def _checked(path: Path, recording: Recording) -> Recording:
+    if recording.samples.ndim != 2 or 0 in recording.samples.shape:
+        raise InvalidData(
+            f"recording '{path}' holds an array of shape {recording.samples.shape}; (n_samples, n_channels) is needed"
+        )
+    if recording.channels and len(recording.channels) != recording.samples.shape[1]:
+        raise InvalidData(
+            f"recording '{path}' names {len(recording.channels)} channels and has {recording.samples.shape[1]}; "
+            'one name for each is needed'
+        )
+    if recording.rate_hz is not None and not 0 < recording.rate_hz < np.inf:
+        raise InvalidData(f"recording '{path}' has a rate of {recording.rate_hz} Hz; one above 0 is needed")
+    return recording
+
+
+def load_csv(path: Path) -> Recording:
+    """Return a table: one column for each channel, comma, semicolon or blanks between, names in the first line or none.
+
+    A column `time_s` gives the rate and is no channel. Lines with # are passed over.
+    """
+    with path.open(encoding='utf-8-sig') as file:
+        first = next((line for line in file if line.strip() and not line.startswith('#')), '')
+    delimiter = next((sign for sign in ',;' if sign in first), None)
+    names = [name.strip().strip('"') for name in first.strip().split(delimiter)]
+    named = not all(_is_number(name) for name in names)
+    with path.open(encoding='utf-8-sig') as file:
+        lines = (line for line in file if line.strip() and not line.startswith('#'))
+        if named:
+            next(lines, None)
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')  # an empty table is refused below, in our words
+            table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, dtype=np.float64)
+    if not named:
+        return Recording(table)
+    if table.size and table.shape[1] != len(names):
+        raise ValueError(f'its first line has {len(names)} names and the others {table.shape[1]} numbers')
+    time = next((i for i, name in enumerate(names) if name.lower() in TIME_COLUMNS), None)
+    if time is None or not table.size:
+        return Recording(table, None, tuple(names))
+    del names[time]
+    return Recording(np.delete(table, time, axis=1), rate_of(table[:, time]), tuple(names))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def rate_of(time_s: Array) -> float:
+    """Return the rate of evenly spaced times, (n,); ValueError if they are not."""
+    steps = np.diff(time_s)
+    if not len(steps) or not np.median(steps) > 0:
+        raise ValueError('its times do not rise; leave the column out and set `rate_hz`')
+    if np.abs(steps / np.median(steps) - 1).max() > UNEVEN:
+        raise ValueError(
+            f'its times are uneven (steps of {steps.min():.4g} to {steps.max():.4g} s); resample it, or leave the '
+            'column out and set `rate_hz`'
+        )
+    return float(len(steps) / (time_s[-1] - time_s[0]))
+
+
+def load_wav(path: Path) -> Recording:
+    """Return a WAV file; whole numbers are scaled so that full scale is 1."""
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore', wavfile.WavFileWarning)  # chunks of no interest
+        rate_hz, samples = wavfile.read(path)
+    if samples.dtype == np.uint8:  # WAV's only unsigned format
+        samples = samples.astype(np.int16) - 128
+        full_scale = 128.0
+    else:
+        full_scale = -float(np.iinfo(samples.dtype).min) if samples.dtype.kind == 'i' else 1.0
+    return Recording(_columns(samples) / full_scale, float(rate_hz))
+
+
+def load_npy(path: Path) -> Recording:
+    """Return an array of shape (n_samples, n_channels) or (n_samples,)."""
+    return Recording(_columns(np.load(path, allow_pickle=False)))
+
+
+def load_npz(path: Path) -> Recording:
+    """Return the array `samples`; `rate_hz` and `channels` beside it are used if they are there."""
+    with np.load(path, allow_pickle=False) as arrays:
+        if 'samples' not in arrays:
+            raise ValueError(f"it holds {', '.join(arrays.files) or 'nothing'}; an array called 'samples' is needed")
+        rate_hz = float(arrays['rate_hz']) if 'rate_hz' in arrays else None
+        channels = tuple(str(name) for name in np.atleast_1d(arrays['channels'])) if 'channels' in arrays else ()
+        return Recording(_columns(arrays['samples']), rate_hz, channels)
+
+
+def _columns(values: Any) -> Samples:
+    if not isinstance(values, np.ndarray):
+        raise ValueError('it holds several arrays; write one array, or call the file .npz')
+    if values.dtype.kind not in 'iuf':
+        raise ValueError(f'it holds values of type {values.dtype}; real numbers are needed')
+    samples: Samples = values.astype(np.float64)
+    return samples[:, None] if samples.ndim == 1 else samples
+
+
+LOADERS: Mapping[str, Callable[[Path], Recording]] = {
+    '.csv': load_csv,
+    '.wav': load_wav,
+    '.npy': load_npy,
+    '.npz': load_npz,
+}

@@ -1,0 +1,119 @@
+"""The PVDF finger as a sensor of the suite: the film on 'signal', the force on 'signal_static'."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from texture_core.parameters import param
+from texture_core.signal import TactileSignal
+from texture_drivers.framed_sensor import FramedSensor
+from texture_drivers.params import SensorParams
+from texture_drivers.pvdf import tables
+from texture_drivers.pvdf.charge_leak import ChargeLeak, Restorer
+from texture_drivers.sample_line import Stream
+from texture_drivers.settings import load_settings
+
+COULOMB_PC = 1e12
+
+
+@dataclass(frozen=True)
+class PvdfSettings:
+    """The film, its amplifier and the force sensor."""
+
+    baud: int = param(tables.BAUD, 'Baud rate of a real UART; USB ignores it.', low=9600, high=12_000_000)
+    film_rate_hz: float = param(tables.FILM_RATE_HZ, 'Samples of the film a second.', unit='Hz', low=1.0, high=1e5)
+    force_rate_hz: float = param(tables.FORCE_RATE_HZ, 'Samples of the force a second.', unit='Hz', low=0.1, high=1e4)
+    film_gain_pc: float = param(tables.FILM_PC_PER_COUNT, 'Charge per count.', unit='pC')
+    film_offset_pc: float = param(0.0, 'Charge at 0 counts.', unit='pC')
+    force_gain_n: float = param(tables.FORCE_N_PER_COUNT, 'Force per count.', unit='N')
+    force_offset_n: float = param(0.0, 'Force at 0 counts.', unit='N')
+    restore_from_hz: float = param(
+        0.0,
+        'Publish the force on the film, in N, with the leak undone above this frequency; 0: the charge as measured.',
+        unit='Hz',
+        low=0.0,
+        high=1000.0,
+    )
+    resistance_ohm: float = param(tables.RESISTANCE_OHM, 'Of the amplifier.', unit='Ω', low=1e3, high=1e15)
+    capacitance_f: float = param(tables.CAPACITANCE_F, 'Of the film.', unit='F', low=1e-13, high=1e-3)
+    d33_pc_n: float = param(tables.D33_PC_N, 'Charge per force on the film.', unit='pC/N', low=1e-3, high=1e6)
+
+    def streams(self) -> list[Stream]:
+        """Return what the device sends, as the line understands it."""
+        return [
+            Stream(
+                topic=tables.FILM_TOPIC,
+                kind=tables.FILM_KIND,
+                sensor=tables.FILM_SENSOR,
+                rate_hz=self.film_rate_hz,
+                channels=tables.FILM_CHANNELS,
+                unit='pC',
+                gains=np.array([self.film_gain_pc]),
+                offsets=np.array([self.film_offset_pc]),
+            ),
+            Stream(
+                topic=tables.FORCE_TOPIC,
+                kind=tables.FORCE_KIND,
+                sensor=tables.FORCE_SENSOR,
+                rate_hz=self.force_rate_hz,
+                channels=tables.FORCE_CHANNELS,
+                unit='N',
+                gains=np.array([self.force_gain_n]),
+                offsets=np.array([self.force_offset_n]),
+            ),
+        ]
+
+    def restorer(self) -> Restorer | None:
+        """Return what undoes the leak, if that is wanted."""
+        if not self.restore_from_hz:
+            return None
+        leak = ChargeLeak(self.resistance_ohm, self.capacitance_f, self.d33_pc_n / COULOMB_PC)
+        return Restorer(leak, self.film_rate_hz, self.restore_from_hz)
+
+
+class Pvdf:
+    """Read film and force. See `texture_core.protocols.Sensor`."""
+
+    def __init__(self, params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> None:
+        settings = load_settings(PvdfSettings, params.config)
+        self._line = FramedSensor(params, now_ns, settings.streams(), settings.baud)
+        self._restorer = settings.restorer()
+        self._next_sample = 0
+
+    def open(self) -> None:
+        """Open the device; DeviceError if it cannot be reached."""
+        self._line.open()
+
+    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
+        """Wait for the length of one batch and return what arrived."""
+        batches = self._line.read()
+        if self._restorer is None or tables.FILM_TOPIC not in batches:
+            return batches
+        restored = [self._restored(batch, self._restorer) for batch in batches[tables.FILM_TOPIC]]
+        return {**batches, tables.FILM_TOPIC: restored}
+
+    def close(self) -> None:
+        """Close the device."""
+        self._line.close()
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals; see `FramedSensor.counts`."""
+        return self._line.counts
+
+    @property
+    def expected_rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        return self._line.expected_rates_hz
+
+    def _restored(self, film: TactileSignal, restorer: Restorer) -> TactileSignal:
+        """Return the force on the film, N, of its charge, pC."""
+        if film.first_sample != self._next_sample:
+            restorer.restart()
+        self._next_sample = film.next_sample
+        force_n = restorer.update(film.samples.astype(np.float64) / COULOMB_PC)
+        return replace(film, unit='N', samples=force_n.astype(np.float32))
