@@ -218,7 +218,12 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
     for key in section:
         if key != 'features':
             raise InvalidParameter(f'{place}: {unknown(str(key), ["features"], "key")}')
-    return InputFeatures(topic, tuple(choose(FEATURES, entry, 'feature', place) for entry in section['features']))
+    features = tuple(choose(FEATURES, entry, 'feature', place) for entry in section['features'])
+    names = [name for name, _ in features]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidParameter(f"{place}: feature '{name}' is named twice; name it once")
+    return InputFeatures(topic, features)
 
 
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:

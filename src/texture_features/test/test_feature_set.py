@@ -1,0 +1,116 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidParameter, TextureError, UnknownName
+from texture_core.window import Window
+from texture_features.feature_set import FeatureSet
+from texture_features.windows import CutWindow, SlideEnd
+
+RECIPE = {
+    'windows': {'length_s': 0.5, 'hop_s': 0.25},
+    'inputs': {
+        'signal': {'features': [{'log_bands': {'bands': 16}}, 'hjorth', 'speed']},
+        'signal_static': {'features': ['level', 'log_variance']},
+    },
+}
+
+
+def cut(seed=0, rate_hz=1000.0, channels=('dynamic',)):
+    rng = np.random.default_rng(seed)
+    windows = {
+        'signal': Window(rng.normal(size=(500, len(channels))), rate_hz, channels),
+        'signal_static': Window(rng.normal(size=(30, 2)), 60.0, ('t1', 't2')),
+    }
+    return CutWindow(seed * 1000, 'e1', 0.5, 0.25, windows, speed_m_s=0.1)
+
+
+def test_values_have_the_names_of_their_origin():
+    vector = FeatureSet.from_mapping(RECIPE).describe(cut())
+    assert vector.names[0] == 'signal/log_bands/1/dynamic'
+    assert vector.names[16:20] == (
+        'signal/hjorth/log_activity/dynamic',
+        'signal/hjorth/mobility/dynamic',
+        'signal/hjorth/complexity/dynamic',
+        'signal/speed',
+    )
+    assert vector.names[-1] == 'signal_static/log_variance/t2'
+    assert dict(zip(vector.names, vector.values, strict=True))['signal/speed'] == 0.1
+    assert len(set(vector.names)) == len(vector.names)
+
+
+def test_many_windows_get_the_very_numbers_of_one():
+    feature_set = FeatureSet.from_mapping(RECIPE)
+    pieces = (
+        [cut(seed) for seed in range(70)] + [SlideEnd(5, 'e1', 0.25)] + [cut(1, 2200.0), cut(2, channels=('a', 'b'))]
+    )
+    for piece, vector in zip(pieces, feature_set.describe_many(pieces), strict=True):
+        alone = feature_set.describe(piece)
+        np.testing.assert_array_equal(vector.values, alone.values)
+        assert dataclasses.replace(vector, values=np.empty(0), names=()).__dict__.keys() == alone.__dict__.keys()
+        assert (vector.feature_set, vector.names, vector.last) == (alone.feature_set, alone.names, alone.last)
+
+
+def test_the_end_of_a_slide_is_an_empty_last_vector():
+    vector = FeatureSet.from_mapping(RECIPE).describe(SlideEnd(7, 'e1', 0.25, skipped=3))
+    assert (vector.last, vector.names, vector.skipped, vector.window_s) == (True, (), 3, 0.0)
+
+
+def test_the_fingerprint_says_what_the_values_mean():
+    feature_set = FeatureSet.from_mapping(RECIPE)
+    fingerprint = feature_set.describe(cut()).feature_set
+    assert fingerprint.endswith(' signal=1000Hz*1 signal_static=60Hz*2')
+    hopped = FeatureSet.from_mapping({**RECIPE, 'windows': {'length_s': 0.5, 'hop_s': 0.1}})
+    longer = FeatureSet.from_mapping({**RECIPE, 'windows': {'length_s': 0.6}})
+    assert hopped.describe(cut()).feature_set == fingerprint
+    assert longer.describe(cut()).feature_set != fingerprint
+    assert feature_set.describe(cut(rate_hz=2200.0)).feature_set != fingerprint
+
+
+def test_a_feature_set_written_out_is_the_same_again():
+    feature_set = FeatureSet.from_mapping(RECIPE)
+    assert FeatureSet.from_mapping(feature_set.as_mapping()) == feature_set
+
+
+def test_recipes_are_found_by_name_and_by_path(tmp_path):
+    path = tmp_path / 'mine.yaml'
+    path.write_text('inputs: {signal: {features: [hjorth]}}\n')
+    assert FeatureSet.load(str(path)).topics == ('signal',)
+    card = tmp_path / 'model.json'
+    card.write_text('{"recipe": {"inputs": {"other": {"features": ["level"]}}}}')
+    assert FeatureSet.load(str(card)).topics == ('other',)
+    assert FeatureSet.load('default').topics == ('signal',)
+
+
+@pytest.mark.parametrize(
+    ('recipe', 'sentence'),
+    [
+        ({}, 'name one or more'),
+        ({'inputs': {'signal': ['hjorth']}}, "list under 'features'"),
+        ({'inputs': {'signal': {'features': [], 'rate': 3}}}, "list under 'features'"),
+        ({'inputs': {'signal': {'features': ['hjort']}}}, "did you mean 'hjorth'"),
+        ({'inputs': {'signal': {'features': [{'hjorth': {'flor': 1}}]}}}, "did you mean 'floor'"),
+        ({'inputs': {'signal': {'features': [{'log_bands': {'bands': 1}}]}}}, '2 to 8192'),
+        ({'inputs': {'signal': {'features': ['hjorth', 'hjorth']}}}, 'twice'),
+        ({'inputs': {'signal': {'features': ['hjorth']}}, 'windows': {'length_s': 0}}, 'at least|0.005 to'),
+    ],
+)
+def test_a_wrong_recipe_gets_one_sentence(recipe, sentence):
+    with pytest.raises(TextureError, match=sentence) as caught:
+        FeatureSet.from_mapping(recipe)
+    assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize('text', ['a: [', '- 1', '', '!!python/object:os.system {}', '\x00'])
+def test_a_file_that_is_no_recipe_gets_one_sentence(tmp_path, text):
+    path = tmp_path / 'bad.yaml'
+    path.write_text(text)
+    with pytest.raises(InvalidParameter, match=r'bad\.yaml') as caught:
+        FeatureSet.load(str(path))
+    assert '\n' not in str(caught.value)
+
+
+def test_an_unknown_recipe_is_answered_with_the_nearest():
+    with pytest.raises(UnknownName, match="did you mean 'default'"):
+        FeatureSet.load('defalt')

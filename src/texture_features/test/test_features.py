@@ -1,0 +1,153 @@
+import numpy as np
+import pytest
+from scipy import signal as scipy_signal
+
+from texture_core.errors import InvalidData
+from texture_features.catalogue import FEATURES
+from texture_features.feature import Windows
+from texture_features.features.hjorth import hjorth
+from texture_features.features.log_bands import LogBands, hann, welch_density
+from texture_features.features.spectral_peaks import SpectralPeaks, highest_peaks
+
+RATE_HZ = 1000.0
+EVERY = pytest.mark.parametrize('name', FEATURES)
+
+
+def noise(*shape, seed=0):
+    return np.random.default_rng(seed).normal(size=shape)
+
+
+def tone(frequency_hz, n_samples=1000, amplitude=1.0):
+    return amplitude * np.sin(2 * np.pi * frequency_hz * np.arange(n_samples) / RATE_HZ)[:, None]
+
+
+def windows(samples, speed_m_s=0.1, force_n=2.0):
+    leading = np.asarray(samples).shape[:-2]
+    return Windows(np.asarray(samples), RATE_HZ, np.full(leading, speed_m_s), np.full(leading, force_n))
+
+
+@EVERY
+@pytest.mark.parametrize(
+    'samples',
+    [np.zeros((500, 2)), np.full((500, 2), 0.1), noise(1, 2), noise(2, 2), noise(3, 1), tone(120.0)],
+    ids=['zero', 'constant', 'one sample', 'two samples', 'three samples', 'tone'],
+)
+def test_any_finite_window_gives_finite_values(name, samples):
+    assert np.isfinite(FEATURES[name]()(windows(samples))).all()
+
+
+@EVERY
+def test_values_come_for_each_channel_and_name(name):
+    feature = FEATURES[name]()
+    channels = 3 if feature.of_signal else 1
+    assert feature(windows(noise(500, 3))).shape == (channels, len(feature.names))
+    assert len(set(feature.names)) == len(feature.names)
+
+
+@EVERY
+def test_many_windows_give_the_very_values_of_each(name):
+    samples = noise(4, 500, 3)
+    feature = FEATURES[name]()
+    together = feature(windows(samples))
+    for window, values in zip(samples, together, strict=True):
+        np.testing.assert_array_equal(feature(windows(window)), values)
+
+
+@EVERY
+def test_the_samples_are_not_changed(name):
+    samples = noise(300, 2)
+    before = samples.copy()
+    FEATURES[name]()(windows(samples))
+    np.testing.assert_array_equal(samples, before)
+
+
+@pytest.mark.parametrize('shape', [(0, 2), (500, 0), (500,)])
+def test_empty_windows_are_refused(shape):
+    with pytest.raises(InvalidData, match='at least one'):
+        Windows(np.zeros(shape), RATE_HZ)
+
+
+@pytest.mark.parametrize(
+    ('name', 'shift'), [('log_bands', 9.0), ('log_variance', 9.0), ('log_slope_variance', 9.0), ('integral', None)]
+)
+def test_a_signal_three_times_as_strong_has_nine_times_the_power(name, shift):
+    feature = FEATURES[name]()
+    weak, strong = feature(windows(noise(500, 2))), feature(windows(3.0 * noise(500, 2)))
+    expected = weak + np.log(shift) if shift else weak * 9.0
+    np.testing.assert_allclose(strong, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize('name', ['log_bands', 'hjorth', 'log_variance', 'log_slope_variance', 'integral'])
+def test_an_offset_of_the_sensor_changes_nothing(name):
+    feature = FEATURES[name]()
+    np.testing.assert_allclose(feature(windows(noise(500, 2) + 100.0)), feature(windows(noise(500, 2))), rtol=1e-6)
+
+
+@pytest.mark.parametrize('n_samples', [100, 256, 500, 1100])
+def test_density_agrees_with_scipy(n_samples):
+    rows = noise(3, n_samples)
+    length = min(n_samples, 256)
+    _, expected = scipy_signal.welch(
+        rows, RATE_HZ, window=hann(length), nperseg=length, noverlap=128 if length == 256 else None, nfft=256
+    )
+    np.testing.assert_allclose(welch_density(rows, RATE_HZ, 256), expected, rtol=1e-9, atol=1e-15)
+
+
+def test_the_density_of_white_noise_adds_up_to_its_variance():
+    rows = noise(1, 100_000)
+    power = welch_density(rows, RATE_HZ, 256).sum() * RATE_HZ / 256
+    assert power == pytest.approx(rows.var(), rel=0.02)
+
+
+def test_the_highest_band_holds_the_tone():
+    feature = LogBands(bands=32)
+    highest = int(feature(windows(tone(203.0)))[0].argmax())
+    assert feature.names[highest] == '13'  # band k reaches around k · 500 Hz / 32
+
+
+def test_hjorth_of_a_tone_is_its_power_and_angular_frequency():
+    activity, mobility, complexity = hjorth(tone(50.0, 10_000, amplitude=2.0).T)[0]
+    assert activity == pytest.approx(2.0, rel=1e-3)
+    assert mobility == pytest.approx(2 * np.sin(np.pi * 50.0 / RATE_HZ), rel=1e-3)
+    assert complexity == pytest.approx(1.0, rel=1e-3)
+
+
+def test_peaks_are_the_tones_in_order_of_strength():
+    feature = SpectralPeaks(peaks=2)
+    values = feature(windows(tone(120.0) + tone(310.0, amplitude=0.5)))[0]
+    assert feature.names == ('1/frequency_hz', '1/amplitude', '2/frequency_hz', '2/amplitude')
+    np.testing.assert_allclose(values, [120.0, 1.0, 310.0, 0.5], rtol=0.05)
+
+
+def test_peaks_ranked_by_frequency_begin_with_the_lowest():
+    values = SpectralPeaks(peaks=2, order='frequency')(windows(tone(310.0) + tone(120.0, amplitude=0.5)))[0]
+    np.testing.assert_allclose(values[[0, 2]], [120.0, 310.0], rtol=0.02)
+
+
+def test_peaks_that_the_spectrum_lacks_are_zero():
+    bins, heights = highest_peaks(np.array([0.0, 1.0, 0.0, 3.0, 0.0]), 4, gap=1.0)
+    np.testing.assert_array_equal(bins, [3, 1, 0, 0])
+    np.testing.assert_array_equal(heights, [3.0, 1.0, 0.0, 0.0])
+
+
+def test_a_peak_close_to_a_higher_one_is_left_out():
+    bins, _ = highest_peaks(np.array([0.0, 1.0, 0.0, 3.0, 0.0, 0.0, 2.0, 0.0]), 2, gap=3.0)
+    np.testing.assert_array_equal(bins, [3, 6])
+
+
+def test_integral_and_arc_length_have_their_closed_forms():
+    assert FEATURES['integral']()(windows(tone(50.0, amplitude=2.0)))[0, 0] == pytest.approx(2.0, rel=1e-6)
+    ramp = np.arange(11.0)[:, None] * 3.0
+    line = Windows(ramp, rate_hz=0.25)  # steps of 4 s and 3 units: 5 long
+    assert FEATURES['arc_length']()(line)[0, 0] == pytest.approx(50.0)
+
+
+def test_a_ramp_has_no_slope_variance():
+    ramp = np.arange(50.0)[:, None]
+    assert FEATURES['log_slope_variance'](floor=0.1)(windows(ramp))[0, 0] == pytest.approx(np.log(0.1))
+
+
+def test_speed_and_force_pass_through_whatever_they_are():
+    for speed in (0.0, 0.15, np.nan):
+        np.testing.assert_array_equal(FEATURES['speed']()(windows(noise(5, 1), speed_m_s=speed)), [[speed]])
+        np.testing.assert_array_equal(FEATURES['force']()(windows(noise(5, 1), force_n=speed)), [[speed]])

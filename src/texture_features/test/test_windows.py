@@ -1,0 +1,254 @@
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_features.windows import CutWindow, SlideEnd, WindowCutter, WindowParams, cut_recording
+
+PARAMS = WindowParams(length_s=0.5, hop_s=0.1)
+START_NS = 7 * NANOSECONDS
+LIMITS = settings(max_examples=40, deadline=None)
+
+
+def ns(seconds: float) -> int:
+    return START_NS + round(seconds * NANOSECONDS)
+
+
+def state(at_s, phase=Phase.SLIDE, steady_s=0.0, name='e1', **others):
+    return ExplorationState(ns(at_s), name, 'linear_slide', phase, steady_s, **others)
+
+
+def stream(duration_s, rate_hz=1000.0, batch=5, begin_s=0.0, columns=1):
+    """Return batches whose samples are their own running index."""
+    total = round(duration_s * rate_hz)
+    rows = np.repeat(np.arange(total, dtype=np.float32)[:, None], columns, axis=1)
+    channels = tuple(f'c{column}' for column in range(columns))
+    return [
+        TactileSignal(ns(begin_s + first / rate_hz), 's', channels, '', rate_hz, first, rows[first : first + batch])
+        for first in range(0, total, batch)
+    ]
+
+
+def run(signals, states, params=PARAMS):
+    return list(cut_recording(signals, states, params))
+
+
+def starts(pieces):
+    return [round((piece.start_ns - START_NS) / NANOSECONDS, 6) for piece in pieces if isinstance(piece, CutWindow)]
+
+
+def first_samples(pieces, topic='signal'):
+    return [int(piece.windows[topic].samples[0, 0]) for piece in pieces if isinstance(piece, CutWindow)]
+
+
+def as_data(pieces):
+    """Return pieces in a form that compares by value."""
+    return [
+        (
+            piece.start_ns,
+            piece.skipped,
+            repr((piece.speed_m_s, piece.force_n, piece.surface)),
+            {topic: window.samples.tobytes() for topic, window in piece.windows.items()},
+        )
+        if isinstance(piece, CutWindow)
+        else piece
+        for piece in pieces
+    ]
+
+
+def test_windows_cover_the_promised_time_and_no_more():
+    pieces = run({'signal': stream(3.0)}, [state(1.0, steady_s=1.0), state(2.0, Phase.LIFT)])
+    assert starts(pieces) == [1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+    assert first_samples(pieces) == [1000, 1100, 1200, 1300, 1400, 1500]
+    assert pieces[-1] == SlideEnd(ns(2.0), 'e1', 0.1)
+
+
+def test_two_slide_states_cover_the_time_between_them():
+    states = [state(1.0), state(1.4), state(1.8), state(1.9, Phase.LIFT)]
+    assert starts(run({'signal': stream(3.0)}, states)) == [1.0, 1.1, 1.2, 1.3]
+
+
+def test_slide_states_too_far_apart_leave_a_hole():
+    states = [state(0.0, steady_s=0.6), state(1.25, steady_s=0.6), state(2.0, Phase.LIFT)]
+    assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 1.3]
+
+
+def test_a_window_comes_with_its_last_sample_and_not_before():
+    cutter = WindowCutter(PARAMS, ['signal'])
+    cutter.add_state(state(0.0, steady_s=2.0))
+    for batch in stream(0.5)[:-1]:
+        cutter.add_signal('signal', batch)
+        assert cutter.take() == []
+    cutter.add_signal('signal', stream(0.5)[-1])
+    assert starts(cutter.take()) == [0.0]
+
+
+def test_jitter_of_later_stamps_moves_no_window():
+    rng = np.random.default_rng(1)
+    batches = stream(2.0)
+    jittered = [
+        dataclasses.replace(batch, stamp_ns=batch.stamp_ns + int(rng.integers(0, 4_000_000)) * (number > 0))
+        for number, batch in enumerate(batches)
+    ]
+    states = [state(0.0, steady_s=1.5), state(1.5, Phase.LIFT)]
+    assert as_data(run({'signal': jittered}, states)) == as_data(run({'signal': batches}, states))
+
+
+def test_inputs_of_different_rates_are_aligned_by_their_stamps():
+    signals = {'signal': stream(2.0, 2200.0, 22), 'signal_static': stream(2.0, 100.0, 1, begin_s=0.004, columns=3)}
+    pieces = run(signals, [state(0.5, steady_s=1.0), state(1.5, Phase.DONE)])
+    assert first_samples(pieces, 'signal') == [1100, 1320, 1540, 1760, 1980, 2200]
+    assert first_samples(pieces, 'signal_static') == [50, 60, 70, 80, 90, 100]
+    assert pieces[0].windows['signal'].samples.shape == (1100, 1)
+    assert pieces[0].windows['signal_static'].samples.shape == (50, 3)
+
+
+def test_windows_with_lost_samples_are_left_out_and_counted():
+    batches = [batch for batch in stream(2.0) if not 700 <= batch.first_sample < 710]
+    pieces = run({'signal': batches}, [state(0.0, steady_s=1.5), state(1.5, Phase.LIFT)])
+    assert starts(pieces) == [0.0, 0.1, 0.2, 0.8, 0.9, 1.0]
+    assert pieces[-1].skipped == 5
+
+
+def test_windows_with_samples_that_are_not_finite_are_left_out():
+    batches = stream(2.0)
+    batches[0].samples[3] = np.nan
+    batches[299].samples[0] = np.inf
+    pieces = run({'signal': batches}, [state(0.0, steady_s=1.5), state(1.5, Phase.LIFT)])
+    assert starts(pieces) == [round(0.1 * k, 1) for k in range(1, 10)]
+    assert pieces[-1].skipped == 2
+
+
+def test_a_stream_that_begins_late_or_again_costs_only_its_windows():
+    first, second = stream(1.0), stream(1.0, begin_s=1.0)
+    pieces = run({'signal': first + second}, [state(0.2, steady_s=1.8), state(2.0, Phase.LIFT)])
+    assert starts(pieces) == [0.2, 0.3, 0.4, 0.5, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+    assert first_samples(pieces)[4] == 0
+    late = run({'signal': stream(1.0, begin_s=0.35)}, [state(0.0, steady_s=1.0), state(1.0, Phase.LIFT)])
+    assert starts(late) == [0.4, 0.5]
+    assert late[-1].skipped == 4
+
+
+def test_speed_and_force_are_means_over_the_window():
+    states = [
+        state(0.0, speed_m_s=0.1, force_n=math.nan),
+        state(0.25, speed_m_s=0.2, force_n=2.0),
+        state(0.5, speed_m_s=9.0, force_n=9.0),
+        state(0.6, Phase.LIFT),
+    ]
+    window = run({'signal': stream(1.0)}, states)[0]
+    assert window.speed_m_s == pytest.approx(0.15)
+    assert window.force_n == pytest.approx(2.0)
+
+
+def test_the_next_exploration_ends_one_that_was_never_ended():
+    states = [state(0.0, steady_s=0.5), state(1.0, steady_s=0.5, name='e2'), state(1.5, Phase.DONE, name='e2')]
+    pieces = run({'signal': stream(2.0)}, states)
+    assert [piece.exploration_id for piece in pieces] == ['e1', 'e1', 'e2', 'e2']
+
+
+def test_a_slide_whose_streams_died_ends_after_a_silence():
+    cutter = WindowCutter(PARAMS, ['signal', 'signal_static'])
+    cutter.add_state(state(0.0, steady_s=1.0))
+    for batch in stream(0.7):
+        cutter.add_signal('signal', batch)
+    cutter.add_state(state(1.0, Phase.LIFT))
+    assert cutter.silence(100.0) == []
+    assert cutter.silence(100.2) == []
+    [end] = cutter.silence(100.4)
+    assert isinstance(end, SlideEnd)
+    assert end.skipped == 6
+
+
+def test_a_stream_that_goes_on_is_no_silence():
+    cutter = WindowCutter(PARAMS, ['signal'])
+    cutter.add_state(state(0.0, steady_s=1.0))
+    cutter.add_state(state(1.0, Phase.LIFT))
+    pieces = []
+    for number, batch in enumerate(stream(1.0)):
+        cutter.add_signal('signal', batch)
+        pieces += cutter.silence(0.2 * number)
+    assert len(starts(pieces)) == 6
+    assert isinstance(pieces[-1], SlideEnd)
+
+
+def test_an_idle_cutter_keeps_a_few_seconds_only():
+    cutter = WindowCutter(PARAMS, ['signal'], keep_s=1.0)
+    for batch in stream(30.0, batch=20):
+        cutter.add_signal('signal', batch)
+        cutter.take()
+    [run_kept] = cutter._inputs['signal'].stream.runs
+    assert run_kept.next_sample - run_kept.first_sample <= 1020
+    assert len(run_kept._rows) <= 2 * 1040
+    assert len(run_kept._marks) <= 52
+
+
+def test_a_huge_jump_of_the_index_is_a_loss_and_takes_no_memory():
+    cutter = WindowCutter(PARAMS, ['signal'])
+    cutter.add_signal('signal', stream(0.1)[0])
+    cutter.add_signal('signal', dataclasses.replace(stream(0.1)[1], first_sample=2**60))
+    assert cutter.counts['lost_samples'] == 2**60 - 5
+    assert len(cutter._inputs['signal'].stream.runs[0]._rows) < 50_000
+
+
+def test_topics_that_are_no_input_are_ignored():
+    cutter = WindowCutter(PARAMS, ['signal'])
+    cutter.add_signal('other', stream(0.1)[0])
+    assert cutter.waiting_for == ('signal',)
+
+
+def recording(rng):
+    """Return two streams with losses, bad samples, restarts and jitter, and states of two explorations."""
+    signals = {}
+    for topic, rate, batch in (('signal', 1000.0, 20), ('signal_static', 100.0, 3)):
+        batches = stream(4.0, rate, batch, begin_s=float(rng.uniform(-0.2, 0.3)))
+        batches = [
+            dataclasses.replace(item, stamp_ns=item.stamp_ns + int(rng.integers(0, 3_000_000))) for item in batches
+        ]
+        if rng.random() < 0.5:
+            batches[int(rng.integers(len(batches)))].samples[0] = np.nan
+        if rng.random() < 0.5:
+            del batches[int(rng.integers(len(batches)))]
+        if rng.random() < 0.3:
+            cut = int(rng.integers(1, len(batches)))
+            origin = batches[cut].first_sample
+            batches[cut:] = [dataclasses.replace(b, first_sample=b.first_sample - origin) for b in batches[cut:]]
+        signals[topic] = batches
+    states = []
+    for name, begin in (('e1', 0.3), ('e2', 2.2)):
+        times = begin + np.cumsum(rng.choice([0.05, 0.2, 0.45, 0.7], size=5))
+        states += [
+            state(at, name=name, steady_s=float(rng.choice([0.0, 0.1, 0.8])), speed_m_s=float(rng.uniform(0.1, 0.2)))
+            for at in times
+        ]
+        states.append(state(float(times[-1]) + 0.05, Phase.LIFT, name=name))
+    return signals, sorted(states, key=lambda item: item.stamp_ns)
+
+
+@LIMITS
+@given(st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+def test_what_is_cut_does_not_depend_on_the_order_of_arrival(content, order):
+    signals, states = recording(np.random.default_rng(content))
+    random = np.random.default_rng(order)
+    expected = as_data(run(signals, states))
+    cutter = WindowCutter(PARAMS, tuple(signals))
+    queues = {'': list(states), **{topic: list(batches) for topic, batches in signals.items()}}
+    pieces = []
+    while any(queues.values()):
+        topic = str(random.choice([name for name, queue in queues.items() if queue]))
+        for _ in range(int(random.choice([1, 3, 40]))):
+            if not queues[topic]:
+                break
+            item = queues[topic].pop(0)
+            if topic:
+                cutter.add_signal(topic, item)
+            else:
+                cutter.add_state(item)
+            if random.random() < 0.5:
+                pieces += cutter.take()
+    assert as_data(pieces + cutter.finish()) == expected
