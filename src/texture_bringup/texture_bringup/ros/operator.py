@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
@@ -26,6 +26,9 @@ from texture_core.ros.qos import SENSOR_QOS
 
 STEP_S = 0.1
 CANCEL_DEADLINE_S = 10.0
+LISTENERS_DEADLINE_S = 60.0
+# What this process sees, the other processes see soon after.
+DISCOVERY_S = 1.0
 Progress = Callable[[ExplorationState, TextureEstimate], None]
 
 
@@ -94,6 +97,27 @@ class Operator:
             self._until(lambda: bool(batches), deadline_s, "no samples arrive on 'signal'; is the sensor connected?")
         finally:
             self._node.destroy_subscription(subscription)
+
+    def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
+        """Wait until each topic has so many subscriptions, and they had time to be found; `guard` is called meanwhile.
+
+        Raises
+        ------
+        LaunchFailed
+            If they do not appear in time.
+        """
+
+        def all_listen() -> bool:
+            guard()
+            return all(self.listeners(topic) >= number for topic in topics)
+
+        self._until(all_listen, LISTENERS_DEADLINE_S, f'nobody listens to {", ".join(topics)}')
+        settled_s = time.monotonic() + DISCOVERY_S
+        self._until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
+
+    def listeners(self, topic: str) -> int:
+        """Return how many subscriptions a topic has."""
+        return int(self._node.count_subscribers(topic))
 
     def explore(self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None) -> Explored:
         """Explore, and return what was felt; Ctrl-C stops the exploration before it goes on.

@@ -1,0 +1,43 @@
+import pytest
+
+from texture_bringup.command import COMMANDS, main
+
+
+def test_without_a_sub_command_the_help_is_printed(capsys) -> None:
+    assert main([]) == 0
+    shown = capsys.readouterr().out
+    assert all(name in shown and command.summary in shown for name, command in COMMANDS.items())
+
+
+def test_an_unknown_sub_command_gets_the_nearest(capsys) -> None:
+    assert main(['trian']) == 2
+    assert "did you mean 'train'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('name', ['launch'])
+def test_every_sub_command_explains_itself(name, capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([name, '--help'])
+    assert ended.value.code == 0
+    assert COMMANDS[name].summary in capsys.readouterr().out
+
+
+def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
+    assert main(['launch', 'bench', '--show-args']) == 0
+    assert 'surface:=glass' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [
+        (['launch', 'bnech'], "no launch file 'bnech'; did you mean 'bench'?"),
+        (['launch', 'bench', 'surfcae:=glass'], "did you mean 'surface'?"),
+        (['launch', 'bench', 'surface'], 'write NAME:=VALUE'),
+        (['launch', 'replay'], 'give bag:=VALUE'),
+    ],
+)
+def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys) -> None:
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count('\n') == 1

@@ -1,0 +1,37 @@
+"""What the demonstration explores, and how."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from texture_core.exploration import ExplorationRequest
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Surfaces of the scene `bench`, slides over each, and the slide itself.
+
+    The finger touches each time at another place; every second slide goes the other way.
+    """
+
+    surfaces: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep', 'sandpaper_fine')
+    learning_slides: int = 3
+    recognition_slides: int = 2
+    speed_m_s: float = 0.08
+    force_n: float = 1.5
+    distance_m: float = 0.08
+
+    def requests(self, surface: str, slides: int, stop_when_certain: bool = False) -> Iterator[ExplorationRequest]:
+        """Yield the explorations of one surface."""
+        for number in range(slides):
+            yield ExplorationRequest(
+                'linear_slide',
+                speed_m_s=self.speed_m_s,
+                force_n=self.force_n,
+                distance_m=self.distance_m,
+                direction_rad=math.pi * (number % 2),
+                surface=surface,
+                stop_when_certain=stop_when_certain,
+            )
