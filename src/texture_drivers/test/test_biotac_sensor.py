@@ -187,3 +187,15 @@ def test_a_device_that_begins_anew_or_pauses_begins_another_epoch() -> None:
     ]
     assert epochs == [1, 1, 2, 2, 2, 3]
     assert run_.restarts == 2
+
+
+def test_a_bridge_of_another_pace_is_told() -> None:
+    run_ = Run(BIOTAC)
+    with pytest.raises(DeviceError, match=r'takes 10\.40 ms for a frame, and 10\.00 ms are needed'):
+        for number in range(120):
+            run_.place(bridge_frame(number, 10_400 * number))
+    steady = Run(BIOTAC)
+    jitter_us = (0, 2000, -2000)
+    for number in range(500):
+        steady.place(bridge_frame(number, 10_050 * number + jitter_us[number % 3]))
+    assert steady.restarts == 0

@@ -18,7 +18,9 @@ from texture_drivers.serial_port import SerialPort
 VERSION = 1
 REPLY, SERIALS = 0x42, 0x53  # kinds of frames: 'B' and 'S'
 POLLS = 5  # looks at the port per waiting time: a frame's arrival tells the time
-STEADY = 0.1  # more deviation between sequence number and clock is a stop or a reset
+LATE_FRAMES = 0.5  # a frame further than this from where its number puts it: the bridge stopped or began anew
+PACE_CHECK_S = 1.0
+PACE_TOLERANCE = 0.02  # far more than clocks differ, far less than slots made of delays instead of by a timer
 
 
 class SerialBridge:
@@ -98,7 +100,13 @@ class SerialBridge:
 
 
 class Run:
-    """Follow the numbers and the clock of a device beyond their wrapping, and notice when they begin anew."""
+    """Follow the numbers and the clock of a device beyond their wrapping, and notice when they begin anew.
+
+    Parameters
+    ----------
+    layout
+        What is sampled: tells how long a frame takes.
+    """
 
     def __init__(self, layout: Layout) -> None:
         self.restarts = 0
@@ -111,13 +119,37 @@ class Run:
         self._epoch += 1
         self._number = WrappingCounter(SEQUENCE_BITS)
         self._time_us = WrappingCounter(TIME_BITS)
+        self._checked: SpiFrame | None = None
 
     def place(self, frame: Frame) -> SpiFrame:
-        """Return the frame with its number and time."""
+        """Return the frame with its number and time.
+
+        Raises
+        ------
+        DeviceError
+            If the device samples at another pace than a BioTac is to be sampled.
+        """
         steps, elapsed_us = self._number.step(frame.sequence), self._time_us.step(frame.time_us)
-        steady = steps > 0 and abs(elapsed_us - steps * self._frame_us) <= STEADY * steps * self._frame_us
+        late_us = abs(elapsed_us - steps * self._frame_us)
+        steady = steps > 0 and late_us <= (LATE_FRAMES + PACE_TOLERANCE * steps) * self._frame_us
         if self._number.value is not None and not steady:
             self.restarts += 1
             self.restart()
         number, time_us = self._number.advance(frame.sequence), self._time_us.advance(frame.time_us)
-        return SpiFrame(self._epoch, number, time_us, frame.columns, frame.body)
+        placed = SpiFrame(self._epoch, number, time_us, frame.columns, frame.body)
+        self._check_pace(placed)
+        return placed
+
+    def _check_pace(self, frame: SpiFrame) -> None:
+        before = self._checked or frame
+        elapsed_us = frame.time_us - before.time_us
+        if elapsed_us < PACE_CHECK_S * 1e6:
+            self._checked = before
+            return
+        self._checked = frame
+        frame_us = elapsed_us / (frame.number - before.number)
+        if abs(frame_us / self._frame_us - 1) > PACE_TOLERANCE:
+            raise DeviceError(
+                f'the bridge takes {frame_us / 1000:.2f} ms for a frame, and {self._frame_us / 1000:.2f} ms are needed'
+                '; let a timer of the bridge start a slot every 227.27 µs'
+            )
