@@ -119,7 +119,7 @@ def load_model(path: str | Path) -> Model:
             training=dict(card['training']),
         )
         answer = model.predict_log_proba(np.zeros(len(model.names)))
-    except (KeyError, TypeError, ValueError, AttributeError, TextureError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile, TextureError) as error:
         raise ModelMismatch(
             f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
         ) from error

@@ -6,8 +6,9 @@ from texture_core.errors import InvalidData
 from texture_features.catalogue import FEATURES
 from texture_features.feature import Windows
 from texture_features.features.hjorth import hjorth
-from texture_features.features.log_bands import LogBands, hann, welch_density
+from texture_features.features.log_bands import LogBands
 from texture_features.features.spectral_peaks import SpectralPeaks, highest_peaks
+from texture_features.spectrum import hann, mean_over_segments, segment_densities
 
 RATE_HZ = 1000.0
 EVERY = pytest.mark.parametrize('name', FEATURES)
@@ -68,7 +69,15 @@ def test_empty_windows_are_refused(shape):
 
 
 @pytest.mark.parametrize(
-    ('name', 'shift'), [('log_bands', 9.0), ('log_variance', 9.0), ('log_slope_variance', 9.0), ('integral', None)]
+    ('name', 'shift'),
+    [
+        ('log_bands', 9.0),
+        ('typical_bands', 9.0),
+        ('low_lines', 9.0),
+        ('log_variance', 9.0),
+        ('log_slope_variance', 9.0),
+        ('integral', None),
+    ],
 )
 def test_a_signal_three_times_as_strong_has_nine_times_the_power(name, shift):
     feature = FEATURES[name]()
@@ -77,7 +86,9 @@ def test_a_signal_three_times_as_strong_has_nine_times_the_power(name, shift):
     np.testing.assert_allclose(strong, expected, rtol=1e-9)
 
 
-@pytest.mark.parametrize('name', ['log_bands', 'hjorth', 'log_variance', 'log_slope_variance', 'integral'])
+@pytest.mark.parametrize(
+    'name', ['log_bands', 'typical_bands', 'low_lines', 'hjorth', 'log_variance', 'log_slope_variance', 'integral']
+)
 def test_an_offset_of_the_sensor_changes_nothing(name):
     feature = FEATURES[name]()
     np.testing.assert_allclose(feature(windows(noise(500, 2) + 100.0)), feature(windows(noise(500, 2))), rtol=1e-6)
@@ -90,12 +101,14 @@ def test_density_agrees_with_scipy(n_samples):
     _, expected = scipy_signal.welch(
         rows, RATE_HZ, window=hann(length), nperseg=length, noverlap=128 if length == 256 else None, nfft=256
     )
-    np.testing.assert_allclose(welch_density(rows, RATE_HZ, 256), expected, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        mean_over_segments(segment_densities(rows, RATE_HZ, 256, 128)), expected, rtol=1e-9, atol=1e-15
+    )
 
 
 def test_the_density_of_white_noise_adds_up_to_its_variance():
     rows = noise(1, 100_000)
-    power = welch_density(rows, RATE_HZ, 256).sum() * RATE_HZ / 256
+    power = mean_over_segments(segment_densities(rows, RATE_HZ, 256, 128)).sum() * RATE_HZ / 256
     assert power == pytest.approx(rows.var(), rel=0.02)
 
 
@@ -103,6 +116,18 @@ def test_the_highest_band_holds_the_tone():
     feature = LogBands(bands=32)
     highest = int(feature(windows(tone(203.0)))[0].argmax())
     assert feature.names[highest] == '13'  # band k reaches around k · 500 Hz / 32
+
+
+def test_bursts_lie_above_what_is_typical_and_a_steady_hum_does_not():
+    steady, bursts = tone(203.0), tone(203.0) * (np.arange(1000) % 250 < 50)[:, None]
+    for samples, apart in ((steady, False), (bursts, True)):
+        mean, typical = (FEATURES[name]()(windows(samples))[0, 12] for name in ('log_bands', 'typical_bands'))
+        assert (mean - typical > 1.0) == apart
+
+
+def test_low_lines_tell_ridges_apart_that_share_a_band():
+    lines = [int(FEATURES['low_lines']()(windows(tone(hz)))[0].argmax()) for hz in (98.0, 106.0)]
+    assert lines == [24, 26]  # line k stands at (k + 1) · 1000 / 256 Hz
 
 
 def test_hjorth_of_a_tone_is_its_power_and_angular_frequency():

@@ -13,11 +13,15 @@ from texture_features.features.level import Level
 from texture_features.features.log_bands import LogBands
 from texture_features.features.log_slope_variance import LogSlopeVariance
 from texture_features.features.log_variance import LogVariance
+from texture_features.features.low_lines import LowLines
 from texture_features.features.spectral_peaks import SpectralPeaks
 from texture_features.features.speed import Speed
+from texture_features.features.typical_bands import TypicalBands
 
 FEATURES: Mapping[str, type[Feature]] = {
     'log_bands': LogBands,  # Welch 1967
+    'typical_bands': TypicalBands,
+    'low_lines': LowLines,
     'hjorth': Hjorth,  # Hjorth 1970; Kaboli et al. 2015
     'spectral_peaks': SpectralPeaks,  # Roberge et al.
     'integral': Integral,  # Roberge et al.

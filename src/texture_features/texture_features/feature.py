@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -24,12 +25,15 @@ class Windows:
         Sampling rate, > 0.
     speed_m_s, force_n : (...)
         Mean speed and normal force in each window; NaN if unknown.
+    memo
+        What features that need the same intermediate result have computed.
     """
 
     samples: Samples
     rate_hz: float
     speed_m_s: Array = field(default_factory=lambda: np.array(np.nan))
     force_n: Array = field(default_factory=lambda: np.array(np.nan))
+    memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if self.samples.ndim < 2 or 0 in self.samples.shape[-2:]:

@@ -1,0 +1,118 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from texture_core.features import FeatureVector
+from texture_estimation.evidence import Evidence
+from texture_estimation.fingerprint import difference
+
+
+def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):
+    """Return the windows of one slide, `hop_s` apart, and the end of it."""
+    rows = np.flatnonzero(examples.groups == f'{label}/{slide}')
+    windows = [
+        FeatureVector(
+            start_ns=round(1e9 + number * hop_s * 1e9),
+            exploration_id=name,
+            window_s=0.5,
+            hop_s=hop_s,
+            names=examples.names,
+            values=examples.values[row],
+            feature_set=examples.feature_set,
+        )
+        for number, row in enumerate(rows)
+    ]
+    return [*windows, FeatureVector(9_000_000_000, name, 0.0, hop_s, last=True)]
+
+
+def judge(model, stream):
+    evidence = Evidence(model)
+    return [evidence.update(vector) for vector in stream]
+
+
+def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, examples):
+    estimates = judge(model, vectors(examples))
+    assert [estimate.windows for estimate in estimates] == [1, 2, 3, 4, 5, 6, 7, 8, 8]
+    assert [estimate.final for estimate in estimates] == [False] * 8 + [True]
+    assert estimates[-1].label == 'felt'
+    assert estimates[-1].known
+    assert estimates[-1].confidence == max(estimates[-1].probabilities)
+    assert sum(estimates[-1].probabilities) == pytest.approx(1.0)
+    assert estimates[-1].labels == model.labels
+
+
+def test_overlapping_windows_count_the_sliding_time_once(model, examples):
+    estimates = judge(model, vectors(examples, hop_s=0.1))
+    assert [round(estimate.evidence_s, 3) for estimate in estimates[:4]] == [0.5, 0.6, 0.7, 0.8]
+    assert estimates[0].stamp_ns == 1_500_000_000
+    apart = judge(model, vectors(examples, hop_s=1.0))
+    assert apart[2].evidence_s == pytest.approx(1.5)
+
+
+def test_the_same_windows_further_apart_are_worth_more(model, make_examples):
+    vague = make_examples(seed=8, spread=2.0)
+    assert (
+        judge(model, vectors(vague, hop_s=0.5))[-1].confidence > judge(model, vectors(vague, hop_s=0.02))[-1].confidence
+    )
+
+
+def test_a_new_exploration_begins_anew_even_without_an_end(model, examples):
+    first = vectors(examples, 'felt')[:4]
+    second = vectors(examples, 'wood', name='e2')
+    estimates = judge(model, first + second)
+    assert estimates[4].windows == 1
+    assert estimates[-1].label == 'wood'
+
+
+def test_after_the_end_the_same_id_begins_anew(model, examples):
+    estimates = judge(model, vectors(examples) + vectors(examples))
+    assert estimates[len(vectors(examples))].windows == 1
+
+
+def test_a_window_that_is_not_finite_is_left_out_with_a_message(model, examples):
+    stream = vectors(examples)
+    values = stream[1].values.copy()
+    values[2] = np.nan
+    stream[1] = dataclasses.replace(stream[1], values=values)
+    estimates = judge(model, stream)
+    assert estimates[1].windows == 1
+    assert "'signal/f2' is not finite" in estimates[1].message
+    assert estimates[-1].windows == 7
+
+
+def test_vectors_of_another_fingerprint_get_no_label_and_a_reason(model, examples):
+    stream = [dataclasses.replace(v, feature_set='abcd1234 signal=2200Hz*1') for v in vectors(examples)[:-1]]
+    for estimate in judge(model, [*stream, vectors(examples)[-1]]):
+        assert (estimate.label, estimate.windows, estimate.probabilities) == ('', 0, ())
+        assert "sampling rate of 'signal' is 2200 Hz, the model was trained at 1000 Hz" in estimate.message
+
+
+def test_a_slide_without_windows_ends_with_a_reason(model, examples):
+    [estimate] = judge(model, vectors(examples)[-1:])
+    assert estimate.final
+    assert estimate.label == ''
+    assert 'no window could be used' in estimate.message
+
+
+def test_without_a_model_the_final_estimate_says_so(examples):
+    estimate = judge(None, vectors(examples))[-1]
+    assert estimate.final
+    assert estimate.label == ''
+    assert 'no model is loaded' in estimate.message
+
+
+@pytest.mark.parametrize(
+    ('came', 'trained', 'words'),
+    [
+        ('a signal=1000Hz*1', 'a signal=1000Hz*1', ''),
+        ('a signal=1000Hz*1', 'a signal=2200Hz*1', 'sampling rate'),
+        ('a signal=1000Hz*2', 'a signal=1000Hz*1', '2 channels'),
+        ('a signal=1000Hz*1', 'a signal=1000Hz*1 signal_static=60Hz*12', 'signal, signal_static'),
+        ('a signal=1000Hz*1', 'b signal=1000Hz*1', 'recipe'),
+        ('', 'b signal=1000Hz*1', 'none'),
+    ],
+)
+def test_the_part_that_differs_is_named(came, trained, words):
+    assert words in difference(came, trained)
+    assert bool(difference(came, trained)) == bool(words)

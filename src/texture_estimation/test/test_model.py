@@ -1,0 +1,90 @@
+import hashlib
+import json
+
+import numpy as np
+import pytest
+import skops.io
+
+from texture_core.errors import ModelMismatch
+from texture_estimation.model import load_model
+
+
+@pytest.fixture
+def saved(model, tmp_path):
+    return model.save(tmp_path / 'surfaces', facts={'accuracy': 0.98})
+
+
+@pytest.mark.parametrize('ending', ['', '.skops', '.json'])
+def test_a_model_judges_the_same_after_it_was_saved(saved, model, examples, ending):
+    loaded = load_model(saved.with_suffix(ending))
+    np.testing.assert_array_equal(loaded.predict_log_proba(examples.values), model.predict_log_proba(examples.values))
+    assert loaded.card == model.card
+
+
+def test_the_card_holds_recipe_labels_and_facts(saved):
+    card = json.loads(saved.with_suffix('.json').read_text())
+    assert card['labels'] == ['cork', 'felt', 'slate', 'wood']
+    assert card['recipe']['learner']['svm_rbf']['c'] == 10.0
+    assert card['accuracy'] == 0.98
+
+
+def test_saving_leaves_two_files_and_nothing_else(saved):
+    assert sorted(path.name for path in saved.parent.iterdir()) == ['surfaces.json', 'surfaces.skops']
+
+
+def refused(path, match):
+    with pytest.raises(ModelMismatch, match=match) as caught:
+        load_model(path)
+    assert '\n' not in str(caught.value)
+
+
+def test_missing_files_are_refused(saved):
+    refused(saved.parent / 'none.skops', 'cannot be read')
+    saved.unlink()
+    refused(saved, 'belongs beside its card')
+
+
+@pytest.mark.parametrize('keep', [0, 10, 1000])
+def test_truncated_files_are_refused(saved, keep):
+    content = saved.read_bytes()
+    saved.write_bytes(content[:keep])
+    refused(saved, 'damaged or of another card')
+    saved.write_bytes(content)
+    card = saved.with_suffix('.json')
+    card.write_text(card.read_text()[:keep])
+    refused(saved, 'cannot be read')
+
+
+@pytest.mark.parametrize('text', ['[]', '{}', '3', '{"format": 99}'])
+def test_foreign_cards_are_refused(saved, text):
+    saved.with_suffix('.json').write_text(text)
+    refused(saved, 'not the card of a model')
+
+
+def rewrite(saved, content, **changes):
+    """Put other parts into the file, with a card that vouches for them."""
+    saved.write_bytes(content)
+    card = json.loads(saved.with_suffix('.json').read_text())
+    card |= {'sha256': hashlib.sha256(content).hexdigest(), **changes}
+    saved.with_suffix('.json').write_text(json.dumps(card))
+
+
+def test_a_file_with_types_no_model_holds_is_refused_before_it_is_built(saved, model):
+    rewrite(saved, skops.io.dumps({**model.parts, 'extra': np.ufunc}))
+    refused(saved, 'which no model of this suite holds')
+
+
+@pytest.mark.parametrize('content', [b'', b'PK\x03\x04', b'not a zip'])
+def test_a_file_that_is_no_skops_file_is_refused(saved, content):
+    rewrite(saved, content)
+    refused(saved, 'train it again')
+
+
+def test_parts_that_do_not_fit_the_card_are_refused(saved, model):
+    content = saved.read_bytes()
+    rewrite(saved, content, labels=['cork'])
+    refused(saved, 'its card names 1')
+    rewrite(saved, content, features=['one'])
+    refused(saved, 'train it again')
+    rewrite(saved, skops.io.dumps({'svc': 3}))
+    refused(saved, 'train it again')

@@ -1,0 +1,44 @@
+import pytest
+
+from texture_core.errors import TextureError
+from texture_core.resources import folder
+from texture_estimation.recipe import Recipe, load_recipe
+
+SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+INPUTS = {'inputs': {'signal': {'features': ['hjorth']}}}
+
+
+@pytest.mark.parametrize('name', SHIPPED)
+def test_shipped_recipes_load_and_are_the_same_when_written_out(name):
+    recipe = load_recipe(name)
+    assert recipe.description
+    assert Recipe.from_mapping(recipe.as_mapping(), name) == recipe
+
+
+def test_the_default_recipe_needs_one_input_only():
+    assert load_recipe('default').feature_set.topics == ('signal',)
+
+
+def test_training_windows_have_the_hop_of_the_training():
+    recipe = Recipe.from_mapping({**INPUTS, 'training': {'hop_s': 0.4}, 'windows': {'length_s': 0.6}}, 'x')
+    assert (recipe.training_windows.length_s, recipe.training_windows.hop_s) == (0.6, 0.4)
+    assert recipe.feature_set.windows.hop_s == 0.1
+
+
+@pytest.mark.parametrize(
+    ('more', 'sentence'),
+    [
+        ({'learnr': 'svm_rbf'}, "did you mean 'learner'"),
+        ({'learner': 'svm_rb'}, "did you mean 'svm_rbf'"),
+        ({'learner': {'svm_rbf': {'c': -1}}}, "parameter 'c'"),
+        ({'learner': ['svm_rbf']}, 'is written'),
+        ({'evidence': 'vote'}, 'soft_vote'),
+        ({'training': {'hop_s': 'x'}}, 'a number is needed'),
+        ({'training': 3}, 'a mapping'),
+    ],
+)
+def test_a_wrong_recipe_gets_one_sentence_that_says_where(more, sentence):
+    with pytest.raises(TextureError, match=sentence) as caught:
+        Recipe.from_mapping({**INPUTS, **more}, 'mine')
+    assert "recipe 'mine'" in str(caught.value)
+    assert '\n' not in str(caught.value)

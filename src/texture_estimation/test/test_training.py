@@ -1,0 +1,99 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidData
+from texture_core.features import FeatureVector
+from texture_estimation.labelled_features import LabelledFeatures
+from texture_estimation.recipe import load_recipe
+from texture_estimation.training import train
+
+RECIPE = load_recipe('default')
+
+
+def accuracy(model, examples):
+    best = model.predict_log_proba(examples.values).argmax(axis=1)
+    return (np.array(model.labels)[best] == examples.labels).mean()
+
+
+def test_a_model_knows_surfaces_it_was_shown(model, make_examples):
+    assert accuracy(model, make_examples(seed=1)) > 0.9
+    assert model.labels == ('cork', 'felt', 'slate', 'wood')
+
+
+def test_probabilities_add_up_to_one(model, examples):
+    np.testing.assert_allclose(np.exp(model.predict_log_proba(examples.values)).sum(axis=1), 1.0)
+
+
+def test_the_same_examples_make_the_same_model(model, examples):
+    again = train(RECIPE, examples)
+    np.testing.assert_array_equal(again.predict_log_proba(examples.values), model.predict_log_proba(examples.values))
+    assert again.growth == model.growth
+
+
+def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
+    model = train(RECIPE, make_examples(spread=2.5, slides=10))
+    fresh = make_examples(seed=3, spread=2.5, slides=10)
+    confidence = np.exp(model.predict_log_proba(fresh.values)).max(axis=1).mean()
+    assert confidence == pytest.approx(accuracy(model, fresh), abs=0.08)
+
+
+def test_windows_of_a_slide_are_worth_less_than_independent_ones(make_examples):
+    model = train(RECIPE, make_examples(spread=2.5, slides=8))
+    assert 0.0 <= model.growth < 1.0
+
+
+@pytest.mark.parametrize('column', [np.full, lambda n, value: np.full(n, value) + 1e-17])
+def test_a_constant_feature_gives_no_nan(make_examples, column):
+    examples = make_examples()
+    values = examples.values.copy()
+    values[:, 2] = column(len(values), 0.1)
+    model = train(RECIPE, dataclasses.replace(examples, values=values))
+    assert np.isfinite(model.predict_log_proba(values)).all()
+
+
+def test_features_that_are_all_constant_give_no_nan(make_examples):
+    examples = dataclasses.replace(make_examples(), values=np.ones((128, 6)))
+    assert np.isfinite(train(RECIPE, examples).predict_log_proba(np.ones(6))).all()
+
+
+@pytest.mark.parametrize(
+    ('slides', 'windows', 'note'), [(1, 8, 'single slide'), (1, 1, 'single window'), (2, 1, 'slides')]
+)
+def test_few_examples_make_a_model_whose_card_says_how_it_is_calibrated(make_examples, slides, windows, note):
+    examples = make_examples(slides=slides, windows=windows)
+    model = train(RECIPE, examples)
+    assert note in model.card['training']['calibration']
+    assert np.isfinite(model.predict_log_proba(examples.values)).all()
+
+
+def pick(examples, rows):
+    return dataclasses.replace(
+        examples, values=examples.values[rows], labels=examples.labels[rows], groups=examples.groups[rows]
+    )
+
+
+def test_examples_that_cannot_be_learnt_from_get_a_sentence(examples):
+    with pytest.raises(InvalidData, match='no windows to learn from'):
+        train(RECIPE, pick(examples, slice(0, 0)))
+    with pytest.raises(InvalidData, match="all windows are of 'cork'"):
+        train(RECIPE, pick(examples, examples.labels == 'cork'))
+    values = examples.values.copy()
+    values[3, 1] = np.nan
+    with pytest.raises(InvalidData, match="'signal/f1' and 0 others are not finite in 1 of 128"):
+        train(RECIPE, dataclasses.replace(examples, values=values))
+    with pytest.raises(InvalidData, match='shape'):
+        dataclasses.replace(examples, names=('a',))
+
+
+def test_vectors_are_gathered_with_their_surfaces():
+    vectors = [
+        FeatureVector(k, f'e{k // 2}', 0.5, 0.1, ('a',), np.array([float(k)]), feature_set='x') for k in range(6)
+    ] + [FeatureVector(9, 'e0', 0.0, 0.1, last=True)]
+    examples = LabelledFeatures.from_vectors(vectors, {'e0': 'cork', 'e2': 'felt', 'e1': ''})
+    assert examples.labels.tolist() == ['cork', 'cork', 'felt', 'felt']
+    assert examples.groups.tolist() == ['e0', 'e0', 'e2', 'e2']
+    assert examples.values.tolist() == [[0.0], [1.0], [4.0], [5.0]]
+    with pytest.raises(InvalidData, match='no window of a labelled surface'):
+        LabelledFeatures.from_vectors(vectors, {})

@@ -1,0 +1,36 @@
+"""Power in equal frequency bands: what is typical within the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows
+from texture_features.spectrum import densities_of, mean_over_segments
+
+
+@dataclass(frozen=True)
+class TypicalBands:
+    """Mean over short segments of the logarithm of the power spectral density, in the bands of `log_bands`.
+
+    Where this is well below `log_bands`, the power comes in bursts: single bumps, stick and slip.
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    bands: int = param(32, 'Number of bands; a segment is twice as many samples long.', low=2, high=8192)
+    floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the band, from 1."""
+        return tuple(str(band + 1) for band in range(self.bands))
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return the mean of log(density + floor)."""
+        densities = densities_of(windows, 2 * self.bands, max(1, self.bands // 2))
+        return mean_over_segments(np.log(densities[..., 1:] + self.floor))
