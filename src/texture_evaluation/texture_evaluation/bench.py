@@ -1,0 +1,28 @@
+"""Benchmarks by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from texture_core.catalogue import find
+from texture_evaluation.benches import biotac20, latency, tsf85
+from texture_evaluation.benches.result import Bench, BenchResult
+
+BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
+    'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
+    'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
+    'tsf85': tsf85.run,  # the parser on a faulty line
+}
+
+
+def run_bench(name: str, bench: Bench) -> tuple[BenchResult, Path]:
+    """Run one benchmark; return its result and the JSON file, beside which its charts lie.
+
+    Raises
+    ------
+    TextureError
+        If there is no such benchmark or its data is missing.
+    """
+    result = find(BENCHES, name, 'benchmark')(bench)
+    return result, result.write(bench.out)
