@@ -40,7 +40,7 @@ def test_a_whole_number_serves_where_a_number_is_needed() -> None:
     ],
 )
 def test_a_bad_value_is_refused_with_what_is_allowed(values: object, sentence: str) -> None:
-    with pytest.raises(InvalidParameter, match='.*') as refusal:
+    with pytest.raises(InvalidParameter) as refusal:
         from_mapping(Params, values, where='recipe x')  # type: ignore[arg-type]
     assert sentence in str(refusal.value)
     assert str(refusal.value).startswith('recipe x: ')

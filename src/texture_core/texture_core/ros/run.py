@@ -3,37 +3,38 @@
 from __future__ import annotations
 
 import signal
+import socket
 import sys
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import TextureError
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def run(make_node: Callable[[], Any], args: Sequence[str] | None = None, threads: int = 1) -> None:
     """Make the node, spin it until SIGINT or SIGTERM, destroy it; exit with 2 and one sentence on a user's error.
 
-    The node's `shutdown` method, if it has one, is called before it is destroyed: it joins threads and closes devices.
+    The node's `shutdown` method, if it has one, is called before it is destroyed, while it can still publish: it joins
+    threads and closes devices.
     """
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    stopped = []
-
-    def stop(number: int, _frame: object) -> None:
-        stopped.append(number)
-        rclpy.try_shutdown()
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, stop)
+    stopped = threading.Event()
+    for number in STOP_SIGNALS:
+        signal.signal(number, lambda _number, _frame: stopped.set())
     node = None
     try:
         node = make_node()
         executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(num_threads=threads)
         executor.add_node(node)
-        while rclpy.ok():
+        _wake_on_signals(executor)
+        while rclpy.ok() and not stopped.is_set():
             executor.spin_once(timeout_sec=1.0)
     except ExternalShutdownException:
         pass
@@ -45,3 +46,21 @@ def run(make_node: Callable[[], Any], args: Sequence[str] | None = None, threads
             getattr(node, 'shutdown', lambda: None)()
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _wake_on_signals(executor: Executor) -> None:
+    """Let a signal end the executor's wait at once: Python's own handlers run only after it."""
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+
+    def wait() -> None:
+        while reader.recv(1):
+            executor.wake()
+
+    # Both ends live as long as the process; the thread keeps no node alive.
+    threading.Thread(target=wait, daemon=True, name='signals').start()
+    _KEPT.append(writer)
+
+
+_KEPT: list[socket.socket] = []
