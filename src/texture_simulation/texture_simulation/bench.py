@@ -33,6 +33,8 @@ class BenchParams:
     surface: str = param('glass', 'Surface under the finger; may be set while running: the sample is swapped.')
     seed: int = param(0, 'Seed of all randomness.', low=0)
     tsf85_link: str = param('/tmp/texture/tsf85', 'Symbolic link to create; the device path for the sensor node.')
+    finger: int = param(0, 'Finger of the sensor that touches.', low=0, high=1)
+    long_stamps: bool = param(True, 'Firmware with 64-bit stamps (from 1.1.7 on); false: older, with 16-bit stamps.')
     finger_port: int = param(28500, 'UDP port on loopback where finger states arrive; 0: any.', low=0, high=65535)
 
 
@@ -58,7 +60,7 @@ class Bench:
         self._now_ns = now_ns
         self._track = FingerTrack()
         self._model = Tsf85Model(self.scene, self._prepared(params.surface), rng)
-        self.tsf85 = EmulatedTsf85(Path(params.tsf85_link).expanduser(), rng)
+        self.tsf85 = EmulatedTsf85(Path(params.tsf85_link).expanduser(), rng, params.finger, params.long_stamps)
         self._link = FingerLink(params.finger_port)
         self._commands: list[Callable[[], None]] = []
         self._samples_done = 0

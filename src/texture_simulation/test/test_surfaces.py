@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidParameter
+from texture_simulation.surfaces import BLURS_M, Grating, SelfAffine, Surface
+
+SHARP = BLURS_M[0]
+PLACES = np.linspace(0.0, 0.2, 20_000)
+
+
+def height(term, blur_m=SHARP, x_m=PLACES, y_m=0.0):
+    return Surface('one', (term,)).height_m(x_m, np.full_like(x_m, y_m), np.full_like(x_m, blur_m))
+
+
+def test_a_sine_is_blurred_by_the_gaussian_s_transfer_function() -> None:
+    pitch_m, depth_m, blur_m = 2e-3, 1e-4, 4e-4
+    felt = height(Grating(pitch_m, depth_m), blur_m)
+    expected = depth_m / 2 * np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
+    assert np.ptp(felt) / 2 == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_square_ridge_felt_sharply_is_as_high_and_as_wide_as_asked() -> None:
+    felt = height(Grating(5e-3, 1e-4, shape='square', duty=0.3))
+    assert np.median(felt[felt > 0]) - np.median(felt[felt < 0]) == pytest.approx(1e-4, rel=0.02)
+    assert (felt > felt.mean()).mean() == pytest.approx(0.3, abs=0.02)
+
+
+def test_sliding_along_the_ridges_meets_none() -> None:
+    assert np.ptp(height(Grating(2e-3, 1e-4, angle_rad=np.pi / 2))) < 1e-12
+
+
+def test_random_roughness_has_its_rms_and_its_waves() -> None:
+    rough = SelfAffine(rms_m=1e-5, longest_m=4e-3, shortest_m=5e-4)
+    x_m, y_m = (np.random.default_rng(0).uniform(0, 1, 50_000) for _ in range(2))
+    felt = height(rough, x_m=x_m, y_m=y_m)
+    assert felt.std() == pytest.approx(1e-5, rel=0.15)  # the least blur takes some of it
+    line = height(rough)
+    power = np.abs(np.fft.rfft(line * np.hanning(len(line)))) ** 2
+    wave = np.fft.rfftfreq(len(line), PLACES[1] - PLACES[0])
+    assert power[wave > 1.3 / rough.shortest_m].sum() < 0.01 * power.sum()
+
+
+def test_blurring_smooths_random_roughness() -> None:
+    rough = SelfAffine()
+    spreads = [height(rough, blur_m).std() for blur_m in (5e-5, 2e-4, 5e-4, 2e-3)]
+    assert spreads == sorted(spreads, reverse=True)
+    assert spreads[-1] < 0.3 * spreads[0]
+
+
+def test_a_seed_is_one_surface() -> None:
+    assert np.array_equal(height(SelfAffine(seed=3)), height(SelfAffine(seed=3)))
+    assert not np.array_equal(height(SelfAffine(seed=3)), height(SelfAffine(seed=4)))
+
+
+def test_terms_add_up() -> None:
+    terms = (Grating(), SelfAffine())
+    both = Surface('two', terms).height_m(PLACES, 0 * PLACES, 0 * PLACES + SHARP)
+    assert np.allclose(both, height(terms[0]) + height(terms[1]))
+
+
+def test_waves_that_do_not_fit_a_tile_are_refused() -> None:
+    with pytest.raises(InvalidParameter, match='at most 32 times'):
+        SelfAffine(longest_m=0.05, shortest_m=1e-4)

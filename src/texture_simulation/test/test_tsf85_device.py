@@ -1,0 +1,109 @@
+import os
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.errors import DeviceError
+from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.tsf85 import EmulatedTsf85
+
+TEN_MS = np.arange(10, dtype=np.int16)
+NO_IMAGE = np.empty((0, 28), dtype=np.uint16)
+START, STOP = bytes.fromhex('9A 00 58 01 01'), bytes.fromhex('9A 00 58 01 00')
+
+
+@pytest.fixture
+def device(tmp_path: Path) -> Iterator[EmulatedTsf85]:
+    made = EmulatedTsf85(tmp_path / 'new' / 'tsf85', np.random.default_rng(0))
+    made.plug()
+    yield made
+    made.unplug()
+
+
+class Host:
+    def __init__(self, link: Path) -> None:
+        self.end = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        tty.setraw(self.end)
+
+    def read(self) -> bytes:
+        try:
+            return os.read(self.end, 100_000)
+        except BlockingIOError:
+            return b''
+
+
+@pytest.fixture
+def host(tmp_path: Path, device: EmulatedTsf85) -> Iterator[Host]:
+    made = Host(tmp_path / 'new' / 'tsf85')
+    yield made
+    os.close(made.end)
+
+
+def test_it_streams_from_start_to_stop_only(device: EmulatedTsf85, host: Host) -> None:
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read() == b''
+    os.write(host.end, START)
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read().count(b'\x9a\x00\x58') == 11  # ten milliseconds and the image
+    os.write(host.end, STOP)
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read() == b''
+
+
+def test_a_command_is_understood_in_pieces_and_after_noise(device: EmulatedTsf85, host: Host) -> None:
+    for piece in (b'\x00\xff', START[:2], START[2:]):
+        os.write(host.end, piece)
+        device.advance(TEN_MS[:1], NO_IMAGE)
+    assert device.streaming
+
+
+def test_it_never_waits_for_a_host_that_does_not_read(device: EmulatedTsf85, host: Host) -> None:
+    os.write(host.end, START)
+    for _ in range(200):
+        device.advance(TEN_MS, NO_IMAGE)
+    assert device.dropped_bytes > 50_000
+
+
+def test_unplugging_breaks_the_port_and_removes_the_link(device: EmulatedTsf85, host: Host, tmp_path: Path) -> None:
+    device.unplug()
+    device.unplug()
+    with pytest.raises(OSError, match='Input/output'):
+        os.write(host.end, START)
+    assert not os.path.lexists(tmp_path / 'new' / 'tsf85')
+    device.advance(TEN_MS, NO_IMAGE)
+    device.plug()
+    assert (tmp_path / 'new' / 'tsf85').exists()
+    assert not device.streaming
+
+
+def test_a_mute_device_speaks_after_a_new_start(device: EmulatedTsf85, host: Host) -> None:
+    os.write(host.end, START)
+    device.advance(TEN_MS, NO_IMAGE)
+    host.read()
+    device.mute = True
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read() == b''
+    os.write(host.end, STOP + START)
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read()
+
+
+def test_a_file_in_the_place_of_the_link_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / 'taken').write_text('mine')
+    device = EmulatedTsf85(tmp_path / 'taken', np.random.default_rng(0))
+    with pytest.raises(DeviceError, match='choose a path'):
+        device.plug()
+    assert (tmp_path / 'taken').read_text() == 'mine'
+
+
+def test_faults_happen_at_their_rates() -> None:
+    data = bytes(range(256)) * 400
+    rng = np.random.default_rng(0)
+    assert ByteFaults().apply(data, rng) == data
+    assert len(ByteFaults(drop=0.01).apply(data, rng)) == pytest.approx(len(data) * 0.99, rel=0.002)
+    assert len(ByteFaults(insert=0.01).apply(data, rng)) == pytest.approx(len(data) * 1.01, rel=0.002)
+    flipped = np.frombuffer(ByteFaults(flip=0.01).apply(data, rng), np.uint8) ^ np.frombuffer(data, np.uint8)
+    assert np.unpackbits(flipped).sum() == (flipped > 0).sum() == pytest.approx(1024, rel=0.15)

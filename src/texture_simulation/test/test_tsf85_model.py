@@ -1,0 +1,88 @@
+import itertools
+
+import numpy as np
+import pytest
+
+from texture_simulation.offline import record
+from texture_simulation.path import Path
+from texture_simulation.scene import Scene, scene_from
+from texture_simulation.sensors.tsf85 import OVERSAMPLING, PATH_RATE_HZ, Tsf85Model
+
+PITCH_M = 1.5e-3
+
+
+def scene_of(angle_rad: float = 0.0, **effects: float) -> Scene:
+    term = {'kind': 'grating', 'pitch_m': PITCH_M, 'depth_m': 1e-4, 'angle_rad': angle_rad}
+    rough = {'kind': 'self_affine', 'seed': 5}
+    return scene_from('test', {'surfaces': {'sine': [term], 'rough': [rough]}, 'effects': effects})
+
+
+def slide(scene: Scene, speed_m_s: float, surface: str = 'sine', seed: int = 0, force_n: float = 2.0):
+    batches = record(scene, surface, speed_m_s, force_n, 2.0, rng=np.random.default_rng(seed))['signal']
+    return np.concatenate([batch.samples for batch in batches])[:, 0]
+
+
+@pytest.mark.parametrize('speed_m_s', [0.05, 0.1, 0.15, 0.3])
+@pytest.mark.parametrize('angle_rad', [0.0, 0.6, -1.0])
+def test_a_grating_gives_its_line_at_speed_over_pitch(speed_m_s: float, angle_rad: float) -> None:
+    signal = slide(scene_of(angle_rad, noise_count=20.0), speed_m_s)
+    spectrum = np.abs(np.fft.rfft((signal - signal.mean()) * np.hanning(len(signal))))
+    frequency = np.fft.rfftfreq(len(signal), 1e-3)
+    line = speed_m_s * np.cos(angle_rad) / PITCH_M
+    assert frequency[spectrum.argmax()] == pytest.approx(line, abs=frequency[1])
+
+
+def test_the_amplitude_grows_with_the_cube_root_of_the_force() -> None:
+    scene = scene_of()
+    # Stiffness F^(1/3), weakened by a blur that grows likewise.
+    blur_m = scene.contact.blur_m * np.cbrt([1.0, 8.0])
+    weakened = np.exp(-0.5 * (2 * np.pi * blur_m / PITCH_M) ** 2)
+    ratio = slide(scene, 0.1, force_n=8.0)[500:].std() / slide(scene, 0.1, force_n=1.0)[500:].std()
+    assert ratio == pytest.approx(2 * weakened[1] / weakened[0], rel=0.02)
+
+
+@pytest.mark.parametrize('surface', ['sine', 'rough'])
+def test_a_finger_at_rest_feels_only_noise(surface: str) -> None:
+    assert not slide(scene_of(), 0.0, surface).any()
+    noise = slide(scene_of(noise_count=25.0), 0.0, surface)
+    assert noise.std() == pytest.approx(25.0, rel=0.1)
+    assert np.isfinite(noise).all()
+
+
+def test_a_seed_is_one_recording_and_every_slide_starts_elsewhere() -> None:
+    scene = scene_of(noise_count=25.0)
+    assert np.array_equal(slide(scene, 0.1, seed=1), slide(scene, 0.1, seed=1))
+    first, second = (slide(scene_of(), 0.1, 'rough', seed=seed)[500:] for seed in (1, 2))
+    assert abs(np.corrcoef(first, second)[0, 1]) < 0.3
+    assert first.std() == pytest.approx(second.std(), rel=0.4)
+
+
+def test_too_strong_a_vibration_is_clipped_as_by_the_converter() -> None:
+    scene = scene_from('t', {'surfaces': {'deep': [{'kind': 'grating', 'pitch_m': 2e-3, 'depth_m': 5e-3}]}})
+    signal = slide(scene, 0.2, 'deep')
+    assert (signal.min(), signal.max()) == (-32768, 32767)
+
+
+def test_blocks_of_any_length_join_without_a_trace() -> None:
+    n_points = 1200
+    x_m = 0.1 * np.arange(n_points) / PATH_RATE_HZ
+    path = Path(x_m, 0 * x_m, np.full(n_points, 2.0))
+    scene = scene_of()
+    whole = Tsf85Model(scene, scene.surface('rough'), np.random.default_rng(3)).advance(path)
+    pieces = Tsf85Model(scene, scene.surface('rough'), np.random.default_rng(3))
+    ends = np.cumsum([0, 7, 5, 100, 1, 287, 200]) * OVERSAMPLING
+    joined = [pieces.advance(path.at(np.arange(a, b))) for a, b in itertools.pairwise(ends)]
+    # The blur sums as many harmonics as a block needs: not to the last bit the same.
+    assert np.allclose(np.concatenate([dynamic for dynamic, _ in joined]), whole[0], atol=1)
+    assert np.array_equal(np.concatenate([images for _, images in joined]), whole[1])
+
+
+def test_the_image_rises_where_and_as_hard_as_the_finger_presses() -> None:
+    scene = scene_from('t', {'surfaces': {'flat': []}})
+    model = Tsf85Model(scene, scene.surface('flat'), np.random.default_rng(0))
+    still = np.zeros(200)
+    free, pressed = (model.advance(Path(still, still, still + force))[1][-1] for force in (0.0, 2.0))
+    rise = (pressed.astype(int) - free).reshape(7, 4)
+    assert rise.sum() == pytest.approx(6000, abs=20)
+    assert rise[3, 1] == rise.max()
+    assert rise[0, 0] == 0
