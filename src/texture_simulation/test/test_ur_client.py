@@ -1,0 +1,128 @@
+"""The unmodified client package ur-rtde on the emulated controller, over TCP."""
+
+from __future__ import annotations
+
+import json
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from texture_core.errors import DeviceError
+from texture_core.finger import FingerState
+from texture_simulation.devices.ur.params import UrControllerParams
+from texture_simulation.devices.ur.process import ControllerProcess
+
+SESSION = Path(__file__).with_name('ur_session.py')
+DEADLINE_S = 60.0
+IP = '127.0.0.60'
+
+
+@pytest.fixture(scope='module')
+def done():
+    pytest.importorskip('rtde_control', reason='ur-rtde is not installable here')
+    with ControllerProcess(UrControllerParams(ip=IP, unlock_delay_s=0.0)):
+        command = [sys.executable, str(SESSION), IP]
+        session = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+    assert session.returncode == 0, session.stderr
+    return json.loads(session.stdout.splitlines()[-1])
+
+
+def test_the_force_sensor_shows_its_offset_until_it_is_zeroed(done):
+    assert done['offset'][2] == pytest.approx(1.5 * 0.866, abs=0.2)
+    assert done['zeroed'] == [True, True]
+
+
+def test_a_move_ends_on_its_goal(done):
+    assert done['move'] == [True, pytest.approx(0.42), pytest.approx(0.0), pytest.approx(0.11)]
+    assert done['waypoint'] == pytest.approx([0.42, 0.0, 0.11])
+
+
+def test_a_move_in_the_background_can_be_stopped(done):
+    assert done['background'] == [True, 0, False]
+    steady, ended, x = done['stopped']
+    assert (steady, ended) == (True, True)
+    assert 0.4 < x < 0.42
+
+
+def test_a_servo_is_followed(done):
+    assert done['servo'] == [True, pytest.approx(0.4), pytest.approx(0.0), pytest.approx(0.12, abs=1e-4)]
+
+
+def test_a_move_until_contact_ends_where_the_surface_begins(done):
+    assert done['contact'] == [True, pytest.approx(0.4), pytest.approx(0.0), pytest.approx(0.1, abs=2e-4)]
+
+
+def test_force_control_holds_the_force_while_the_finger_slides_with_friction(done):
+    assert done['force_mode'] == [True, True]
+    assert done['slide'] == [True, True, pytest.approx(5.0, rel=0.05)]
+    assert done['stop'] == [True, True, True]
+
+
+def test_a_contact_is_detected_in_the_background(done):
+    assert done['detection'] == [False, True, True]
+
+
+def test_the_watchdog_stops_the_program_only_when_it_is_not_kicked(done):
+    assert done['watchdog'] == [True, True, True, False]
+    assert done['again'] == [True, True, True]
+
+
+def test_a_protective_stop_refuses_commands_until_it_is_unlocked(done):
+    assert done['protective_stop'] == [True, 3, False]
+    assert done['dashboard'] == ['5.12.0.0', 'Robotmode: RUNNING', 'Safetystatus: PROTECTIVE_STOP']
+    assert done['unlocked'] == [True, True]
+    assert done['script_stopped']
+
+
+@pytest.mark.parametrize('version', ['3.15', '5.23', '10.10'])
+def test_other_versions_let_the_client_move(version):
+    pytest.importorskip('rtde_control', reason='ur-rtde is not installable here')
+    program = (
+        'import os, sys; from rtde_control import RTDEControlInterface as Control; '
+        'from rtde_receive import RTDEReceiveInterface as Receive; '
+        'ip = sys.argv[1]; receive = Receive(ip); control = Control(ip); pose = receive.getActualTCPPose(); '
+        'pose[0] += 0.01; print(control.moveL(pose, 0.25, 1.2), round(receive.getActualTCPPose()[0], 6), flush=True); '
+        'os._exit(0)'  # the interfaces would sleep
+    )
+    with ControllerProcess(UrControllerParams(ip=IP, version=version)):
+        command = [sys.executable, '-c', program, IP]
+        session = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+    assert session.stdout.splitlines()[-1:] == ['True 0.41'], session.stderr
+
+
+def test_it_tells_the_bench_where_the_finger_is():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
+        bench.bind(('127.0.0.1', 0))
+        bench.settimeout(10.0)
+        with ControllerProcess(UrControllerParams(ip='127.0.0.61', finger_port=bench.getsockname()[1])):
+            states = [FingerState.from_bytes(bench.recv(256)) for _ in range(200)]
+    assert (states[-1].x_m, states[-1].z_m, states[-1].force_n) == (0.0, pytest.approx(0.01), 0.0)
+    rate_hz = 199 / ((states[-1].time_ns - states[0].time_ns) * 1e-9)
+    assert 100 < rate_hz < 600  # 500 Hz on a machine that is not busy
+
+
+def test_two_controllers_on_one_address_are_refused_in_a_sentence():
+    params = UrControllerParams(ip='127.0.0.62')
+    with ControllerProcess(params), pytest.raises(DeviceError, match=r'cannot listen on 127\.0\.0\.62'):
+        ControllerProcess(params).start()
+
+
+def test_offline_means_nobody_answers_for_a_while():
+    with ControllerProcess(UrControllerParams(ip='127.0.0.63')) as controller:
+        controller.ask('emulate offline 0.3')
+        heard = [answer(controller)]
+        while heard[-1] != 'Robotmode: RUNNING':
+            time.sleep(0.02)
+            heard.append(answer(controller))
+        assert ConnectionRefusedError in heard
+
+
+def answer(controller):
+    try:
+        return controller.ask('robotmode')
+    except OSError as error:
+        return type(error)

@@ -1,0 +1,140 @@
+"""The emulated controller in its own time: the register handshake, the watchdog, the safety."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from texture_simulation.devices.ur.controller import Controller
+from texture_simulation.devices.ur.params import UrControllerParams
+from texture_simulation.devices.ur.tables import DONE, READY, Command, Safety
+
+SCRIPT = 'def rtde_control():\nend\n'
+
+
+@pytest.fixture
+def controller():
+    controller = Controller(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
+    controller.upload(SCRIPT)
+    run(controller, 0.1)
+    return controller
+
+
+def run(controller, seconds):
+    for _ in range(round(seconds / controller.step_s)):
+        controller.tick()
+
+
+def send(controller, command, doubles=(), ints=()):
+    registers = controller.registers
+    registers.double_in[: len(doubles)] = doubles
+    registers.int_in[1 : 1 + len(ints)] = ints
+    registers.int_in[0] = command
+    registers.fed_s = controller.time_s
+
+
+def state(controller):
+    return controller.registers.int_out[0]
+
+
+def speed_l(controller, *velocity):
+    send(controller, Command.SPEED_L, [*velocity, 0.0, 0.0, 0.0, 1.0, 0.0])
+
+
+def test_a_program_starts_shortly_after_its_upload():
+    controller = Controller(UrControllerParams(), np.random.default_rng(0))
+    controller.upload(SCRIPT)
+    controller.tick()
+    assert not controller.playing
+    run(controller, 0.1)
+    assert controller.playing
+    assert state(controller) == READY
+
+
+def test_a_command_is_done_once_and_then_waits_for_0(controller):
+    x = controller.robot.pose[0]
+    send(controller, Command.MOVE_L, [x + 0.01, *controller.robot.pose[1:], 0.1, 1.0], [0])
+    controller.tick()
+    assert state(controller) == READY
+    run(controller, 1.0)
+    assert state(controller) == DONE
+    assert controller.robot.pose[0] == pytest.approx(x + 0.01)
+    send(controller, Command.NONE)
+    controller.tick()
+    assert state(controller) == READY
+
+
+def test_realtime_commands_leave_the_script_ready(controller):
+    speed_l(controller, 0.05, 0.0, 0.0)
+    run(controller, 0.2)
+    assert state(controller) == READY
+    assert controller.robot.velocity[0] == pytest.approx(0.05)
+
+
+def test_a_command_that_is_overwritten_within_a_cycle_is_lost(controller):
+    speed_l(controller, 0.05, 0.0, 0.0)
+    send(controller, Command.NONE)
+    run(controller, 0.2)
+    assert not controller.robot.velocity.any()
+
+
+def test_a_move_in_the_background_shows_its_progress(controller):
+    x = controller.robot.pose[0]
+    send(controller, Command.MOVE_L, [x + 0.05, *controller.robot.pose[1:], 0.1, 1.0], [1])
+    run(controller, 0.02)
+    assert state(controller) == DONE
+    assert controller.registers.int_out[2] & 1 << 15
+    run(controller, 1.0)
+    assert not controller.registers.int_out[2] & 1 << 15
+
+
+def test_the_end_of_force_control_does_not_end_a_speed(controller):
+    speed_l(controller, 0.05, 0.0, 0.0)
+    run(controller, 0.1)
+    send(controller, Command.FORCE_MODE_STOP)
+    run(controller, 0.2)
+    assert controller.robot.velocity[0] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize('frequency_hz', [4.0, 10.0])
+def test_the_watchdog_stops_a_program_that_hears_nothing(controller, frequency_hz):
+    send(controller, Command.SET_WATCHDOG, [frequency_hz])
+    run(controller, 0.01)
+    speed_l(controller, 0.05, 0.0, 0.0)
+    run(controller, 1 / frequency_hz - 0.01)
+    assert controller.playing
+    run(controller, 0.05)
+    assert not controller.playing
+    assert not controller.robot.velocity.any()
+
+
+def test_a_stop_of_the_script_stops_the_arm(controller):
+    speed_l(controller, 0.05, 0.0, 0.0)
+    run(controller, 0.1)
+    send(controller, Command.STOP_SCRIPT)
+    run(controller, 0.1)
+    assert not controller.playing
+    assert not controller.robot.velocity.any()
+
+
+def test_a_protective_stop_cannot_be_unlocked_before_its_time(controller):
+    speed_l(controller, 0.05, 0.0, 0.0)
+    run(controller, 0.1)
+    controller.protective_stop()
+    run(controller, 4.9)
+    assert (controller.playing, controller.safety) == (False, Safety.PROTECTIVE_STOP)
+    assert not controller.robot.velocity.any()
+    controller.upload(SCRIPT)
+    assert not controller.unlock()
+    run(controller, 0.2)
+    assert not controller.playing
+    assert controller.unlock()
+    controller.upload(SCRIPT)
+    run(controller, 0.1)
+    assert (controller.playing, controller.safety) == (True, Safety.NORMAL)
+
+
+def test_driving_hard_into_the_surface_is_a_protective_stop(controller):
+    speed_l(controller, 0.0, 0.0, -0.2)
+    run(controller, 0.5)
+    assert controller.safety is Safety.PROTECTIVE_STOP

@@ -1,0 +1,102 @@
+"""The emulated controller without its network: program, robot, safety, in steps of its own time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from texture_simulation.devices.ur.motions import Stop
+from texture_simulation.devices.ur.params import UrControllerParams
+from texture_simulation.devices.ur.program import ControlProgram
+from texture_simulation.devices.ur.registers import Registers
+from texture_simulation.devices.ur.robot import Robot
+from texture_simulation.devices.ur.tables import VERSIONS, Safety
+
+STARTING_S = 0.05  # between the upload of a program and its start
+STOP_DECELERATION = 5.0  # of a program that ends, m/s²
+ENDED = object()
+
+
+class Controller:
+    """A controller that knows no clock: each `tick` is one cycle of `step_s`."""
+
+    def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
+        self.version = VERSIONS[params.version]
+        self.step_s = 1.0 / self.version.rate_hz
+        self.ticks = 0
+        self.registers = Registers()
+        self.robot = Robot(params, rng)
+        self.safety = Safety.NORMAL
+        self._params = params
+        self._starts_s: float | None = None  # when an uploaded program starts
+        self._program: Iterator[None] | None = None
+        self._watchdog_s = 0.0  # longest silence, 0: no watchdog
+        self._stopped_s = 0.0  # when the protective stop happened
+
+    @property
+    def time_s(self) -> float:
+        """Time since the controller was switched on."""
+        return self.ticks * self.step_s
+
+    @property
+    def playing(self) -> bool:
+        """Whether a program runs."""
+        return self._program is not None
+
+    def tick(self) -> None:
+        """Do one cycle."""
+        self.ticks += 1
+        if self._starts_s is not None and self.time_s >= self._starts_s:
+            self._start_program()
+        if self._watchdog_s and self.time_s - self.registers.fed_s > self._watchdog_s:
+            self.stop_program()
+        if self._program is not None and next(self._program, ENDED) is ENDED:
+            self.stop_program()
+        self.robot.step(self.step_s)
+        if np.linalg.norm(self.robot.force[:3]) > self._params.stop_force_n:
+            self.protective_stop()
+
+    def make_up(self) -> None:
+        """Do a cycle that should have been done before; it is not the client who was silent in it."""
+        self.registers.fed_s += self.step_s
+        self.tick()
+
+    def upload(self, script: str) -> None:
+        """Take over a program, which starts a little later; in a protective stop none starts."""
+        if 'rtde_control' in script and self.safety is Safety.NORMAL:
+            self.stop_program()
+            self._starts_s = self.time_s + STARTING_S
+
+    def _start_program(self) -> None:
+        self._starts_s = None
+        self._program = ControlProgram(self.robot, self.registers, self, self.step_s).cycles()
+
+    def stop_program(self) -> None:
+        """End the program, and with it every motion and the watchdog."""
+        if self._program is not None:
+            self.robot.end_force_mode()
+            self.robot.motion = Stop(STOP_DECELERATION)
+        self._program = None
+        self._starts_s = None
+        self._watchdog_s = 0.0
+
+    def set_watchdog(self, min_frequency_hz: float) -> None:
+        """Stop the program when input_int_register_0 comes less often."""
+        self._watchdog_s = 1.0 / min_frequency_hz
+        self.registers.fed_s = self.time_s
+
+    def protective_stop(self) -> None:
+        """Stop hard; the program ends."""
+        if self.safety is Safety.NORMAL:
+            self.safety = Safety.PROTECTIVE_STOP
+            self._stopped_s = self.time_s
+            self.stop_program()
+            self.robot.halt()
+
+    def unlock(self) -> bool:
+        """End a protective stop; return whether it was old enough for that."""
+        if self.time_s - self._stopped_s < self._params.unlock_delay_s:
+            return False
+        self.safety = Safety.NORMAL
+        return True
