@@ -16,12 +16,12 @@ class Plan:
     The finger touches each time at another place; every second slide goes the other way.
     """
 
-    surfaces: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep', 'sandpaper_fine')
+    surfaces: tuple[str, ...] = ('glass', 'brushed_metal', 'leather', 'woven_cloth', 'ridge_2mm_deep')
     learning_slides: int = 3
     recognition_slides: int = 2
-    speed_m_s: float = 0.08
-    force_n: float = 1.5
-    distance_m: float = 0.08
+    speed_m_s: float = 0.05
+    force_n: float = 1.0
+    distance_m: float = 0.06
 
     def requests(self, surface: str, slides: int, stop_when_certain: bool = False) -> Iterator[ExplorationRequest]:
         """Yield the explorations of one surface."""

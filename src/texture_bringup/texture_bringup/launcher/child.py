@@ -62,6 +62,11 @@ class ChildLauncher:
         if self._process is not None and self._process.poll() is not None:
             raise LaunchFailed(f'{self._reason()}; everything the nodes said is in {self.log}')
 
+    def wait(self, deadline_s: float) -> int:
+        """Wait until the nodes have ended by themselves; return the exit code of the launcher."""
+        assert self._process is not None
+        return self._process.wait(deadline_s)
+
     def stop(self) -> None:
         """Stop the nodes and wait until none is left."""
         if self._process is None:

@@ -1,0 +1,137 @@
+"""The emulated bench as a user starts it, in a namespace and a ROS domain of its own."""
+
+import os
+import re
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.ros
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from texture_bringup.demo.isolation import free_port  # noqa: E402
+from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
+from texture_bringup.ros.operator import Operator  # noqa: E402
+from texture_core.errors import InvalidParameter, LaunchFailed  # noqa: E402
+from texture_core.exploration import ExplorationRequest  # noqa: E402
+from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
+from texture_evaluation.train import train_from_bags  # noqa: E402
+
+DOMAIN = 61
+DEADLINE_S = 60.0
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05, surface='ridge_2mm_deep')
+STARTED = re.compile(r'\[launch\] (\S+) started \(process (\d+)\)')
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp('bench')
+
+
+def launched(folder: Path, **arguments: object) -> ChildLauncher:
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
+    given = {'device': folder / 'tsf85', 'finger_port': free_port(), 'namespace': 'left', **arguments}
+    return ChildLauncher('bench', given, environment, folder / 'nodes.log')
+
+
+def processes(launcher: ChildLauncher) -> dict[str, int]:
+    """Return the process of each node, by its name."""
+    return {name: int(number) for name, number in STARTED.findall(launcher.log.read_text())}
+
+
+def is_running(pid: int) -> bool:
+    return Path(f'/proc/{pid}').exists()
+
+
+@pytest.fixture(scope='module')
+def bench(folder):
+    with launched(folder, surface='ridge_2mm_deep') as launcher:
+        yield launcher
+
+
+@pytest.fixture(scope='module')
+def operator(bench):
+    with Operator('left', DOMAIN, bench.check) as operator:
+        operator.wait_for_explorer(DEADLINE_S)
+        operator.wait_for_signal(DEADLINE_S)
+        yield operator
+
+
+@pytest.fixture(scope='module')
+def models(folder):
+    """Return the paths of a model on the vibration alone and of one with the taxels, both of simulated slides."""
+    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
+    bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', 'ridge_2mm_deep'))
+    for recipe in ('default', 'vibration-and-taxels'):
+        train_from_bags(recipe, bags, out=folder / recipe)
+    return {'vibration': folder / 'default.skops', 'taxels': folder / 'vibration-and-taxels.skops'}
+
+
+def test_an_exploration_without_a_model_ends_well_and_says_what_is_missing(operator) -> None:
+    seen = []
+    explored = operator.explore(SLIDE, lambda state, _texture: seen.append(state.phase.value))
+    assert explored.success, explored.message
+    assert 'slide' in seen
+    assert explored.texture.final
+    assert 'model' in explored.texture.message
+
+
+def test_a_model_of_simulated_slides_recognises_the_surface_on_the_bench(operator, models) -> None:
+    operator.set_parameters('classifier', {'model': str(models['vibration'])})
+    explored = operator.explore(SLIDE)
+    assert (explored.texture.label, explored.texture.final) == ('ridge_2mm_deep', True)
+    assert explored.texture.confidence > 0.9
+
+
+def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator) -> None:
+    operator.set_parameters('bench', {'surface': 'glass'})
+    assert operator.explore(SLIDE).texture.label == 'glass'
+    with pytest.raises(InvalidParameter, match="did you mean 'leather'"):
+        operator.set_parameters('bench', {'surface': 'lether'})
+
+
+def test_a_model_of_another_recipe_is_not_used_and_the_estimate_says_so(operator, models) -> None:
+    operator.set_parameters('classifier', {'model': str(models['taxels'])})
+    estimate = operator.explore(SLIDE).texture
+    assert estimate.label == ''
+    assert 'signal_static' in estimate.message
+    with pytest.raises(InvalidParameter, match='nowhere'):
+        operator.set_parameters('classifier', {'model': '/nowhere'})
+
+
+@pytest.mark.parametrize(
+    ('asked', 'reason'),
+    [({'motion': 'linear_slid'}, "'linear_slide'"), ({'motion': 'linear_slide', 'speed_m_s': 9.0}, '0.25')],
+)
+def test_an_impossible_exploration_is_refused_with_what_is_allowed(operator, asked, reason) -> None:
+    explored = operator.explore(ExplorationRequest(**asked))
+    assert (explored.success, explored.exploration_id) == (False, '')
+    assert reason in explored.message
+
+
+def test_nothing_moves_when_stopped(operator) -> None:
+    assert operator.stop() == 'nothing is moving'
+
+
+def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operator, bench) -> None:
+    pids = processes(bench)
+    assert set(pids) == {f'left/{name}' for name in ('bench', 'sensor', 'explorer', 'feature_extractor', 'classifier')}
+    os.kill(pids['left/classifier'], signal.SIGKILL)
+    with pytest.raises(LaunchFailed, match='node left/classifier was killed by SIGKILL'):
+        for _ in range(1000):
+            operator.wait_for_signal(DEADLINE_S)
+    assert not any(is_running(pid) for pid in pids.values())
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'sentence'),
+    [({'scene': 'bnech'}, "did you mean 'bench'?"), ({'finger_port': 99999}, 'finger_port'), ({'seed': 'x'}, 'seed')],
+)
+def test_a_wrong_launch_argument_ends_the_launch_with_a_sentence_of_the_node(folder, wrong, sentence) -> None:
+    with launched(folder, **wrong) as launcher:
+        assert launcher.wait(DEADLINE_S) == 1
+        lines = launcher.log.read_text().splitlines()
+    assert any(line.startswith('[left/') and sentence in line for line in lines), lines
+    assert any('died with exit code 2' in line for line in lines), lines

@@ -1,0 +1,94 @@
+"""The demonstration, shortened; what it prints is tested where it is made."""
+
+import io
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from texture_bringup.demo.plan import Plan
+from texture_bringup.demo.results import Row, table
+from texture_bringup.demo.run import demonstrate
+from texture_bringup.demo.story import Story
+from texture_core.estimates import TextureEstimate
+
+DEADLINE_S = 60.0
+SHORT = Plan(surfaces=('glass', 'ridge_2mm_deep'), learning_slides=2, recognition_slides=1)
+
+
+def started(log: Path) -> list[int]:
+    """Return the processes of the nodes."""
+    return [int(number) for number in re.findall(r'started \(process (\d+)\)', log.read_text())]
+
+
+def test_the_table_shows_a_mistake() -> None:
+    right = TextureEstimate(0, 'a', 'glass', known=True, confidence=0.99, evidence_s=0.7)
+    wrong = TextureEstimate(0, 'b', 'glass', known=True, confidence=0.6, evidence_s=1.2)
+    unknown = TextureEstimate(0, 'c', 'leather', known=False, confidence=0.5, evidence_s=1.2)
+    rows = [Row('glass', right), Row('leather', wrong), Row('leather', unknown)]
+    assert [row.right for row in rows] == [True, False, False]
+    _, first, second, third = table(rows, {'a': 0.012})
+    assert first.split() == ['glass', 'glass', '✓', '0.990', '0.7', 's', '12', 'ms']
+    assert second.split() == ['leather', 'glass', '✗', '0.600', '1.2', 's', '–']
+    assert '✗' in third
+
+
+def test_each_chapter_of_the_story_begins_with_the_time() -> None:
+    times = iter([100.0, 107.4])
+    out = io.StringIO()
+    story = Story(lambda: next(times), out)
+    story.chapter('Learning')
+    story.part('glass', first=True)
+    story.part(' recorded', last=True)
+    assert out.getvalue() == '\n[  7 s]  Learning\n        glass recorded\n'
+
+
+@pytest.mark.ros
+def test_it_learns_recognises_and_leaves_recordings_model_figures_and_picture(tmp_path) -> None:
+    out = io.StringIO()
+    assert demonstrate(tmp_path / 'demo', 'default', 0, SHORT, Story(out=out)), out.getvalue()
+    assert '2 of 2 slides over simulated surfaces recognised' in out.getvalue()
+    assert json.loads((tmp_path / 'demo/evaluation.json').read_text())['labels'] == ['glass', 'ridge_2mm_deep']
+    assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
+
+
+@pytest.mark.ros
+def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
+    command = [sys.executable, '-m', 'texture_bringup.command', 'demo', '--out', str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as demo:
+        for line in demo.stdout:
+            if 'Learning' in line:
+                break
+        pids = [
+            int(number) for number in re.findall(r'started \(process (\d+)\)', (tmp_path / 'nodes.log').read_text())
+        ]
+        demo.send_signal(signal.SIGINT)
+        _, said = demo.communicate(timeout=DEADLINE_S)
+    assert demo.returncode == 130
+    assert said == 'texture: interrupted\n'
+    assert len(pids) == 5
+    assert not any(Path(f'/proc/{pid}').exists() for pid in pids)
+
+
+@pytest.mark.ros
+def test_the_nodes_end_even_if_the_demonstration_is_killed(tmp_path) -> None:
+    command = [sys.executable, '-m', 'texture_bringup.command', 'demo', '--out', str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as demo:
+        log = tmp_path / 'nodes.log'
+        deadline = time.monotonic() + DEADLINE_S
+        while not (log.exists() and 'classifier started' in log.read_text()):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        demo.kill()
+    pids = started(log)
+    while any(Path(f'/proc/{pid}').exists() for pid in pids):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
