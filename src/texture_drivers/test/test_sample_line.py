@@ -88,6 +88,16 @@ def test_a_device_that_begins_anew_goes_on_at_the_index_of_the_hosts_clock():
     )
 
 
+def test_even_a_device_that_begins_anew_at_once_is_noticed():
+    line = SampleLine([stream()])
+    before = run(line, range(100))['signal'][-1]
+    after = run(line, range(100), offset_ns=before.end_ns)['signal'][0]
+    assert line.restarts == 1
+    assert (after.stamp_ns - before.stamp_ns) / SECOND * 2500 == pytest.approx(
+        after.first_sample - before.first_sample, abs=1
+    )
+
+
 def test_after_a_replug_too():
     line = SampleLine([stream()])
     before = run(line, range(1000))['signal'][-1]

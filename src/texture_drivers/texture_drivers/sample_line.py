@@ -23,8 +23,7 @@ from texture_drivers.numbering import BlockCounter
 VERSION = 1
 SAMPLE = np.dtype('<i2')
 MICROSECONDS = 1_000_000
-# The device's clock neither goes back nor leaps: beyond this it began anew, and the host's clock tells the gap.
-EARLIEST_STEP_US, LATEST_STEP_US = -MICROSECONDS, 10 * MICROSECONDS
+LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock tells the gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +96,7 @@ class SampleLine:
         self.clock = StreamClock(MICROSECONDS)
         self.tracks = {stream.kind: Track(stream, frame_id) for stream in streams}
         self._time = WrappingCounter(TIME_BITS)
+        self._latest_us: dict[int, int] = {}  # time of the last block of each kind
         self._newest_us = 0
 
     def restart(self) -> None:
@@ -131,6 +131,7 @@ class SampleLine:
             track.interrupt(self.clock)
         self.clock.restart()
         self._time = WrappingCounter(TIME_BITS)
+        self._latest_us = {}
         self._newest_us = 0
 
     def _blocks(self, frames: Sequence[Frame]) -> dict[int, list[Block]]:
@@ -139,13 +140,21 @@ class SampleLine:
         for frame in frames:
             if not self._fits(frame):
                 continue
-            if not EARLIEST_STEP_US < self._time.step(frame.time_us) < LATEST_STEP_US:
+            if self._is_anew(frame):
                 self.restarts += 1
                 self._begin_anew()
                 blocks = {}
-            block = Block(self._time.advance(frame.time_us), frame.rows, frame.lost, frame.body)
-            blocks.setdefault(frame.kind, []).append(block)
+            time_us = self._latest_us[frame.kind] = self._time.advance(frame.time_us)
+            blocks.setdefault(frame.kind, []).append(Block(time_us, frame.rows, frame.lost, frame.body))
         return blocks
+
+    def _is_anew(self, frame: Frame) -> bool:
+        """Return whether the device's clock went back, within one stream, or leapt."""
+        if self._time.value is None:
+            return False
+        step_us = self._time.step(frame.time_us)
+        goes_back = self._time.value + step_us < self._latest_us.get(frame.kind, self._time.value + step_us)
+        return goes_back or abs(step_us) > LONGEST_STEP_US
 
     def _fits(self, frame: Frame) -> bool:
         track = self.tracks.get(frame.kind)

@@ -16,8 +16,8 @@ FILM_KIND, FORCE_KIND = 0x10, 0x11
 
 FILM_RATE_HZ = 4096.0
 FORCE_RATE_HZ = 64.0
-BAUD = 230400  # both streams are 10.3 kB/s; 115200 baud carry 11.5 kB/s, which leaves nothing for the rails
-FILM_PC_PER_COUNT = 0.01  # ±328 pC; 1 N on the film gives 21 pC
+BAUD = 230400  # both streams are 11 kB/s; 115200 baud carry 11.5 kB/s, which leaves nothing for the rails
+FILM_PC_PER_COUNT = 0.002  # ±65 pC, a step of 3 N: 1 N on the film gives 21 pC
 FORCE_N_PER_COUNT = 0.005  # 15 N, the range of the FSG15N1, are 3000 counts; it is right to 0.075 N
 D33_PC_N = 21.0
 RESISTANCE_OHM = 1e8  # the corner lies at 1.5 Hz: below the vibrations of a slide, above the drift of temperature
