@@ -48,8 +48,6 @@ def live(model: Path, bags: Path, slides: str, rate: float, domain_id: int) -> t
     ):
         graph.listen('texture', on_estimate)
         graph.listen('diagnostics', reader_of(health))
-        publishers = ('texture', 'features')
-        graph.wait_until(lambda: all(graph.node.count_publishers(t) for t in publishers), 60.0, 'the two nodes')
         with node(
             'texture_evaluation', 'replay', bag=str(bags), slides=slides, rate=rate, start_delay_s=2.0, deadline_s=60.0
         ) as replay:

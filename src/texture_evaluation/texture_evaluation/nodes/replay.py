@@ -39,7 +39,7 @@ class ReplayParams:
     from_namespace: str = param('', "Namespace in the bag to publish; '' if it has but one.")
     longest_pause_s: float = param(1.0, 'Longer pauses in the recording are shortened to this.', unit='s', low=0.0)
     subscribers: int = param(
-        1, "Subscriptions that 'signal' and 'exploration' must have each before the start.", low=0, high=100
+        1, "Subscriptions that 'signal', 'exploration' and 'features' must have each before the start.", low=0, high=100
     )
     deadline_s: float = param(30.0, 'How long to wait for them.', unit='s', low=0.0)
     start_delay_s: float = param(1.0, 'Rest between finding them and the start.', unit='s', low=0.0)
@@ -92,10 +92,9 @@ class Replay(Node):
             self._error = error
 
     def _wait_for_subscribers(self) -> None:
-        needed = {name: p for name, p in self._outputs.items() if name in ('signal', 'exploration')}
         deadline = time.monotonic() + self._params.deadline_s
         while not self._stop.wait(POLL_S):
-            missing = [n for n, p in needed.items() if p.get_subscription_count() < self._params.subscribers]
+            missing = [name for name, count in self._listeners().items() if count < self._params.subscribers]
             if not missing:
                 break
             if time.monotonic() > deadline:
@@ -104,6 +103,11 @@ class Replay(Node):
                     "subscription(s); start what shall listen, or set 'subscribers' to 0"
                 )
         self._stop.wait(self._params.start_delay_s)
+
+    def _listeners(self) -> dict[str, int]:
+        """Return how many subscriptions there are; those of `features` tell that a classifier is ready, too."""
+        matched = {name: self._outputs[name].get_subscription_count() for name in ('signal', 'exploration')}
+        return {**matched, 'features': self.count_subscribers('features')}
 
     def _publish_all(self) -> None:
         schedule = Schedule(self._params.rate, self._params.longest_pause_s)
