@@ -154,7 +154,10 @@ def _no_bag(path: Path) -> str:
     if not path.exists():
         return f"there is no bag '{path}'; give the folder that was recorded or imported"
     if path.is_dir() and next(path.glob('*.mcap'), None):
-        return f"the bag '{path}' has no metadata.yaml, its recording was cut off; `mcap recover` may save the .mcap file, which can be given by itself"
+        return (
+            f"the bag '{path}' has no metadata.yaml, its recording was cut off; "
+            '`mcap recover` may save the .mcap file, which can be given by itself'
+        )
     return f"'{path}' is no bag; a folder with metadata.yaml and an .mcap file, or a folder of such bags, is needed"
 
 
