@@ -22,8 +22,8 @@ from texture_core.parameters import param
 LEAST_FELT = 1e-3  # a harmonic blurred to less than this share is left out
 TILE = 256  # points along each side of a tile of random roughness
 POINTS_PER_WAVE = 4  # of the shortest wave
-# No straight slide along x or y meets the same stretch of the periodic tile twice in a row.
-TILE_TURN_RAD = 0.4637
+# The periodic tile lies askew at the golden slope, so that a slide along x or y never meets the same stretch again.
+TILE_TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
 BLURS_M = np.geomspace(5e-5, 2e-3, 10)  # tiles are made for these and interpolated between; no blur is less
 
 

@@ -47,6 +47,11 @@ def _quantised(counts: Array, kind: type[Integer]) -> NDArray[Integer]:
     return whole
 
 
+def _tick_from(point: int) -> int:
+    """Return the first tick of the static channel at or after a point of the path."""
+    return math.ceil(point * STATIC_RATE_HZ / PATH_RATE_HZ)
+
+
 class Tsf85Model:
     """Turn a path, block by block, into the sensor's counts; what lies between the blocks is continuous.
 
@@ -126,9 +131,10 @@ class Tsf85Model:
 
     def _image_points(self, n_points: int) -> NDArray[np.intp]:
         """Return which of the next points of the path fall on a tick of the static channel."""
-        first, end = (math.ceil(point * STATIC_RATE_HZ / PATH_RATE_HZ) for point in (self._points, self._points + n_points))
-        points: NDArray[np.intp] = np.floor(np.arange(first, end) * PATH_RATE_HZ / STATIC_RATE_HZ).astype(np.intp) - self._points
-        self._points += n_points
+        end = self._points + n_points
+        ticks = np.arange(_tick_from(self._points), _tick_from(end))
+        points: NDArray[np.intp] = np.floor(ticks * PATH_RATE_HZ / STATIC_RATE_HZ).astype(np.intp) - self._points
+        self._points = end
         return points
 
     def _shares(self, force_n: Array) -> Array:
