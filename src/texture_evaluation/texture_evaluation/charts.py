@@ -144,7 +144,7 @@ def _chart(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
         FigureCanvasAgg(figure)
         yield figure
         Path(path).parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=DPI)
+        figure.savefig(path, dpi=DPI, bbox_inches='tight', pad_inches=0.12)
 
 
 def _styles() -> Iterator[dict[str, Any]]:
