@@ -51,6 +51,14 @@ def test_each_chapter_of_the_story_begins_with_the_time() -> None:
     assert out.getvalue() == '\n[  7 s]  Learning\n        glass recorded\n'
 
 
+def test_a_story_that_breaks_off_leaves_no_line_open() -> None:
+    out = io.StringIO()
+    with pytest.raises(KeyboardInterrupt), Story(out=out) as story:
+        story.part('glass', first=True)
+        raise KeyboardInterrupt
+    assert out.getvalue().endswith('glass\n')
+
+
 @pytest.mark.ros
 def test_it_learns_recognises_and_leaves_recordings_model_figures_and_picture(tmp_path) -> None:
     out = io.StringIO()

@@ -22,9 +22,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the demonstration; return 1 if a slide was mistaken."""
     recipe = WITH_SLOW_CHANNELS['default'] if options.channels == 'all' else 'default'
-    story = Story()
-    story.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
-    all_right = demonstrate(options.out, recipe, options.seed, Plan(), story)
-    if not all_right:
-        story.line('Not every slide was recognised.')
+    with Story() as story:
+        story.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
+        all_right = demonstrate(options.out, recipe, options.seed, Plan(), story)
+        if not all_right:
+            story.line('Not every slide was recognised.')
     return 0 if all_right else 1

@@ -5,13 +5,14 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from types import TracebackType
 from typing import TextIO
 
 MARGIN = ' ' * 8
 
 
 class Story:
-    """Tell what happens, each chapter with the time since the start.
+    """Tell what happens, each chapter with the time since the start; in a `with` block no line is left open.
 
     Parameters
     ----------
@@ -25,6 +26,16 @@ class Story:
         self._clock = clock
         self._out = out
         self._start_s = clock()
+        self._line_is_open = False
+
+    def __enter__(self) -> Story:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._line_is_open:
+            self._write('\n')
 
     def chapter(self, text: str) -> None:
         """Begin something new."""
@@ -40,3 +51,4 @@ class Story:
 
     def _write(self, text: str) -> None:
         print(text, end='', file=self._out, flush=True)
+        self._line_is_open = not text.endswith('\n')

@@ -27,6 +27,8 @@ from texture_core.ros.qos import SENSOR_QOS
 STEP_S = 0.1
 CANCEL_DEADLINE_S = 10.0
 LISTENERS_DEADLINE_S = 60.0
+# So long the explorer may be away; meanwhile `guard` can tell why.
+GONE_S = 10.0
 # What this process sees, the other processes see soon after.
 DISCOVERY_S = 1.0
 Progress = Callable[[ExplorationState, TextureEstimate], None]
@@ -170,9 +172,12 @@ class Operator:
 
     def _result(self, future: Future) -> Any:
         """Return the result of a future that the explorer or another node answers."""
+        seen_s = time.monotonic()
         while not future.done():
             self._step()
-            if not self._explore.server_is_ready():
+            if self._explore.server_is_ready():
+                seen_s = time.monotonic()
+            elif time.monotonic() - seen_s > GONE_S:
                 raise MotionAborted('the explorer has vanished; look at its output')
         return future.result()
 
