@@ -81,6 +81,11 @@ class Bench:
         return self._link.port
 
     @property
+    def running(self) -> bool:
+        """Whether time runs on the bench."""
+        return self._thread.is_alive()
+
+    @property
     def surface(self) -> str:
         """Name of the surface under the finger."""
         return self._model.surface.name

@@ -43,6 +43,8 @@ class BenchNode(Node):
         self._params = params
 
     def _report(self) -> tuple[str, str, dict[str, Any]]:
+        if not self._bench.running:
+            return 'ERROR', 'the bench has stopped; see its log and start it again', dict(self._bench.counts)
         state = 'streaming' if self._bench.tsf85.streaming else 'waiting for a driver'
         return 'OK', f"{state}; '{self._bench.surface}' lies under the finger", dict(self._bench.counts)
 
