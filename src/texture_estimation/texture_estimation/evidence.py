@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 
 from texture_core.estimates import TextureEstimate
@@ -75,22 +73,22 @@ class Evidence:
 
     def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
         model = self.model
-        base = TextureEstimate(
-            stamp_ns=self._end_ns or vector.start_ns,
-            exploration_id=vector.exploration_id,
-            final=final,
-            model=model.name if model else '',
-            message=self._message or (NO_WINDOW if final and not self._windows else ''),
-        )
         if model is None or not self._windows:
-            return base
+            return TextureEstimate(
+                stamp_ns=vector.start_ns,
+                exploration_id=vector.exploration_id,
+                final=final,
+                model=model.name if model else '',
+                message=self._message or (NO_WINDOW if final else ''),
+            )
         # Overlapping windows are worth only the sliding time that they add.
         worth = self._evidence_ns / self._window_ns
         mean = self._sum / self._windows
         probabilities = np.exp(model.recipe.evidence.log_posterior(mean, worth, model.growth))
         best = int(probabilities.argmax())
-        return dataclasses.replace(
-            base,
+        return TextureEstimate(
+            stamp_ns=self._end_ns,
+            exploration_id=vector.exploration_id,
             label=model.labels[best],
             known=True,
             confidence=float(probabilities[best]),
@@ -98,4 +96,7 @@ class Evidence:
             probabilities=tuple(probabilities.tolist()),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,
+            final=final,
+            model=model.name,
+            message=self._message,
         )

@@ -12,6 +12,9 @@ import numpy as np
 from texture_core.arrays import Array, Samples
 from texture_core.errors import InvalidData
 
+# Far below the square of any sample, far above the smallest number.
+TINY = 1e-290
+
 
 @dataclass(frozen=True, eq=False)
 class Windows:
@@ -93,5 +96,6 @@ def slopes(rows: Array) -> Array:
 
 
 def ratio(above: Array, below: Array) -> Array:
-    """Return above / below; 0 where `below` is 0."""
-    return np.divide(above, below, out=np.zeros_like(above), where=below > 0)
+    """Return above / below for numbers that are 0 together; 0 / 0 is 0."""
+    quotient: Array = above / (below + TINY)
+    return quotient

@@ -33,13 +33,13 @@ def segment_densities(rows: Array, rate_hz: float, segment: int, step: int) -> A
     """
     n_samples = rows.shape[-1]
     cut = rows[..., None, :] if n_samples <= segment else np.take(rows, _indices(n_samples, segment, step), axis=-1)
-    taper, squares = _taper(cut.shape[-1])
-    spectra = np.fft.rfft(centred(cut) * taper, segment)
-    densities: Array = spectra.real**2
-    densities += spectra.imag**2
-    densities *= 2.0 / (rate_hz * squares)
-    densities[..., 0] /= 2.0
-    densities[..., -1] /= 2.0
+    pieces = centred(cut)
+    pieces *= hann(cut.shape[-1])
+    spectra = np.fft.rfft(pieces, segment)
+    real, imaginary = spectra.real, spectra.imag
+    densities: Array = real * real
+    densities += imaginary * imaginary
+    densities *= _scale(rate_hz, segment, cut.shape[-1])
     return densities
 
 
@@ -67,9 +67,12 @@ def hann(length: int) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _taper(length: int) -> tuple[Array, float]:
+def _scale(rate_hz: float, segment: int, length: int) -> Array:
+    """Return what makes a squared spectrum a one-sided density: the inner bins count for both signs of frequency."""
     window = hann(length)
-    return window, float(window @ window)
+    scale = np.full(segment // 2 + 1, 2.0 / (rate_hz * float(window @ window)))
+    scale[[0, -1]] /= 2.0
+    return scale
 
 
 @lru_cache(maxsize=64)

@@ -60,7 +60,7 @@ class ArraySvm:
         standard = (values - self.mean) / self.scale
         # |x - s|² = |x|² + |s|² - 2 x·s, one product with all support vectors
         squares = np.add.reduce(standard * standard, axis=-1, keepdims=True)
-        exponents = standard @ self.vectors.T
+        exponents = self.vectors @ standard if standard.ndim == 1 else standard @ self.vectors.T
         exponents -= self.squares
         exponents -= squares
         exponents *= self.gamma

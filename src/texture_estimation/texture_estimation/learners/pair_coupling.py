@@ -52,8 +52,9 @@ class PairCoupling:
     def scores(self, decisions: Array) -> Array:
         """Return -log(1 + Σ_j exp(-margin)), (..., n_labels)."""
         margins = decisions * self.slopes + self.offsets
-        both = np.concatenate((-margins, margins), axis=-1)
-        odds = np.exp(np.minimum(both, LARGEST))
+        against = np.concatenate((-margins, margins), axis=-1)
+        np.minimum(against, LARGEST, out=against)
+        odds = np.exp(against, out=against)
         scores: Array = -np.log1p(odds @ self._sides)  # type: ignore[attr-defined]
         return scores
 

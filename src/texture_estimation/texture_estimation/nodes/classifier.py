@@ -38,6 +38,7 @@ class Classifier(Node):
         on_change(self, ClassifierParams, self._change)
         self._estimates = 0
         self._broken = 0
+        self._reported = 0
         self._processing_s = 0.0
         self._publisher = self.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
         self.create_subscription(msg.FeatureVector, 'features', self._on_features, FEATURE_QOS)
@@ -75,7 +76,8 @@ class Classifier(Node):
         if evidence.model is None:
             return 'WARN', NO_MODEL, numbers
         faults = evidence.refused + evidence.not_finite + self._broken
-        return ('WARN', 'some feature vectors could not be used', numbers) if faults else ('OK', 'judging', numbers)
+        new, self._reported = faults != self._reported, faults
+        return ('WARN', 'some feature vectors could not be used', numbers) if new else ('OK', 'judging', numbers)
 
 
 def _evidence(params: ClassifierParams) -> Evidence:

@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows, centred, power, ratio, slopes
+from texture_features.feature import Windows, power, ratio, slopes
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,17 @@ def hjorth(rows: Array) -> Array:
     """
     slope = slopes(rows)
     activity = power(rows)
-    slope_power = power(centred(slope))
-    bend_power = power(centred(slopes(slope)))
-    mobility = np.sqrt(ratio(slope_power, activity))
-    slope_mobility = np.sqrt(ratio(bend_power, slope_power))
-    return np.stack((activity, mobility, ratio(slope_mobility, mobility)), axis=-1)
+    slope_power = _step_variance(rows, slope)
+    bend_power = _step_variance(slope, slopes(slope))
+    values = np.empty((*activity.shape, 3))
+    values[..., 0] = activity
+    values[..., 1] = np.sqrt(ratio(slope_power, activity))
+    values[..., 2] = np.sqrt(ratio(bend_power, slope_power))
+    values[..., 2] = ratio(values[..., 2], values[..., 1])
+    return values
+
+
+def _step_variance(rows: Array, steps: Array) -> Array:
+    """Return the variance of the steps of rows; their mean is known from the first and the last sample."""
+    mean = (rows[..., -1] - rows[..., 0]) / steps.shape[-1]
+    return np.maximum(power(steps) - mean * mean, 0.0)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from rclpy.node import Node
 from texture_msgs import msg
@@ -37,6 +39,7 @@ class FeatureExtractor(Node):
         self._feature_set = FeatureSet.load(declare(self, ExtractorParams).recipe)
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.topics)
         self._broken = 0
+        self._reported = 0
         self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         for topic in self._feature_set.topics:
@@ -45,18 +48,17 @@ class FeatureExtractor(Node):
         self._diagnostics = Diagnostics(self, self._report)
 
     def _on_signal(self, topic: str, message: msg.TactileSignal) -> None:
-        try:
-            self._cutter.add_signal(topic, from_msg(message))
-        except TextureError as error:
-            self._refuse(error)
-            return
-        self._publish(self._cutter.take())
+        self._add(partial(self._cutter.add_signal, topic), message)
 
     def _on_state(self, message: msg.ExplorationState) -> None:
+        self._add(self._cutter.add_state, message)
+
+    def _add(self, add: Callable[[Any], None], message: Any) -> None:
         try:
-            self._cutter.add_state(from_msg(message))
+            add(from_msg(message))
         except TextureError as error:
-            self._refuse(error)
+            self._broken += 1
+            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
             return
         self._publish(self._cutter.take())
 
@@ -67,17 +69,14 @@ class FeatureExtractor(Node):
         for piece in pieces:
             self._publisher.publish(to_msg(self._feature_set.describe(piece)))
 
-    def _refuse(self, error: TextureError) -> None:
-        self._broken += 1
-        self.get_logger().warning(str(error), throttle_duration_sec=1.0)
-
     def _report(self) -> Report:
         numbers = {**self._cutter.counts, 'broken_messages': self._broken}
         waiting = self._cutter.waiting_for
         if waiting:
             return 'WARN', f'nothing has come yet on {", ".join(waiting)}', numbers
         faults = sum(numbers.values()) - numbers['windows']
-        return ('WARN', 'samples or messages were lost', numbers) if faults else ('OK', 'describing', numbers)
+        new, self._reported = faults - self._reported, faults
+        return ('WARN', 'samples or messages were lost', numbers) if new else ('OK', 'describing', numbers)
 
 
 def main() -> None:

@@ -1,0 +1,126 @@
+import time
+
+import numpy as np
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from texture_msgs import msg
+
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.ros.conversions import from_msg, to_msg
+from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_features.feature_set import FeatureSet
+from texture_features.nodes.feature_extractor import FeatureExtractor
+from texture_features.windows import cut_recording
+
+pytestmark = pytest.mark.ros
+RATE_HZ = 1000.0
+DEADLINE_S = 20.0
+
+
+class Bench:
+    """The node under test, and a node that plays the sensor and the explorer and hears the features."""
+
+    def __init__(self):
+        self.node = FeatureExtractor()
+        self.peer = rclpy.create_node('peer')
+        self.executor = SingleThreadedExecutor()
+        for node in (self.node, self.peer):
+            self.executor.add_node(node)
+        self.features, self.reports = [], []
+        self.signals = self.peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
+        self.states = self.peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
+        self.peer.create_subscription(
+            msg.FeatureVector, 'features', lambda m: self.features.append(from_msg(m)), FEATURE_QOS
+        )
+        self.peer.create_subscription(DiagnosticArray, '/diagnostics', lambda m: self.reports.append(m.status[0]), 10)
+        self.spin_until(lambda: self.signals.get_subscription_count() and self.peer.count_publishers('features') == 1)
+
+    def spin_until(self, condition):
+        deadline = time.monotonic() + DEADLINE_S
+        while not condition():
+            assert time.monotonic() < deadline, 'the condition did not come true in time'
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def play(self, batches):
+        for batch in batches:
+            self.signals.publish(to_msg(batch))
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def close(self):
+        self.executor.shutdown()
+        for node in (self.node, self.peer):
+            node.destroy_node()
+
+
+@pytest.fixture
+def bench(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '40')
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    rclpy.init(args=['--ros-args', '-p', 'recipe:=default'])
+    bench = Bench()
+    yield bench
+    bench.close()
+    rclpy.shutdown()
+
+
+def recording(seconds=1.0):
+    samples = np.random.default_rng(0).normal(size=(round(seconds * RATE_HZ), 1)).astype(np.float32)
+    return [
+        TactileSignal(
+            NANOSECONDS + round(first / RATE_HZ * NANOSECONDS),
+            's',
+            ('c',),
+            '',
+            RATE_HZ,
+            first,
+            samples[first : first + 20],
+        )
+        for first in range(0, len(samples), 20)
+    ]
+
+
+def slide(steady_s=0.8):
+    return ExplorationState(NANOSECONDS, 'e1', 'linear_slide', Phase.SLIDE, steady_s, 0.1, 2.0)
+
+
+def lift(at_s=0.8):
+    return ExplorationState(NANOSECONDS + round(at_s * NANOSECONDS), 'e1', 'linear_slide', Phase.LIFT)
+
+
+def test_the_node_publishes_what_the_same_recording_gives_offline(bench):
+    bench.states.publish(to_msg(slide()))
+    bench.spin_until(lambda: bench.node._cutter._slides)
+    bench.play(recording())
+    bench.spin_until(lambda: len(bench.features) == 4)
+    bench.states.publish(to_msg(lift()))
+    bench.spin_until(lambda: bench.features and bench.features[-1].last)
+    feature_set = FeatureSet.load('default')
+    pieces = cut_recording({'signal': recording()}, [slide(), lift()], feature_set.windows)
+    for heard, expected in zip(bench.features, map(feature_set.describe, pieces), strict=True):
+        np.testing.assert_array_equal(heard.values, expected.values)
+        assert (heard.start_ns, heard.names, heard.feature_set) == (
+            expected.start_ns,
+            expected.names,
+            expected.feature_set,
+        )
+
+
+def test_a_slide_whose_sensor_died_ends_all_the_same(bench):
+    bench.states.publish(to_msg(slide()))
+    bench.states.publish(to_msg(lift()))
+    bench.spin_until(lambda: bench.features and bench.features[-1].last)
+    assert bench.features[-1].skipped == 4
+    bench.spin_until(lambda: any('nothing has come yet on signal' in report.message for report in bench.reports))
+
+
+def test_broken_messages_are_counted_and_survived(bench):
+    bench.signals.publish(msg.TactileSignal(sensor='s', channels=['a', 'b'], sampling_rate_hz=1000.0, samples=[1.0]))
+    bench.states.publish(msg.ExplorationState(phase='sleeping'))
+    bench.spin_until(lambda: bench.node._broken == 2)
+    bench.states.publish(to_msg(slide()))
+    bench.spin_until(lambda: bench.node._cutter._slides)
+    bench.play(recording())
+    bench.spin_until(lambda: len(bench.features) == 4)
