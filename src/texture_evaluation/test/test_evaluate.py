@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidParameter, ModelMismatch, UnknownName
+from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
 from texture_core.signal import TactileSignal
 from texture_estimation.model import Model, load_model
 from texture_evaluation.bags import BagWriter, read_bag
@@ -69,6 +69,16 @@ def test_another_rate_is_refused_and_nothing_is_scored(model: Model, simulated: 
             bag.write(topic, halved(value) if topic == 'signal' else value, log_ns)
     with pytest.raises(ModelMismatch, match="'signal' is 500 Hz, the model was trained at 1000 Hz"):
         evaluate(model, [tmp_path / 'slow'])
+
+
+def test_of_two_fingers_in_a_bag_one_is_named(model: Model, simulated: Path, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'two') as bag:
+        for topic, log_ns, value in read_bag(simulated / 'glass'):
+            bag.write(f'/left/{topic}', value, log_ns)
+            bag.write(f'/right/{topic}', value, log_ns)
+    with pytest.raises(InvalidData, match='namespaces /left, /right'):
+        evaluate(model, [tmp_path / 'two'])
+    assert len(evaluate(model, [tmp_path / 'two'], namespace='/left').known) == 6
 
 
 def halved(signal: TactileSignal) -> TactileSignal:

@@ -15,7 +15,9 @@ from texture_features.feature_set import FeatureSet
 from texture_features.windows import Piece, WindowCutter
 
 
-def describe(bags: Iterable[str | Path], feature_set: FeatureSet, slides: str = '') -> LabelledFeatures:
+def describe(
+    bags: Iterable[str | Path], feature_set: FeatureSet, slides: str = '', namespace: str | None = None
+) -> LabelledFeatures:
     """Return the features of all windows of the labelled slides in bags.
 
     Parameters
@@ -26,6 +28,8 @@ def describe(bags: Iterable[str | Path], feature_set: FeatureSet, slides: str = 
         Windows, inputs and features.
     slides
         Which slides of each surface, such as '1-30'; '' for all.
+    namespace
+        Of the finger, if bags hold several.
 
     Raises
     ------
@@ -34,7 +38,7 @@ def describe(bags: Iterable[str | Path], feature_set: FeatureSet, slides: str = 
     ModelMismatch
         If a slide lacks an input of the feature set, or the slides differ in rates or channels.
     """
-    chosen = find_slides(bags, slides)
+    chosen = find_slides(bags, slides, namespace)
     surfaces = {slide.name: slide.surface for slide in chosen}
     vectors = [vector for _, of_slide in describe_slides(chosen, feature_set) for vector in of_slide]
     if not vectors:

@@ -74,12 +74,14 @@ class Report:
             raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another file") from error
 
 
-def evaluate_bags(model: str | Path, bags: Iterable[str | Path], slides: str = '') -> Report:
+def evaluate_bags(
+    model: str | Path, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None
+) -> Report:
     """Load a model and `evaluate` it."""
-    return evaluate(load_model(model), bags, slides)
+    return evaluate(load_model(model), bags, slides, namespace)
 
 
-def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '') -> Report:
+def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None) -> Report:
     """Return how a model does on the labelled slides of bags.
 
     Parameters
@@ -90,6 +92,8 @@ def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '') -> Repo
         Bags, or folders of bags.
     slides
         Which slides of each surface, such as '31-40'; '' for all. Surfaces the model was not taught are unknown ones.
+    namespace
+        Of the finger, if bags hold several.
 
     Raises
     ------
@@ -98,7 +102,7 @@ def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '') -> Repo
     InvalidData
         If a bag cannot be read or no slide is usable.
     """
-    chosen = find_slides(bags, slides)
+    chosen = find_slides(bags, slides, namespace)
     tested = {slide: _test(model, slide, pieces) for slide, pieces in cut_slides(chosen, model.recipe.feature_set)}
     results = {slide: result for slide, (result, _) in tested.items() if result.estimates}
     if not results:

@@ -25,6 +25,7 @@ def train_from_bags(
     *,
     channels: str = 'all',
     name: str = '',
+    namespace: str | None = None,
 ) -> Model:
     """Return a model trained on the labelled slides of bags, and save it.
 
@@ -42,6 +43,8 @@ def train_from_bags(
         'fast' leaves all inputs of the recipe but `signal` out.
     name
         Of the model; that of the file, or else of the recipe, if ''.
+    namespace
+        Of the finger, if bags hold several.
 
     Raises
     ------
@@ -50,7 +53,7 @@ def train_from_bags(
     """
     plan = with_channels(load_recipe(recipe), channels)
     windows = replace(plan.feature_set, windows=plan.training_windows)
-    examples = describe(bags, windows, slides)
+    examples = describe(bags, windows, slides, namespace)
     default = Path(out).name.removesuffix('.skops') if out else plan.name
     model = train(plan, examples, name or default)
     if out is not None:
