@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
@@ -22,21 +21,19 @@ class Windows:
 
     Parameters
     ----------
-    samples : (..., n_samples, n_channels)
+    samples : (..., n_samples, n_channels) float64
         Finite.
     rate_hz
         Sampling rate, > 0.
     speed_m_s, force_n : (...)
         Mean speed and normal force in each window; NaN if unknown.
-    memo
-        What features that need the same intermediate result have computed.
     """
 
     samples: Samples
     rate_hz: float
     speed_m_s: Array = field(default_factory=lambda: np.array(np.nan))
     force_n: Array = field(default_factory=lambda: np.array(np.nan))
-    memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
+    _memo: dict[Hashable, Array] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if self.samples.ndim < 2 or 0 in self.samples.shape[-2:]:
@@ -45,18 +42,24 @@ class Windows:
                 '(..., n_samples, n_channels) with at least one of each is needed'
             )
 
-    @cached_property
+    @property
     def rows(self) -> Array:
         """The samples as (..., n_channels, n_samples), contiguous.
 
         Sums along the last axis have the same rounding for one window as for many, and are fast.
         """
-        return np.ascontiguousarray(self.samples.swapaxes(-1, -2), dtype=np.float64)
+        return np.ascontiguousarray(self.samples.swapaxes(-1, -2))
 
-    @cached_property
+    @property
     def centred_rows(self) -> Array:
         """The rows less their mean."""
-        return centred(self.rows)
+        return self.shared('centred_rows', lambda: centred(self.rows))
+
+    def shared(self, key: Hashable, compute: Callable[[], Array]) -> Array:
+        """Return an intermediate result that several features need; it is computed once."""
+        if key not in self._memo:
+            self._memo[key] = compute()
+        return self._memo[key]
 
 
 class Feature(Protocol):

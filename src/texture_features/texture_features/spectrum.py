@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
-from texture_features.feature import Windows, centred
+from texture_features.feature import Windows
 
 
-def segment_densities(rows: Array, rate_hz: float, segment: int, step: int) -> Array:
-    """Return the one-sided power spectral density of each segment of each row.
+def segment_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
+    """Return the one-sided power spectral density of each segment of each row, at its lowest bins above 0 Hz.
 
-    A segment is freed of its mean and tapered by a Hann window. A row shorter than one is padded with zeros.
+    A segment is freed of its mean and tapered by a Hann window. A row shorter than one is padded with zeros. The
+    transform is a product with a matrix: for the few bins of a short window it takes half the time of a fast Fourier
+    transform and the steps around it, and its rounding is the same for one window as for many.
 
     Parameters
     ----------
@@ -23,33 +25,30 @@ def segment_densities(rows: Array, rate_hz: float, segment: int, step: int) -> A
         Sampling rate.
     segment, step
         Length of a segment, even, and distance between two of them, in samples.
+    bins
+        Number of bins, at most segment / 2.
 
     Returns
     -------
-    (..., n_segments, segment / 2 + 1)
-        At the frequencies k · rate_hz / segment, unit²/Hz.
+    (..., n_segments, bins)
+        At the frequencies k · rate_hz / segment, k = 1 to `bins`, unit²/Hz.
 
     Source: Welch 1967; the mean over the segments is scipy.signal.welch(detrend='constant').
     """
     n_samples = rows.shape[-1]
     cut = rows[..., None, :] if n_samples <= segment else np.take(rows, _indices(n_samples, segment, step), axis=-1)
-    pieces = centred(cut)
-    pieces *= hann(cut.shape[-1])
-    spectra = np.fft.rfft(pieces, segment)
-    real, imaginary = spectra.real, spectra.imag
-    densities: Array = real * real
-    densities += imaginary * imaginary
-    densities *= _scale(rate_hz, segment, cut.shape[-1])
+    parts = cut @ _transform(cut.shape[-1], segment, bins, rate_hz)
+    parts *= parts
+    densities: Array = parts[..., :bins] + parts[..., bins:]
     return densities
 
 
-def densities_of(windows: Windows, segment: int, step: int) -> Array:
+def densities_of(windows: Windows, segment: int, step: int, bins: int) -> Array:
     """Return the densities of the segments of windows; features that ask for the same share them."""
-    key = ('densities', segment, step)
-    if key not in windows.memo:
-        windows.memo[key] = segment_densities(windows.rows, windows.rate_hz, segment, step)
-    densities: Array = windows.memo[key]
-    return densities
+    return windows.shared(
+        ('densities', segment, step, bins),
+        lambda: segment_densities(windows.centred_rows, windows.rate_hz, segment, step, bins),
+    )
 
 
 def mean_over_segments(densities: Array) -> Array:
@@ -67,12 +66,22 @@ def hann(length: int) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _scale(rate_hz: float, segment: int, length: int) -> Array:
-    """Return what makes a squared spectrum a one-sided density: the inner bins count for both signs of frequency."""
-    window = hann(length)
-    scale = np.full(segment // 2 + 1, 2.0 / (rate_hz * float(window @ window)))
-    scale[[0, -1]] /= 2.0
-    return scale
+def _transform(length: int, segment: int, bins: int, rate_hz: float) -> Array:
+    """Return the matrix (length, 2 · bins) that takes a segment to the square roots of its densities.
+
+    Columns are cosines, then sines, tapered. Their own mean is removed, which removes that of the segment: with the
+    taper w and a wave e, Σ w e (s - mean(s)) = Σ (w e - mean(w e)) s.
+    """
+    taper = hann(length)
+    phases = 2.0 * np.pi * np.outer(np.arange(length), np.arange(1, bins + 1)) / segment
+    waves = np.concatenate((np.cos(phases), np.sin(phases)), axis=1) * taper[:, None]
+    waves -= waves.mean(axis=0)
+    # The bins count for both signs of frequency, but for the one at half the sampling rate, which has no other.
+    scale = np.full(bins, 2.0 / (rate_hz * float(taper @ taper)))
+    scale[segment // 2 - 1 :] /= 2.0
+    matrix: Array = waves * np.sqrt(np.tile(scale, 2))
+    matrix.flags.writeable = False
+    return matrix
 
 
 @lru_cache(maxsize=64)

@@ -19,7 +19,7 @@ class LogBands:
 
     of_signal: ClassVar[bool] = True
 
-    bands: int = param(32, 'Number of bands; a segment is twice as many samples long.', low=2, high=8192)
+    bands: int = param(32, 'Number of bands; a segment is twice as many samples long.', low=2, high=512)
     floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
 
     @property
@@ -29,5 +29,5 @@ class LogBands:
 
     def __call__(self, windows: Windows) -> Array:
         """Return log(mean density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, max(1, self.bands // 2))
-        return np.log(mean_over_segments(densities)[..., 1:] + self.floor)
+        densities = densities_of(windows, 2 * self.bands, max(1, self.bands // 2), self.bands)
+        return np.log(mean_over_segments(densities) + self.floor)

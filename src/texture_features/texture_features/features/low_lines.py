@@ -22,7 +22,7 @@ class LowLines:
 
     of_signal: ClassVar[bool] = True
 
-    lines: int = param(32, 'Number of lines, from the first above 0 Hz.', low=1, high=4096)
+    lines: int = param(32, 'Number of lines, from the first above 0 Hz.', low=1, high=512)
     points: int = param(256, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
     floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
 
@@ -34,5 +34,5 @@ class LowLines:
     def __call__(self, windows: Windows) -> Array:
         """Return log(mean density + floor)."""
         segment = 2 * (self.points // 2)
-        densities = densities_of(windows, segment, segment // 2)[..., 1 : self.lines + 1]
+        densities = densities_of(windows, segment, segment // 2, len(self.names))
         return np.log(mean_over_segments(densities) + self.floor)

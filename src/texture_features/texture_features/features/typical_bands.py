@@ -22,7 +22,7 @@ class TypicalBands:
 
     of_signal: ClassVar[bool] = True
 
-    bands: int = param(32, 'Number of bands; a segment is twice as many samples long.', low=2, high=8192)
+    bands: int = param(32, 'Number of bands; a segment is twice as many samples long.', low=2, high=512)
     floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
 
     @property
@@ -32,5 +32,5 @@ class TypicalBands:
 
     def __call__(self, windows: Windows) -> Array:
         """Return the mean of log(density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, max(1, self.bands // 2))
-        return mean_over_segments(np.log(densities[..., 1:] + self.floor))
+        densities = densities_of(windows, 2 * self.bands, max(1, self.bands // 2), self.bands)
+        return mean_over_segments(np.log(densities + self.floor))
