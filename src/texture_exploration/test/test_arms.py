@@ -1,5 +1,6 @@
 """What every arm of the catalogue keeps to, on its default parameters."""
 
+import contextlib
 import math
 import time
 
@@ -7,15 +8,28 @@ import pytest
 
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.protocol import ArmCommand
+from texture_simulation.devices.ur.params import UrControllerParams
+from texture_simulation.devices.ur.process import ControllerProcess
+
+
+@contextlib.contextmanager
+def ur_controller():
+    pytest.importorskip('rtde_control', reason='ur-rtde is not installable here')
+    with ControllerProcess(UrControllerParams(ip='127.0.0.56')):
+        yield {'ip': '127.0.0.56'}
+
+
+DEVICES = {'ur': ur_controller}  # what must be there for an arm, and the parameters that lead to it
 
 
 @pytest.fixture(params=ARMS)
 def arm(request):
     arm_class = ARMS[request.param]
-    arm = arm_class(arm_class.Params())
-    arm.connect()
-    yield arm
-    arm.close()
+    with DEVICES.get(request.param, lambda: contextlib.nullcontext({}))() as values:
+        arm = arm_class(arm_class.Params(**values))
+        arm.connect()
+        yield arm
+        arm.close()
 
 
 def wait_for(condition, deadline_s=5.0):

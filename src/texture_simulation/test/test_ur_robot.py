@@ -110,6 +110,14 @@ def test_force_control_comes_down_and_reaches_the_wanted_force(stiffness):
     assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
 
 
+def test_force_control_acts_along_the_axes_of_its_frame():
+    robot = robot_over(start_height_m=0.001)
+    mode = pressing(-2.0)
+    robot.force_mode = ForceMode(np.diag([1.0, -1.0, -1.0]), mode.selection, mode.wrench, mode.limits)
+    run(robot, 2.0)
+    assert robot.pressing_n == pytest.approx(2.0, rel=0.01)
+
+
 def test_force_control_comes_down_no_faster_than_allowed():
     robot = robot_over(start_height_m=0.1)
     robot.force_mode = pressing(50.0)

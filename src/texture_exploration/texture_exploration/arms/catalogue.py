@@ -6,7 +6,9 @@ from collections.abc import Mapping
 
 from texture_exploration.arms.protocol import ArmClass
 from texture_exploration.arms.simulated import SimulatedArm
+from texture_exploration.arms.ur import UrArm
 
 ARMS: Mapping[str, ArmClass] = {
     'simulated': SimulatedArm,  # kinematic, over an elastic plane; drives the emulated bench
+    'ur': UrArm,  # Universal Robots, through ur-rtde
 }

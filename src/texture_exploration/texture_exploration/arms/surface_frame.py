@@ -17,8 +17,8 @@ class SurfaceFrame:
     Parameters
     ----------
     pose : (6,)
-        Of the surface in the base frame: x, y, z in m of a point in it, then a rotation vector in rad. The z axis of the
-        surface points away from it.
+        Of the surface in the base frame: x, y, z in m of a point in it, then a rotation vector in rad. The z axis
+        points away from the surface.
     """
 
     def __init__(self, pose: Sequence[float]) -> None:

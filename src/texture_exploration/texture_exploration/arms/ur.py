@@ -37,7 +37,7 @@ class UrArm:
         self._link: WorkerLink | None = None
 
     def connect(self) -> None:
-        """Reach the controller and start its control program; a protective stop is released if the parameters say so."""
+        """Reach the controller and start its control program; release a protective stop if the parameters say so."""
         self.close()
         if importlib.util.find_spec('rtde_control') is None:
             raise DeviceError(
@@ -56,9 +56,9 @@ class UrArm:
 
     def close(self) -> None:
         """Stop and end the worker process."""
-        if self._link is not None:
-            self._link.end()
-            self._link = None
+        link, self._link = self._link, None
+        if link is not None:
+            link.end()
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -109,6 +109,11 @@ class UrArm:
             if time.monotonic() > end_s:
                 raise DeviceError(f'the arm did not recover: {fault}; look at the pendant')
             time.sleep(POLL_S)
+
+    @property
+    def worker_pid(self) -> int:
+        """Number of the process that talks to the controller."""
+        return self._connected().pid
 
     @property
     def counts(self) -> Mapping[str, int]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
-from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
 
 
@@ -14,10 +12,18 @@ class UrArmParams:
     """Where the controller is, where the surface is, and how the arm is supervised."""
 
     ip: str = param('127.0.0.2', 'Address of the controller; the default is that of the emulated one.')
-    surface_pose: list[float] = param(
-        [0.4, 0.0, 0.1, 0.0, 0.0, 0.0],
-        'Pose of the surface in the base frame: x, y, z in m, rotation vector in rad; its z axis points away from it.',
+    surface_x_m: float = param(0.4, 'Origin of the surface in the base frame, x.', unit='m', low=-3.0, high=3.0)
+    surface_y_m: float = param(0.0, 'The same, y.', unit='m', low=-3.0, high=3.0)
+    surface_z_m: float = param(0.1, 'The same, z.', unit='m', low=-3.0, high=3.0)
+    surface_rx_rad: float = param(
+        0.0,
+        'Rotation vector of the surface, x; turned by it, z points away from the surface.',
+        unit='rad',
+        low=-7.0,
+        high=7.0,
     )
+    surface_ry_rad: float = param(0.0, 'The same, y.', unit='rad', low=-7.0, high=7.0)
+    surface_rz_rad: float = param(0.0, 'The same, z.', unit='rad', low=-7.0, high=7.0)
     rate_hz: float = param(250.0, 'Rate of commands and states.', unit='Hz', low=50.0, high=500.0)
     arm_acceleration_m_s2: float = param(2.0, 'Acceleration towards a new velocity.', unit='m/s²', low=0.1, high=10.0)
     force_speed_m_s: float = param(0.05, 'Highest normal speed under force control.', unit='m/s', low=0.001, high=0.25)
@@ -39,9 +45,8 @@ class UrArmParams:
     probe_timeout_s: float = param(1.5, 'The controller must show that it is one within.', unit='s', low=0.1, high=10.0)
     connect_timeout_s: float = param(10.0, 'The arm must be ready to move within.', unit='s', low=0.5, high=60.0)
 
-    def __post_init__(self) -> None:
-        if len(self.surface_pose) != 6 or not all(map(math.isfinite, self.surface_pose)):
-            raise InvalidParameter(
-                f"parameter 'surface_pose' is {list(self.surface_pose)}; six finite numbers are needed: "
-                'x, y, z in m and a rotation vector in rad'
-            )
+    @property
+    def surface_pose(self) -> tuple[float, ...]:
+        """Pose of the surface in the base frame as a UR controller writes it: m and rad, (6,)."""
+        origin = (self.surface_x_m, self.surface_y_m, self.surface_z_m)
+        return (*origin, self.surface_rx_rad, self.surface_ry_rad, self.surface_rz_rad)

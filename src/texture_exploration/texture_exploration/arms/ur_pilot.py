@@ -1,8 +1,8 @@
 """Lead the arm through ur-rtde: one command per cycle.
 
-All commands pass through the same registers of the controller, which its script reads every 2 ms. A second command in a
-cycle would overwrite the first before it is read, and the commands that stream are not acknowledged. So each cycle sends
-one, and what must hold is said again and again.
+All commands pass through the same registers of the controller, which its script reads every 2 ms. Commands that stream
+are not acknowledged: a second one would overwrite the first before it is read. So each cycle sends one of them, and
+what must hold is said again and again.
 """
 
 from __future__ import annotations
@@ -52,15 +52,14 @@ class Pilot:
         mode = _mode(wish)
         if mode is not self._mode:
             self._change(mode, wish)
-        else:
-            self._count(STREAM[mode](self, wish))
+        self._count(STREAM[mode](self, wish))
 
     def forget(self) -> None:
         """The program on the controller was started anew: the arm is at rest."""
         self._mode = Mode.REST
 
     def _change(self, mode: Mode, wish: Wish | None) -> None:
-        """Leave the present mode; the new one begins in the next cycle."""
+        """Leave the present mode. These commands are acknowledged, so nothing overwrites them."""
         if mode is Mode.REST:
             self._count(self._control.speedStop(STOP_DECELERATION_M_S2))
         if self._mode is Mode.FORCE:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import socket
 import struct
 import time
-from types import TracebackType
+from contextlib import closing
 
 from texture_core.errors import DeviceError
 from texture_exploration.arms.ur_tables import (
@@ -49,12 +49,8 @@ class Line:
         except OSError as error:
             raise DeviceError(f"{self._where} cannot be reached: {error}; check parameter 'ip'") from error
 
-    def __enter__(self) -> Line:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """End the conversation."""
         self._socket.close()
 
     def send(self, data: bytes) -> None:
@@ -100,7 +96,7 @@ def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
     DeviceError
         If there is none, or it does not answer in time.
     """
-    with Line(ip, RTDE_PORT, timeout_s) as line:
+    with closing(Line(ip, RTDE_PORT, timeout_s)) as line:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         answer = _ask(line, CONTROLLER_VERSION, b'')
     if len(answer) < 8:
@@ -124,9 +120,13 @@ class Dashboard(Line):
 
     def __init__(self, ip: str, timeout_s: float) -> None:
         super().__init__(ip, DASHBOARD_PORT, timeout_s)
-        banner = self.read_line()
-        if DASHBOARD_BANNER not in banner:
-            raise DeviceError(f"{self._where} greets with '{banner}' and not as the dashboard of a UR controller")
+        try:
+            banner = self.read_line()
+            if DASHBOARD_BANNER not in banner:
+                raise DeviceError(f"{self._where} greets with '{banner}' and not as the dashboard of a UR controller")
+        except DeviceError:
+            self.close()
+            raise
 
     def ask(self, line: str) -> str:
         """Return the answer to a command."""
@@ -146,13 +146,13 @@ def check_ready(ip: str, timeout_s: float, unlock: bool) -> None:
     version = rtde_version(ip, timeout_s)
     if version[0] >= FIRST_WITHOUT_DASHBOARD:
         return
-    with Dashboard(ip, max(0.1, end_s - time.monotonic())) as dashboard:
+    with closing(Dashboard(ip, max(0.1, end_s - time.monotonic()))) as dashboard:
         mode = dashboard.ask('robotmode')
         if 'RUNNING' not in mode:
             raise DeviceError(f"the arm at {ip} answers '{mode}'; switch it on and release its brakes")
         if version >= FIRST_WITH_REMOTE_CONTROL and 'true' not in dashboard.ask('is in remote control'):
             raise DeviceError(f'the arm at {ip} is under local control; switch the pendant to remote control')
-        safety = dashboard.ask('safetymode').rpartition(' ')[2]
+        safety = _safety(dashboard)
     if safety in FREE_MODES:
         return
     if safety != 'PROTECTIVE_STOP' or not unlock:
@@ -173,10 +173,15 @@ def unlock_protective_stop(ip: str, timeout_s: float) -> None:
     """
     end_s = time.monotonic() + UNLOCK_WAIT_S
     while True:
-        with Dashboard(ip, timeout_s) as dashboard:
+        with closing(Dashboard(ip, timeout_s)) as dashboard:
+            if _safety(dashboard) in FREE_MODES:
+                return
             answer = dashboard.ask('unlock protective stop')
-        if 'releasing' in answer:
-            return
         if time.monotonic() > end_s:
             raise DeviceError(f"the controller at {ip} does not release the protective stop: '{answer}'")
         time.sleep(UNLOCK_RETRY_S)
+
+
+def _safety(dashboard: Dashboard) -> str:
+    """Return the safety mode, such as NORMAL."""
+    return dashboard.ask('safetymode').rpartition(' ')[2]

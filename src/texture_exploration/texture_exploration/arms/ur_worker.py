@@ -1,8 +1,8 @@
 """The process that talks to the controller through ur-rtde, so that nothing ur-rtde waits for stops the node.
 
-The constructors of ur-rtde hold Python's global lock and wait without a limit, and a command may wait for minutes. Here an
-alarm of the kernel ends the process when it hangs; the watchdog of the controller then stops the arm. The process ends
-by itself, with the arm at rest, when its parent is gone.
+The constructors of ur-rtde hold Python's global lock and wait without a limit, and a command may wait for minutes. Here
+an alarm of the kernel ends the process when it hangs; the watchdog of the controller then stops the arm. The process
+ends by itself, with the arm at rest, when its parent is gone.
 """
 
 from __future__ import annotations
@@ -36,13 +36,14 @@ class Observer:
     Silence counts only while this thread is awake, so that a machine that stalls is not taken for a dead controller.
     """
 
-    def __init__(self, receive: Any, channel: socket.socket, silence_s: float) -> None:
+    def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
         self.silent = False
         self.refused = 0
         self.connected = True
         self._receive = receive
         self._channel = channel
-        self._silence_s = silence_s
+        self._silence_s = params.silence_s
+        self._period_s = 1.0 / params.rate_hz
         self._stamp = -1.0
         self._time_ns = time.monotonic_ns()
         self._quiet_s = 0.0
@@ -51,13 +52,14 @@ class Observer:
     def run(self) -> None:
         """Look in every cycle whether there is news."""
         last_s = time.monotonic()
-        while self.connected:
-            begin = self._receive.initPeriod()
-            now_s = time.monotonic()
-            self._look(min(now_s - last_s, LATE_S))
-            last_s = now_s
-            self.connected = self._receive.isConnected()
-            self._receive.waitPeriod(begin)
+        try:
+            while self.connected and self._receive.isConnected():
+                now_s = time.monotonic()
+                self._look(min(now_s - last_s, LATE_S))
+                last_s = now_s
+                time.sleep(self._period_s)  # the exact waitPeriod of ur-rtde burns processor time
+        finally:
+            self.connected = False
 
     def _look(self, passed_s: float) -> None:
         stamp = self._receive.getTimestamp()
@@ -105,28 +107,35 @@ class Worker:
         flags = control_class.FLAG_UPLOAD_SCRIPT | control_class.FLAG_DISABLE_REMOTE_CONTROL_CHECK
         receive = receive_class(params.ip, params.rate_hz, VARIABLES)
         self._control = control_class(params.ip, params.rate_hz, flags)
-        self._observer = Observer(receive, channel, params.silence_s)
+        self._observer = Observer(receive, channel, params)
         self._pilot = Pilot(self._control, params)
         self._wish: Wish | None = None
         self._heard_s = 0.0
 
-    def run(self) -> str:
-        """Lead the arm until the parent or the controller is gone; return why, if it is the controller."""
-        self._control.setWatchdog(self._params.watchdog_hz)
-        threading.Thread(target=self._observer.run, name='observer', daemon=True).start()
-        while self._listen():
-            begin = self._control.initPeriod()
-            set_alarm(HANGING_S)
-            if not (self._observer.connected and self._control.isConnected()):
-                return LOST
-            # What is sent to a controller that does not answer would be obeyed late, when nobody means it any more.
+    def lead(self) -> str:
+        """Lead the arm until the parent or the controller is gone; return what to say about it."""
+        try:
+            self._set_watchdog()
+            threading.Thread(target=self._observer.run, name='observer', daemon=True).start()
+            while self._listen():
+                if not (self._observer.connected and self._control.isConnected()):
+                    return LOST
+                self._cycle()
             if not self._observer.silent:
-                self._pilot.cycle(self._wish)
-            self._observer.refused = self._pilot.refused
-            self._control.waitPeriod(begin)
-        self._pilot.cycle(None)
-        self._control.stopScript()
+                self._pilot.cycle(None)
+                self._control.stopScript()
+        except RuntimeError as error:
+            return f'{LOST} ({error})'
         return ''
+
+    def _cycle(self) -> None:
+        begin = self._control.initPeriod()
+        set_alarm(HANGING_S)
+        # What is sent to a controller that does not answer would be obeyed late, when nobody means it any more.
+        if not self._observer.silent:
+            self._pilot.cycle(self._wish)
+        self._observer.refused = self._pilot.refused
+        self._control.waitPeriod(begin)
 
     def _listen(self) -> bool:
         """Take over what the parent said last; return whether it is still there."""
@@ -159,8 +168,12 @@ class Worker:
         end_s = time.monotonic() + RESTART_S
         while not self._control.isProgramRunning() and time.monotonic() < end_s:
             time.sleep(0.005)
-        self._control.setWatchdog(self._params.watchdog_hz)
+        self._set_watchdog()
         self._pilot.forget()
+
+    def _set_watchdog(self) -> None:
+        if not self._control.setWatchdog(self._params.watchdog_hz):
+            raise RuntimeError('the controller did not take the watchdog, without which the arm does not move')
 
 
 def set_alarm(seconds: float) -> None:
@@ -178,12 +191,14 @@ def main() -> None:
         signal.signal(number, signal.SIG_IGN)
     set_alarm(params.connect_timeout_s)
     try:
-        reason = Worker(params, channel).run()
+        worker = Worker(params, channel)
     except RuntimeError as error:  # so ur-rtde tells what it met
         reason = str(error)
+    else:
+        reason = worker.lead()
     if reason:
         channel.send(trouble(reason))
-    # Closing the interfaces of ur-rtde takes two seconds of sleep; the end of the process closes them too.
+    # To end the interfaces of ur-rtde takes seconds of sleep; the end of the process closes their connections too.
     os._exit(0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -17,8 +18,9 @@ from texture_simulation.devices.ur.server import Server
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Serve until SIGINT or SIGTERM; 'ready' is printed once the ports are open."""
+    """Serve until SIGINT, SIGTERM or the end of the parent process; 'ready' is printed once the ports are open."""
     signals: list[int] = []
+    parent = os.getppid()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _frame: signals.append(number))
     try:
@@ -29,7 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'emulated UR controller: {error}', file=sys.stderr)
         return 2
     print('ready', flush=True)
-    server.run(lambda: bool(signals))
+    server.run(lambda: bool(signals) or os.getppid() != parent)
     server.close()
     return 0
 

@@ -57,13 +57,24 @@ class ControllerProcess:
             _, told = self._process.communicate()
             raise DeviceError(told.strip() or 'the emulated UR controller did not start')
 
+    @property
+    def running(self) -> bool:
+        """Whether it is there."""
+        return self._process is not None and self._process.poll() is None
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        assert self._process is not None
+        return self._process.pid
+
     def freeze(self) -> None:
         """Let it hang."""
-        self._signal(signal.SIGSTOP)
+        os.kill(self.pid, signal.SIGSTOP)
 
     def thaw(self) -> None:
         """Let it go on."""
-        self._signal(signal.SIGCONT)
+        os.kill(self.pid, signal.SIGCONT)
 
     def stop(self) -> None:
         """Kill it; may be called twice."""
@@ -80,10 +91,6 @@ class ControllerProcess:
             lines.write(line + '\n')
             lines.flush()
             return lines.readline().strip()
-
-    def _signal(self, number: int) -> None:
-        if self._process is not None:
-            os.kill(self._process.pid, number)
 
     @staticmethod
     def _ready(process: subprocess.Popen[str]) -> bool:

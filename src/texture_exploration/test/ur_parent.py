@@ -1,0 +1,19 @@
+"""Slide with a UR arm until killed: python ur_parent.py IP. Prints the number of the worker process once it slides."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.ur import UrArm, UrArmParams
+
+arm = UrArm(UrArmParams(ip=sys.argv[1]))
+arm.connect()
+told = False
+while True:
+    arm.command(ArmCommand(tangential_m_s=(0.02, 0.0)))
+    if not told and arm.state().velocity[0] > 0.01:
+        told = True
+        print(arm.worker_pid, flush=True)
+    time.sleep(0.02)
