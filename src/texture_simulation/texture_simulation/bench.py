@@ -10,12 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
+from texture_core.finger import FingerState
 from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS
 from texture_drivers.tsf85.tables import RATE_HZ
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 from texture_simulation.finger_link import FingerLink
 from texture_simulation.live import FingerTrack
+from texture_simulation.live_sensor import LIVE_SENSORS, LiveSensor
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.sensors.tsf85 import OVERSAMPLING, PATH_RATE_HZ, Tsf85Model
 from texture_simulation.surfaces import Surface
@@ -35,6 +37,8 @@ class BenchParams:
     tsf85_link: str = param('/tmp/texture/tsf85', 'Symbolic link to create; the device path for the sensor node.')
     finger: int = param(0, 'Finger of the sensor that touches.', low=0, high=1)
     long_stamps: bool = param(True, 'Firmware with 64-bit stamps (from 1.1.7 on); false: older, with 16-bit stamps.')
+    daq_link: str = param('', 'The same for the data acquisition finger of paper 3; empty: it is not there.')
+    pvdf_link: str = param('', 'The same for the PVDF finger of paper 5; empty: it is not there.')
     finger_port: int = param(28500, 'UDP port on loopback where finger states arrive; 0: any.', low=0, high=65535)
 
 
@@ -61,6 +65,12 @@ class Bench:
         self._track = FingerTrack()
         self._model = Tsf85Model(self.scene, self._prepared(params.surface), rng)
         self.tsf85 = EmulatedTsf85(Path(params.tsf85_link).expanduser(), rng, params.finger, params.long_stamps)
+        links = {'daq': params.daq_link, 'pvdf': params.pvdf_link}
+        self.others: dict[str, LiveSensor] = {
+            name: LIVE_SENSORS[name](self.scene, self._model.surface, Path(link).expanduser(), rng)
+            for name, link in links.items()
+            if link
+        }
         self._link = FingerLink(params.finger_port)
         self._commands: list[Callable[[], None]] = []
         self._samples_done = 0
@@ -92,11 +102,16 @@ class Bench:
 
     def set_surface(self, name: str) -> None:
         """Swap the sample; UnknownName, with the nearest name, if there is none such."""
-        self._model.surface = self._prepared(name)
+        surface = self._prepared(name)
+        self._model.surface = surface
+        for other in self.others.values():
+            other.model.surface = surface
 
     def start(self) -> None:
         """Plug the devices in and let time run."""
         self.tsf85.plug()
+        for other in self.others.values():
+            other.device.plug()
         self._thread.start()
 
     def stop(self) -> None:
@@ -105,6 +120,8 @@ class Bench:
         if self._thread.is_alive():
             self._thread.join()
         self.tsf85.unplug()
+        for other in self.others.values():
+            other.device.unplug()
         self._link.close()
 
     def unplug(self) -> None:
@@ -122,6 +139,7 @@ class Bench:
             'samples': self._samples_done,
             'skipped samples': self.skipped,
             'bytes nobody took': self.tsf85.dropped_bytes,
+            **{f'bytes nobody took, {name}': other.device.dropped_bytes for name, other in self.others.items()},
             'finger states': self._link.received,
             'refused datagrams': self._link.refused,
         }
@@ -149,9 +167,18 @@ class Bench:
             due = (self._now_ns() - start_ns) // SAMPLE_NS - self._samples_done
             self._skip(due - round(LONGEST_BURST_S * RATE_HZ))
             due = min(due, round(LONGEST_BURST_S * RATE_HZ))
+            for state in self._link.states():
+                self._update(state)
             if due > 0:
                 self._samples_done += due
                 self._advance(due, start_ns + self._samples_done * SAMPLE_NS)
+            for other in self.others.values():
+                other.advance(self._now_ns())
+
+    def _update(self, state: FingerState) -> None:
+        self._track.update(state)
+        for other in self.others.values():
+            other.update(state)
 
     def _skip(self, samples: int) -> None:
         if samples > 0:
@@ -161,8 +188,6 @@ class Bench:
 
     def _advance(self, samples: int, until_ns: int) -> None:
         """Make and send the samples up to a time."""
-        for state in self._link.states():
-            self._track.update(state)
         was_touching = self._track.touching
         path = self._track.advance(until_ns, OVERSAMPLING * samples, PATH_RATE_HZ)
         if not was_touching and self._track.touching:

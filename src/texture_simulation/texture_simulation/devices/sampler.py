@@ -98,6 +98,11 @@ class EmulatedSampler:
         }
         self._kept = b''
 
+    def pass_by(self, duration_s: float) -> None:
+        """Let time pass without sending: whole frames are lost."""
+        for name, stream in self._streams.items():
+            self._frames[name] += round(duration_s * stream.rate_hz / stream.rows)
+
     def advance(self, samples: Mapping[str, Counts]) -> None:
         """Sample, and send what fills a frame.
 

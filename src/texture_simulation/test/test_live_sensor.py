@@ -1,0 +1,105 @@
+"""The DAQ and the PVDF finger on the emulated bench: scene, model, device, line and driver together."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from texture_core.finger import FingerState
+from texture_core.signal import NANOSECONDS, lost_samples
+from texture_drivers.daq.sensor import daq
+from texture_drivers.params import SensorParams
+from texture_drivers.pvdf.sensor import Pvdf
+from texture_simulation.bench import Bench, BenchParams
+from texture_simulation.live_sensor import live_daq
+from texture_simulation.scene import load_scene
+
+DEADLINE_S = 30.0
+SPEED_M_S, FORCE_N = 0.1, 2.0  # over ridges of 2 mm: 50 Hz
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    params = BenchParams(
+        surface='ridge_2mm_deep',
+        tsf85_link=str(tmp_path / 'tsf85'),
+        daq_link=str(tmp_path / 'daq'),
+        pvdf_link=str(tmp_path / 'pvdf'),
+        finger_port=0,
+    )
+    with Bench(params) as made:
+        yield made
+
+
+@pytest.fixture
+def arm(bench: Bench) -> Iterator[None]:
+    """An arm whose finger slides for ever along x."""
+    stop = threading.Event()
+
+    def run() -> None:
+        start_ns = time.monotonic_ns()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            while not stop.wait(0.01):
+                now_ns = time.monotonic_ns()
+                x_m = SPEED_M_S * (now_ns - start_ns) / 1e9
+                state = FingerState(now_ns, x_m=x_m, vx_m_s=SPEED_M_S, force_n=FORCE_N)
+                line.sendto(state.to_bytes(), ('127.0.0.1', bench.finger_port))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    yield
+    stop.set()
+    thread.join()
+
+
+def read(sensor: Any, seconds: float) -> dict[str, np.ndarray]:
+    """Return what comes in so many seconds, by topic, (n_samples, n_channels); nothing may be missing."""
+    batches: dict[str, list[Any]] = {}
+    deadline_s = time.monotonic() + DEADLINE_S
+    wanted = round(seconds * sensor.expected_rates_hz['signal'])
+    sensor.open()
+    while sum(len(batch.samples) for batch in batches.get('signal', [])) < wanted:
+        assert time.monotonic() < deadline_s
+        for topic, found in sensor.read().items():
+            batches.setdefault(topic, []).extend(found)
+    sensor.close()
+    assert not any(lost_samples(found) for found in batches.values())
+    return {topic: np.concatenate([batch.samples for batch in found]) for topic, found in batches.items()}
+
+
+def peak_hz(samples: np.ndarray, rate_hz: float) -> float:
+    spectrum = np.abs(np.fft.rfft((samples - samples.mean()) * np.hanning(len(samples))))
+    return float(np.fft.rfftfreq(len(samples), 1 / rate_hz)[spectrum.argmax()])
+
+
+def test_the_daq_finger_feels_the_ridges_at_speed_over_pitch(bench: Bench, arm: None, tmp_path: Path) -> None:
+    samples = read(daq(SensorParams(device=str(tmp_path / 'daq'))), 3.0)['signal'][2500:]
+    assert peak_hz(samples[:, 0], 2500.0) == pytest.approx(50.0, abs=1.0)
+
+
+def test_the_pvdf_finger_feels_ridges_and_force(bench: Bench, arm: None, tmp_path: Path) -> None:
+    found = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 3.0)
+    assert peak_hz(found['signal'][4096:, 0], 4096.0) == pytest.approx(50.0, abs=1.0)
+    assert found['signal_static'][64:].mean() == pytest.approx(FORCE_N, rel=0.05)
+
+
+def test_swapping_the_sample_is_felt_by_all(bench: Bench, arm: None, tmp_path: Path) -> None:
+    rough = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 2.0)['signal'][4096:].std()
+    bench.set_surface('glass')
+    smooth = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 2.0)['signal'][4096:].std()
+    assert smooth < 0.3 * rough
+
+
+def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
+    scene = load_scene('bench')
+    live = live_daq(scene, scene.surface('glass'), tmp_path / 'daq', np.random.default_rng(0))
+    live.advance(0)
+    live.advance(10 * NANOSECONDS)
+    assert live.device._frames['daq'] == 2500  # the driver sees a gap of 9.5 s, and then 0.5 s of samples
