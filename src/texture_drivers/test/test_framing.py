@@ -1,7 +1,7 @@
 from binascii import crc_hqx
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from texture_drivers.framing import CRC_START, Deframer, Frame, WrappingCounter, pack
@@ -104,6 +104,7 @@ def test_long_bodies_survive(size):
     assert Deframer().feed(pack(numbered(3, body)))[0].body == body
 
 
+@settings(deadline=None)  # a busy machine is slow
 @given(st.lists(st.binary(max_size=300), max_size=20))
 def test_arbitrary_bytes_never_raise(pieces):
     deframer = Deframer(max_frame_bytes=200)
@@ -112,12 +113,14 @@ def test_arbitrary_bytes_never_raise(pieces):
         assert len(deframer._rest) <= 201
 
 
+@settings(deadline=None)
 @given(noise=st.binary(max_size=200), bodies=BODIES)
 def test_after_any_noise_at_most_one_frame_is_lost(noise, bodies):
     frames = Deframer().feed(noise + b''.join(pack(numbered(i, body)) for i, body in enumerate(bodies)))
     assert [frame.body for frame in frames][-(len(bodies) - 1) :] == bodies[1:]
 
 
+@settings(deadline=None)
 @given(bodies=BODIES, dropped=st.integers(0, 10_000))
 def test_a_dropped_byte_costs_at_most_two_frames_and_the_loss_is_counted(bodies, dropped):
     deframer = Deframer()
@@ -129,6 +132,7 @@ def test_a_dropped_byte_costs_at_most_two_frames_and_the_loss_is_counted(bodies,
     assert len(bodies) + 1 - len(frames) == deframer.lost <= 2
 
 
+@settings(deadline=None)
 @given(st.lists(st.integers(-(2**15), 2**15 - 1), max_size=50))
 def test_a_wrapping_counter_is_followed_forwards_and_back(steps):
     counter, truth = WrappingCounter(16), 2**20
