@@ -163,7 +163,7 @@ def test_a_biotac_sp_has_24_electrodes_at_81_hz() -> None:
 
 
 def test_serial_numbers_are_details() -> None:
-    assert opened(FakeLink([])).details == {'serial of finger 0': 'BT-1'}
+    assert opened(FakeLink([])).details['serial of finger 0'] == 'BT-1'
 
 
 def bridge_frame(sequence: int, time_us: int) -> Frame:

@@ -101,3 +101,39 @@ def test_losses_a_wrong_rate_bad_packets_and_a_reopening_are_warnings() -> None:
 
 def test_silence_is_an_error() -> None:
     assert health_after(1.5, published=0)[0] == 'ERROR'
+
+
+def test_the_level_rises_and_falls_back_with_what_happens() -> None:
+    sensor = Scripted('')
+    reader = Reader(sensor, lambda *_: None)
+    reader.fault = ''
+    health, now_s, levels = Health(reader, 0.0), 0.0, []
+    story = [
+        {'published': 1000},
+        {'published': 951},  # 5 % off is still good
+        {'published': 949},
+        {'published': 1000, 'lost': 1},
+        {'published': 1000, 'bogus': 5},
+        {'published': 1000, 'bogus': 6},
+        {'published': 0},  # for 1 s: not longer
+        {'published': 0},
+        {'published': 1000, 'reopened': 1},
+        {'published': 1000},
+        {'published': 1000, 'fault': 1},
+        {'published': 1000},
+    ]
+    for step in story:
+        now_s += 1.0
+        reader.fault = 'it is gone' if step.pop('fault', 0) else ''
+        reader.published['signal'] += step.pop('published')
+        for name, change in step.items():
+            sensor.counts[name] += change
+        levels.append(health.report(now_s)[0])
+    assert levels == ['OK', 'OK', 'WARN', 'WARN', 'OK', 'WARN', 'WARN', 'ERROR', 'WARN', 'OK', 'ERROR', 'OK']
+
+
+def test_what_the_sensor_tells_of_itself_is_reported() -> None:
+    sensor = Scripted('')
+    sensor.details = {'serial number': 'A7'}
+    reader = Reader(sensor, lambda *_: None)
+    assert Health(reader, 0.0).report(1.0)[2]['serial number'] == 'A7'

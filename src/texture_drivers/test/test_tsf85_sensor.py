@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import DeviceError
+from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.params import SensorParams
 from texture_drivers.tsf85.sensor import Tsf85
+from texture_drivers.tsf85.tables import LAYOUTS
 
 DEADLINE_S = 10.0
 
@@ -42,10 +43,10 @@ class Wire:
         except BlockingIOError:
             return b''
 
-    def say(self, stamp_ms: int, dynamic: int, image: list[int] | None = None) -> None:
-        items = b'\x70' + struct.pack('>Q', stamp_ms) + b'\x20' + struct.pack('>h', dynamic)
+    def say(self, stamp_ms: int, dynamic: int, image: list[int] | None = None, more: bytes = b'') -> None:
+        items = b'\x70' + struct.pack('>Q', stamp_ms) + b'\x20' + struct.pack('>h', dynamic) + more
         if image:
-            items += b'\x10' + struct.pack('>28H', *image)
+            items += b'\x10' + struct.pack(f'>{len(image)}H', *image)
         os.write(self.device, bytes([0x9A, 0, 0x58, len(items)]) + items)
 
 
@@ -85,14 +86,21 @@ class Feeder:
         self.wire, self.sensor, self.clock = wire, sensor, clock
         self.signal: list[TactileSignal] = []
         self.static: list[TactileSignal] = []
+        self.others: dict[str, list[TactileSignal]] = {}
         self.stamp_ms = 5000
 
-    def run(self, milliseconds: int, missing: tuple[int, ...] = (), image: list[int] | None = None) -> None:
+    def run(
+        self,
+        milliseconds: int,
+        missing: tuple[int, ...] = (),
+        image: list[int] | None = None,
+        more: bytes = b'',
+    ) -> None:
         sent = 0
         for first in range(0, milliseconds, 10):
             for ms in range(first, min(first + 10, milliseconds)):
                 if ms not in missing:
-                    self.wire.say(self.stamp_ms, ms % 1000, image)
+                    self.wire.say(self.stamp_ms, ms % 1000, image, more)
                     sent += 1
                 self.stamp_ms += 1
                 self.clock.now_ns += NANOSECONDS // 1000
@@ -102,6 +110,8 @@ class Feeder:
         batches = self.sensor.read()
         self.signal += batches.get('signal', [])
         self.static += batches.get('signal_static', [])
+        for topic, found in batches.items():
+            self.others.setdefault(topic, []).extend(found)
 
 
 @pytest.fixture
@@ -189,6 +199,98 @@ def test_a_silent_device_is_stopped_and_started_and_given_up_at_last(wire: Wire,
     sensor.close()
     assert sensor.counts['revived'] == 3
     assert wire.heard().count(bytes.fromhex('9A 00 58 01 01')) == 4
+
+
+def test_the_image_that_stays_the_same_is_counted_as_repeated(feeder: Feeder) -> None:
+    for number in range(10):  # a new image every 50 ms, sent each millisecond, published at 60 Hz
+        feeder.run(50, image=[number] * 28)
+    counts = feeder.sensor.counts
+    assert counts['images'] == len(feeder.static) == pytest.approx(24, abs=2)
+    fresh = len({batch.samples[0, 0] for batch in feeder.static})
+    assert counts['repeated_images'] == counts['images'] - fresh
+
+
+def test_acceleration_and_rotation_come_in_si_units_with_the_dynamic_values(feeder: Feeder) -> None:
+    feeder.run(200, more=bytes.fromhex('30 0000 C000 4000') + b'\x40' + struct.pack('>3h', 0, -13107, 13107))
+    imu = feeder.others['imu']
+    assert indices(imu) == indices(feeder.signal)
+    assert [batch.stamp_ns for batch in imu] == [batch.stamp_ns for batch in feeder.signal]
+    assert imu[0].channels[:1] + imu[0].channels[-1:] == ('acceleration_x', 'rotation_z')
+    assert imu[0].unit == 'm/s², m/s², m/s², rad/s, rad/s, rad/s'
+    turn = np.deg2rad(99.9985)  # 13107 / 131.072 degrees a second
+    np.testing.assert_allclose(imu[-1].samples[-1], [0, -9.80665, 9.80665, 0, -turn, turn], rtol=1e-5)
+
+
+def test_what_the_finger_does_not_measure_is_nan_or_not_published(feeder: Feeder) -> None:
+    feeder.run(200)
+    assert feeder.others['imu'] == []
+    feeder.run(20, more=bytes.fromhex('30 0000 0000 4000'))
+    assert np.isnan(feeder.others['imu'][-1].samples[-1]).tolist() == [False] * 3 + [True] * 3
+
+
+@pytest.mark.parametrize(
+    ('config', 'columns'), [('{imu: false}', 0), ('{magnetometer: true}', 9), ('{imu: false, magnetometer: true}', 3)]
+)
+def test_the_settings_choose_the_inertial_channels(wire: Wire, clock: Clock, config: str, columns: int) -> None:
+    sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.001, config=config), clock)
+    sensor.open()
+    feeder = Feeder(wire, sensor, clock)
+    feeder.run(200, more=bytes.fromhex('30 0000 0000 4000 40 0000 0000 0000 50 0001 0000 0000'))
+    sensor.close()
+    assert ('imu' in sensor.expected_rates_hz) == bool(columns)
+    assert {batch.samples.shape[1] for batch in feeder.others['imu']} == ({columns} if columns else set())
+    if columns == 3:
+        assert feeder.others['imu'][0].samples[0] == pytest.approx([0.15e-6, 0, 0], rel=1e-5)
+
+
+def test_both_fingers_are_read_through_one_opening(wire: Wire, clock: Clock) -> None:
+    sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.001), clock, fingers=(0, 1))
+    sensor.open()
+    feeder = Feeder(wire, sensor, clock)
+    feeder.run(300, missing=(200,), more=bytes.fromhex('24 0007') + b'\x14' + struct.pack('>28H', *range(28)))
+    sensor.close()
+    assert set(sensor.expected_rates_hz) == {
+        f'finger{finger}/{topic}' for finger in (0, 1) for topic in ('signal', 'signal_static', 'imu')
+    }
+    first, second = feeder.others['finger0/signal'], feeder.others['finger1/signal']
+    assert indices(first) == indices(second)
+    assert np.unique(np.concatenate([batch.samples for batch in second])).tolist() == [7.0]
+    assert feeder.others['finger1/signal_static'][0].samples.tolist() == [list(range(28))]
+    assert feeder.others['finger0/signal_static'] == []
+    assert (sensor.counts['samples'], sensor.counts['lost']) == (2 * len(indices(first)), 2)
+
+
+def test_the_prototype_has_12_taxels_at_25_hz(wire: Wire, clock: Clock) -> None:
+    params = SensorParams(device=str(wire.link), batch_s=0.001)
+    sensor = Tsf85(params, clock, layout=LAYOUTS['tsf85_3x4'])
+    sensor.open()
+    feeder = Feeder(wire, sensor, clock)
+    feeder.run(500, image=list(range(12)))
+    sensor.close()
+    assert feeder.static[0].channels[-1] == 'taxel_2_3'
+    assert feeder.static[0].samples.tolist() == [list(range(12))]
+    assert len(feeder.static) == pytest.approx(10, abs=1)
+    assert sensor.counts['bogus'] == 0
+
+
+def test_a_third_finger_is_refused_with_a_sentence() -> None:
+    with pytest.raises(InvalidParameter, match=r"'finger' is 2; a TSF-85 has the fingers 0 and 1"):
+        Tsf85(SensorParams(finger=2))
+
+
+def test_bytes_that_are_no_packets_are_told_from_silence(wire: Wire, clock: Clock) -> None:
+    sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.1), clock)
+    sensor.open()
+    deadline = time.monotonic() + DEADLINE_S
+    with pytest.raises(DeviceError, match=r'sends bytes, .* its firmware'):
+        while time.monotonic() < deadline:
+            os.write(wire.device, bytes.fromhex('9A 00 58 03 80 0102'))
+            sensor.read()
+    sensor.close()
+
+
+def test_the_drift_of_the_device_is_told(feeder: Feeder) -> None:
+    assert feeder.sensor.details == {'device clock slow by [ppm]': 0.0}
 
 
 def test_a_second_program_cannot_open_the_device(wire: Wire, sensor: Tsf85, clock: Clock) -> None:

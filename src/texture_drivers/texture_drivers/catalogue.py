@@ -8,12 +8,13 @@ from typing import Protocol
 
 from texture_core.protocols import Sensor
 from texture_drivers.biotac.sensor import BioTac
-from texture_drivers.biotac.tables import LAYOUTS
+from texture_drivers.biotac.tables import LAYOUTS as BIOTACS
 from texture_drivers.daq.sensor import daq
 from texture_drivers.file.player import FilePlayer
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
 from texture_drivers.tsf85.sensor import Tsf85
+from texture_drivers.tsf85.tables import LAYOUTS as TSF85S
 
 
 class MakeSensor(Protocol):
@@ -26,8 +27,10 @@ class MakeSensor(Protocol):
 
 SENSORS: Mapping[str, MakeSensor] = {
     'tsf85': Tsf85,  # Robotiq TSF-85 / CoRo fingertip
+    'tsf85_pair': partial(Tsf85, fingers=(0, 1)),  # both fingers; topics finger0/signal and so on
+    'tsf85_3x4': partial(Tsf85, layout=TSF85S['tsf85_3x4']),  # its prototype: 3 rows of 4 taxels at 25 Hz
     'biotac': BioTac,  # SynTouch BioTac, 19 electrodes
-    'biotac_sp': partial(BioTac, layout=LAYOUTS['biotac_sp']),  # 24 electrodes
+    'biotac_sp': partial(BioTac, layout=BIOTACS['biotac_sp']),  # 24 electrodes
     'biotac_hand': partial(BioTac, fingers=(0, 1, 2)),  # all places of a board; topics finger0/signal and so on
     'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
     'pvdf': Pvdf,  # PVDF film and force sensor, Hu et al. 2014

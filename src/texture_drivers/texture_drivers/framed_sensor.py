@@ -11,6 +11,7 @@ from texture_drivers.params import SensorParams
 from texture_drivers.sample_line import SampleLine, Stream
 from texture_drivers.serial_port import SerialPort
 
+PPM = 1e6
 SILENCE_S = 1.0  # the device sends without being asked; opening the port again has woken many a one
 
 
@@ -82,6 +83,11 @@ class FramedSensor:
             'reopened': max(0, self._opened - 1),
             'clock_steps': line.clock.steps,
         }
+
+    @property
+    def details(self) -> Mapping[str, float]:
+        """How much the device's clock is slow."""
+        return {'device clock slow by [ppm]': PPM * self._line.clock.drift}
 
     @property
     def expected_rates_hz(self) -> Mapping[str, float]:

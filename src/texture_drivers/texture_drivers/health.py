@@ -18,7 +18,8 @@ class Health:
     """Report level, sentence and numbers on what happened since the last report.
 
     ERROR: the sensor cannot be reached, or no sample came for 1 s. WARN: samples were lost or the sensor was opened
-    again since the last report, a rate is more than 5 % off, or more than 5 packets a second are refused.
+    again since the last report, a rate is more than 5 % off, or more than 5 packets a second are refused. All that is
+    judged over the time since the last report, so the level falls back by itself.
     """
 
     def __init__(self, reader: Reader, now_s: float) -> None:
@@ -27,6 +28,12 @@ class Health:
         self._published = dict(reader.published)
         self._counts = dict(reader.sensor.counts)
         self._last_sample_s = now_s
+
+    @property
+    def details(self) -> Mapping[str, Any]:
+        """What the sensor tells of itself, such as its 'serial number'; a user's own need not."""
+        details: Mapping[str, Any] = getattr(self._reader.sensor, 'details', {})
+        return details
 
     def report(self, now_s: float) -> Report:
         """Return the state at a time of a monotonic clock."""
@@ -43,6 +50,7 @@ class Health:
             **{f'{topic} expected [Hz]': rate for topic, rate in self._reader.sensor.expected_rates_hz.items()},
             **counts,
             'age of last sample [s]': age_s,
+            **self.details,
         }
         level, message = self._judge(rates, new, age_s, period_s)
         return level, message, numbers

@@ -118,7 +118,7 @@ def test_what_was_sampled_is_delivered_with_its_time(
     whole_turns = round((since_s / FRAME_S - frame) / (4096 / 44))
     true_s = (round((frame * 44 + 4096 * whole_turns) / 44) + 1 / 44) * FRAME_S
     assert since_s == pytest.approx(true_s, abs=0.02)
-    assert sensor.details == {'serial of finger 0': 'BT-0'}
+    assert sensor.details['serial of finger 0'] == 'BT-0'
 
 
 def test_stamps_follow_the_pace_of_the_device(make_rig: Callable[..., Rig], make_sensor: Callable[..., BioTac]) -> None:

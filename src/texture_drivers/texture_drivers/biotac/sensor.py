@@ -18,6 +18,7 @@ from texture_drivers.params import SensorParams
 
 SILENCE_S = 1.0  # without a whole frame, or without a good word, the board or the finger is not there
 MICROSECONDS_PER_S = 1e6
+PPM = 1e6
 CHEETAH = 'cheetah'
 Topics = dict[str, list[TactileSignal]]
 
@@ -99,9 +100,10 @@ class BioTac:
         }
 
     @property
-    def details(self) -> Mapping[str, str]:
-        """Serial number of each BioTac that told it."""
-        return {f'serial of finger {place}': serial for place, serial in enumerate(self._link.serials) if serial}
+    def details(self) -> Mapping[str, str | float]:
+        """Serial number of each BioTac that told it, and how much the device's clock is slow."""
+        serials = {f'serial of finger {place}': serial for place, serial in enumerate(self._link.serials) if serial}
+        return {**serials, 'device clock slow by [ppm]': PPM * self._clock.drift}
 
     @property
     def expected_rates_hz(self) -> Mapping[str, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +9,7 @@ from rclpy.node import Node
 from texture_msgs import msg
 
 from texture_core.catalogue import find
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData
 from texture_core.parameters import param
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.diagnostics import Diagnostics, Report
@@ -18,6 +17,7 @@ from texture_core.ros.parameters import declare
 from texture_core.ros.qos import SENSOR_QOS
 from texture_core.ros.run import run
 from texture_drivers.biotac.messages import MESSAGES, MessageStream
+from texture_drivers.message_types import import_message
 
 TOPICS = ('signal', 'signal_static')
 
@@ -43,7 +43,7 @@ class BiotacAdaptor(Node):
         self._messages = self._refused = 0
         self._fault = ''
         self._signals = {topic: self.create_publisher(msg.TactileSignal, topic, SENSOR_QOS) for topic in TOPICS}
-        message_class = import_message(self._params.message_type)
+        message_class = import_message(self._params.message_type, 'message_type')
         self.create_subscription(message_class, self._params.topic, self._on_message, SENSOR_QOS)
         self._diagnostics = Diagnostics(self, self._report)
 
@@ -70,18 +70,6 @@ class BiotacAdaptor(Node):
         )
         level, sentence = next(((level, text) for holds, level, text in verdicts if holds), ('OK', 'converting'))
         return level, sentence, numbers
-
-
-def import_message(message_type: str) -> Any:
-    """Return the class of 'package/msg/Type'; InvalidParameter if it is not installed."""
-    package, _, name = message_type.partition('/msg/')
-    try:
-        return getattr(importlib.import_module(f'{package}.msg'), name)
-    except (ImportError, AttributeError) as error:
-        raise InvalidParameter(
-            f"parameter 'message_type' is '{message_type}', which cannot be imported ({error}); build the package with "
-            'these messages and source it, or name the type as package/msg/Type'
-        ) from error
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ from texture_msgs import msg
 from texture_core.catalogue import find
 from texture_core.errors import TextureError
 from texture_core.parameters import param
+from texture_core.protocols import Sensor
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.diagnostics import Diagnostics
 from texture_core.ros.parameters import declare, read
@@ -38,7 +39,7 @@ class SensorNode(LifecycleNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('sensor', **kwargs)
         params = declare(self, SensorNodeParams)
-        find(SENSORS, params.sensor, 'sensor')  # a wrong name ends the node here, with a sentence
+        self._make(params)  # what is wrong in the parameters ends the node here, with a sentence
         self._reader: Reader | None = None
         self._topics: dict[str, Any] = {}
         self._diagnostics = Diagnostics(self, self._report, hardware_id=params.device)
@@ -50,12 +51,12 @@ class SensorNode(LifecycleNode):
         """Make the sensor and its publishers; nothing is opened."""
         try:
             params = read(self, SensorNodeParams)
-            sensor = find(SENSORS, params.sensor, 'sensor')(params, lambda: self.get_clock().now().nanoseconds)
+            sensor = self._make(params)
         except TextureError as error:
             self.get_logger().error(str(error))
             return TransitionCallbackReturn.FAILURE
         self._sensor = sensor
-        self._diagnostics.hardware_id = params.device
+        self._device = self._diagnostics.hardware_id = params.device
         self._topics = {
             topic: self.create_lifecycle_publisher(msg.TactileSignal, topic, SENSOR_QOS)
             for topic in sensor.expected_rates_hz
@@ -92,6 +93,9 @@ class SensorNode(LifecycleNode):
             self._reader.stop()
             self._reader = None
 
+    def _make(self, params: SensorNodeParams) -> Sensor:
+        return find(SENSORS, params.sensor, 'sensor')(params, lambda: self.get_clock().now().nanoseconds)
+
     def _destroy_publishers(self) -> None:
         for publisher in self._topics.values():
             self.destroy_publisher(publisher)
@@ -103,6 +107,7 @@ class SensorNode(LifecycleNode):
     def _report(self) -> tuple[str, str, dict[str, Any]]:
         if self._reader is None:
             return 'WARN', 'the sensor is not active', {}
+        self._diagnostics.hardware_id = self._health.details.get('serial number', self._device)
         return self._health.report(time.monotonic())
 
 

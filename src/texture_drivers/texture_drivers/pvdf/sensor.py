@@ -106,6 +106,11 @@ class Pvdf:
         return self._line.counts
 
     @property
+    def details(self) -> Mapping[str, float]:
+        """How much the device's clock is slow."""
+        return self._line.details
+
+    @property
     def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
         return self._line.expected_rates_hz

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from struct import Struct
 from typing import NamedTuple
 
@@ -29,12 +30,18 @@ class PacketParser:
     The protocol has no checksum, so a packet is believed only if everything about it fits: a data command, known item
     types, index bits 0, a finger that exists, items that end exactly with the payload, and a start byte after it as
     far as one has come. A flipped value byte inside such a packet cannot be seen.
+
+    Parameters
+    ----------
+    layout
+        Kind of fingertip.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, layout: tables.Layout = tables.TSF85) -> None:
         self.packets = 0
         self.refused = 0  # start bytes that led to no packet
         self.refused_bytes = 0
+        self._items = layout.items
         self._buffer = b''
 
     def feed(self, data: bytes) -> list[Packet]:
@@ -52,7 +59,7 @@ class PacketParser:
             position = start
             if not _may_be_judged(buffer, start):
                 break
-            packet = _packet_at(buffer, start)
+            packet = _packet_at(buffer, start, self._items)
             if packet is None:
                 self.refused += 1
                 self.refused_bytes += 1
@@ -80,26 +87,26 @@ def _may_be_judged(buffer: bytes, start: int) -> bool:
     return end == len(buffer) and buffer[end - 1] != tables.START_BYTE
 
 
-def _packet_at(buffer: bytes, start: int) -> Packet | None:
+def _packet_at(buffer: bytes, start: int, layouts: Mapping[int, Struct]) -> Packet | None:
     command, end = buffer[start + 2], _end(buffer, start)
     if command not in tables.DATA_COMMANDS or (end < len(buffer) and buffer[end] != tables.START_BYTE):
         return None
     payload = buffer[start + tables.HEADER_BYTES : end]
     for timestamp in tables.TIMESTAMPS:
-        items = _walk(payload, timestamp)
+        items = _walk(payload, timestamp, layouts)
         if items:
             return Packet(command, items)
     return None
 
 
-def _walk(payload: bytes, timestamp: Struct) -> tuple[Item, ...] | None:
+def _walk(payload: bytes, timestamp: Struct, layouts: Mapping[int, Struct]) -> tuple[Item, ...] | None:
     """Return the items of a payload, or None if they do not fit it exactly."""
     items = []
     position = 0
     while position < len(payload):
         head = payload[position]
         kind, finger = head & tables.TYPE_MASK, (head & tables.FINGER_MASK) >> tables.FINGER_SHIFT
-        layout = timestamp if kind == tables.TIMESTAMP else tables.ITEMS.get(kind)
+        layout = timestamp if kind == tables.TIMESTAMP else layouts.get(kind)
         if layout is None or head & tables.INDEX_MASK or finger >= tables.FINGERS:
             return None
         if position + 1 + layout.size > len(payload):

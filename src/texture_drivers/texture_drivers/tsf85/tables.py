@@ -7,6 +7,8 @@ robotiq/ros @18335fa (`robotiq_tsf/src/PollData.cpp`). Both agree.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from struct import Struct
 
 START_BYTE = 0x9A
@@ -23,7 +25,6 @@ TYPE_MASK, FINGER_MASK, FINGER_SHIFT, INDEX_MASK = 0xF0, 0x0C, 2, 0x03
 FINGERS = 2
 STATIC, DYNAMIC, ACCELEROMETER, GYROSCOPE, MAGNETOMETER, TEMPERATURE, TIMESTAMP = range(0x10, 0x80, 0x10)
 ITEMS: Mapping[int, Struct] = {
-    STATIC: Struct('>28H'),
     DYNAMIC: Struct('>h'),
     ACCELEROMETER: Struct('>3h'),
     GYROSCOPE: Struct('>3h'),
@@ -35,9 +36,38 @@ ITEMS: Mapping[int, Struct] = {
 TIMESTAMPS = (Struct('>H'), Struct('>Q'))
 
 RATE_HZ = 1000.0  # of the dynamic channel; the device's stamps are milliseconds
-STATIC_ROWS, STATIC_COLUMNS = 7, 4
-STATIC_RATE_HZ = 60.0  # Robotiq README 2026; 25 to 59 Hz with earlier firmware
-DYNAMIC_SENSOR, STATIC_SENSOR = 'tsf85/dynamic', 'tsf85/static'
+DYNAMIC_SENSOR, STATIC_SENSOR, MOTION_SENSOR = 'tsf85/dynamic', 'tsf85/static', 'tsf85/imu'
 DYNAMIC_CHANNELS = ('dynamic',)
-STATIC_CHANNELS = tuple(f'taxel_{row}_{column}' for row in range(STATIC_ROWS) for column in range(STATIC_COLUMNS))
 UNIT = 'count'
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The taxels of one kind of fingertip, row by row."""
+
+    rows: int
+    columns: int
+    static_rate_hz: float
+
+    @cached_property
+    def static_channels(self) -> tuple[str, ...]:
+        """Name of each taxel."""
+        return tuple(f'taxel_{row}_{column}' for row in range(self.rows) for column in range(self.columns))
+
+    @cached_property
+    def items(self) -> Mapping[int, Struct]:
+        """What follows each item byte, but for the stamp's."""
+        return {STATIC: Struct(f'>{self.rows * self.columns}H'), **ITEMS}
+
+
+LAYOUTS: Mapping[str, Layout] = {
+    'tsf85': Layout(7, 4, 60.0),  # 60 Hz: Robotiq README 2026; 59 Hz in paper 2, about 25 Hz with some firmware
+    # The prototype of Roberge et al. ("3x4 taxels per phalanges ... about 25 Hz"). No public driver shows its packets:
+    # those of the TSF-85 are taken, with 12 taxels.
+    'tsf85_3x4': Layout(3, 4, 25.0),
+}
+TSF85 = LAYOUTS['tsf85']
+STATIC_ROWS, STATIC_COLUMNS, STATIC_RATE_HZ = TSF85.rows, TSF85.columns, TSF85.static_rate_hz
+STATIC_CHANNELS = TSF85.static_channels
+
+USB_IDS = ((0x16D0, 0x14CC), (0x04B4, 0xF232))  # the present one; an older one, Cypress' default

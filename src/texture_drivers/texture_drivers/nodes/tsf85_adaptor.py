@@ -1,0 +1,97 @@
+"""The node that turns the messages of the vendor's TSF-85 driver into the suite's signals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+from texture_msgs import msg
+
+from texture_core.errors import InvalidData
+from texture_core.parameters import param
+from texture_core.ros.conversions import to_msg
+from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.parameters import declare
+from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros.run import run
+from texture_drivers.message_types import import_message
+from texture_drivers.tsf85.messages import MessageStream
+from texture_drivers.tsf85.settings import Tsf85Settings
+
+NEEDED = ('Dynamic', 'Timestamp', 'StaticData')
+INERTIAL = ('Accelerometer', 'Gyroscope')
+
+
+@dataclass(frozen=True)
+class AdaptorParams:
+    """Whose messages are read."""
+
+    package: str = param('robotiq_tsf', 'Package of the messages.')
+    prefix: str = param('TactileSensor', 'What the names of the topics begin with.')
+    finger: int = param(0, 'Which finger: 0 is the first.', low=0, high=1)
+    imu: bool = param(False, 'Convert acceleration and rotation too; two more messages each millisecond.')
+    static_rate_hz: float = param(60.0, 'Rate at which images are published.', unit='Hz', low=1.0, high=1000.0)
+    batch_s: float = param(0.01, 'Length of one batch of samples.', unit='s', low=0.001, high=0.1)
+    frame_id: str = param('fingertip', 'Frame of the fingertip, for the headers.')
+
+
+class Tsf85Adaptor(Node):
+    """Publish one finger out of the messages of the vendor's driver."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('tsf85_adaptor', **kwargs)
+        params = self._params = declare(self, AdaptorParams)
+        settings = Tsf85Settings(imu=params.imu)
+        self._stream = MessageStream(params.finger, settings, params.static_rate_hz, params.frame_id)
+        self._refused = self._heard = 0
+        self._fault = ''
+        self._counts = dict(self._stream.counts)
+        self._signals = {
+            topic: self.create_publisher(msg.TactileSignal, topic, SENSOR_QOS) for topic in self._stream.rates_hz
+        }
+        for name in NEEDED + INERTIAL if params.imu else NEEDED:
+            message_class = import_message(f'{params.package}/msg/{name}', 'package')
+            self.create_subscription(message_class, f'{params.prefix}/{name}', self._take(name), SENSOR_QOS)
+        self.create_timer(params.batch_s, self._publish)
+        self._diagnostics = Diagnostics(self, self._report)
+
+    def _take(self, name: str) -> Callable[[Any, Mapping[str, int]], None]:
+        """Return the callback of a topic."""
+
+        def take(message: Any, info: Mapping[str, int]) -> None:
+            self._heard += 1
+            try:
+                self._stream.take(name, message, info['source_timestamp'])
+            except InvalidData as error:
+                self._refused += 1
+                self._fault = str(error)
+
+        return take
+
+    def _publish(self) -> None:
+        for topic, batches in self._stream.batches().items():
+            for batch in batches:
+                self._signals[topic].publish(to_msg(batch))
+
+    def _report(self) -> Report:
+        counts = dict(self._stream.counts)
+        new = {name: total - self._counts[name] for name, total in counts.items()}
+        heard, fault = self._heard, self._fault
+        self._counts, self._heard, self._fault = counts, 0, ''
+        silent = f"no message on '{self._params.prefix}/…'; start the driver, or set the parameter prefix"
+        unstamped = f"no '{self._params.prefix}/Timestamp': samples are numbered through, and losses go unseen"
+        verdicts = (
+            (bool(fault), 'ERROR', fault),
+            (heard == 0, 'ERROR', silent),
+            (new['lost'] > 0, 'WARN', f'{new["lost"]} samples lost since the last report'),
+            (new['unstamped'] > new['samples'] / 2, 'WARN', unstamped),
+        )
+        level, sentence = next(((level, text) for holds, level, text in verdicts if holds), ('OK', 'converting'))
+        return level, sentence, {**counts, 'refused messages': self._refused}
+
+
+def main() -> None:
+    """Run the node."""
+    run(Tsf85Adaptor)

@@ -1,0 +1,199 @@
+"""One finger of a TSF-85: its sets become numbered, timed batches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.signal import TactileSignal
+from texture_drivers.clock import StreamClock
+from texture_drivers.counting import SampleCounter
+from texture_drivers.tsf85 import tables
+from texture_drivers.tsf85.sets import Set
+from texture_drivers.tsf85.settings import Tsf85Settings
+
+IMAGE_HOLD_S = 0.25  # an image older than this is no measurement of now
+SIGNAL, STATIC, IMU = 'signal', 'signal_static', 'imu'
+
+
+class Finger:
+    """Follow one finger: number its sets by the device's stamps, time them by the host's clock, cut batches.
+
+    Parameters
+    ----------
+    layout
+        Kind of fingertip.
+    settings
+        Of the inertial sensors.
+    static_rate_hz
+        Rate of the taxel images as published; 0: that of the layout.
+    frame_id
+        For the headers.
+    """
+
+    def __init__(
+        self,
+        layout: tables.Layout = tables.TSF85,
+        settings: Tsf85Settings | None = None,
+        static_rate_hz: float = 0.0,
+        frame_id: str = '',
+    ) -> None:
+        settings = Tsf85Settings() if settings is None else settings
+        self.clock = StreamClock(tables.RATE_HZ)
+        self.counter = SampleCounter()
+        self.cutter = BatchCutter(layout, settings, static_rate_hz or layout.static_rate_hz, frame_id, self.clock)
+        self._waiting: list[Set] = []
+        self._interrupted = False
+
+    @property
+    def rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        rates = {SIGNAL: tables.RATE_HZ, STATIC: self.cutter.static_rate_hz}
+        return {**rates, IMU: tables.RATE_HZ} if self.cutter.has_motion else rates
+
+    def interrupt(self) -> None:
+        """Forget what belongs to the stream so far: another one begins."""
+        self._interrupted = True
+        self._waiting = []
+
+    def place(self, sets: Sequence[Set], arrival_ns: int) -> Mapping[str, list[TactileSignal]]:
+        """Return the batches, by topic, that the sets make which have just arrived."""
+        if not sets:
+            return {}
+        if self._interrupted:
+            self._resume(len(sets), arrival_ns)
+        waiting = [*self._waiting, *sets]
+        indices, anew = self.counter.place([item.stamp_ms for item in waiting])
+        self._waiting = waiting[len(indices) :]
+        if anew:
+            self.interrupt()
+        if not indices:
+            return {}
+        self.clock.observe(indices[-1], arrival_ns)
+        return self.cutter.cut(indices, waiting[: len(indices)])
+
+    def _resume(self, n_sets: int, arrival_ns: int) -> None:
+        """Go on after an interruption at the index that the host's clock tells."""
+        self._interrupted = False
+        if self.clock.settled:
+            self.counter.resume(round(self.clock.index_at(arrival_ns)) - (n_sets - 1))
+        else:
+            self.counter.resume(self.counter.next_index)
+        self.clock.restart()
+
+
+class BatchCutter:
+    """Make batches of numbered sets: a new batch wherever the index jumps, and taxel images at a constant rate."""
+
+    def __init__(
+        self,
+        layout: tables.Layout,
+        settings: Tsf85Settings,
+        static_rate_hz: float,
+        frame_id: str,
+        clock: StreamClock,
+    ) -> None:
+        self.samples = 0
+        self.lost = 0
+        self.images = 0
+        self.repeated_images = 0  # published although no other image had come since the tick before
+        self.static_rate_hz = static_rate_hz
+        self._layout = layout
+        self._frame_id = frame_id
+        self._clock = clock
+        self._motion_channels, self._motion_unit = settings.channels, settings.unit
+        self._motion_gains: Array = settings.gains
+        self._next_index: int | None = None  # none published yet
+        self._image: tuple[int, ...] | None = None
+        self._image_index = 0
+        self._shown: tuple[int, ...] | None = None
+        self._tick = 0
+        self._sets_per_tick = tables.RATE_HZ / static_rate_hz
+
+    @property
+    def has_motion(self) -> bool:
+        """Whether the inertial sensors are published."""
+        return bool(self._motion_channels)
+
+    def cut(self, indices: Sequence[int], sets: Sequence[Set]) -> Mapping[str, list[TactileSignal]]:
+        """Return the batches by topic; nothing while the clock is not settled."""
+        if not self._clock.settled:
+            return {}
+        batches: dict[str, list[TactileSignal]] = {SIGNAL: [], STATIC: [], IMU: []}
+        for first, members in _runs(indices, sets):
+            if first != self._next_index:
+                self._jump(first)
+            self._next_index = first + len(members)
+            self.samples += len(members)
+            batches[SIGNAL].append(self._dynamic(first, members))
+            batches[STATIC].extend(self._images(first, members))
+            batches[IMU].extend(self._motion(first, members))
+        return batches
+
+    def _jump(self, first: int) -> None:
+        self.lost += 0 if self._next_index is None else first - self._next_index
+        self._tick = math.ceil(first / self._sets_per_tick)
+
+    def _images(self, first: int, members: Sequence[Set]) -> Iterator[TactileSignal]:
+        for index, item in enumerate(members, first):
+            if item.image is not None:
+                self._image, self._image_index = item.image, index
+            while self._tick * self._sets_per_tick <= index:
+                if self._image is not None and index - self._image_index <= IMAGE_HOLD_S * tables.RATE_HZ:
+                    yield self._static(self._tick, self._image)
+                self._tick += 1
+
+    def _dynamic(self, first: int, members: Sequence[Set]) -> TactileSignal:
+        return TactileSignal(
+            stamp_ns=self._clock.time_ns(first),
+            sensor=tables.DYNAMIC_SENSOR,
+            channels=tables.DYNAMIC_CHANNELS,
+            unit=tables.UNIT,
+            sampling_rate_hz=tables.RATE_HZ,
+            first_sample=first,
+            samples=np.array([item.dynamic for item in members], dtype=np.float32)[:, None],
+            frame_id=self._frame_id,
+        )
+
+    def _motion(self, first: int, members: Sequence[Set]) -> Iterator[TactileSignal]:
+        """Yield the inertial values, unless the device has sent none of them."""
+        counts = np.array([item.motion for item in members])
+        if not self.has_motion or np.isnan(counts).all():
+            return
+        yield TactileSignal(
+            stamp_ns=self._clock.time_ns(first),
+            sensor=tables.MOTION_SENSOR,
+            channels=self._motion_channels,
+            unit=self._motion_unit,
+            sampling_rate_hz=tables.RATE_HZ,
+            first_sample=first,
+            samples=(counts * self._motion_gains).astype(np.float32),
+            frame_id=self._frame_id,
+        )
+
+    def _static(self, tick: int, image: tuple[int, ...]) -> TactileSignal:
+        self.images += 1
+        self.repeated_images += image == self._shown
+        self._shown = image
+        return TactileSignal(
+            stamp_ns=self._clock.time_ns(tick * self._sets_per_tick),
+            sensor=tables.STATIC_SENSOR,
+            channels=self._layout.static_channels,
+            unit=tables.UNIT,
+            sampling_rate_hz=self.static_rate_hz,
+            first_sample=tick,
+            samples=np.array([image], dtype=np.float32),
+            frame_id=self._frame_id,
+        )
+
+
+def _runs(indices: Sequence[int], sets: Sequence[Set]) -> Iterator[tuple[int, list[Set]]]:
+    """Yield the first index and the sets of each run without a gap."""
+    numbered = enumerate(zip(indices, sets, strict=True))
+    for _, run in groupby(numbered, key=lambda item: item[1][0] - item[0]):
+        members = [numbered_set for _, numbered_set in run]
+        yield members[0][0], [item for _, item in members]
