@@ -17,24 +17,25 @@ from texture_evaluation.charts import Tour, picture
 from texture_evaluation.evaluate import Report
 
 
-def draw(bag: Path, report: Report, source: str, path: Path) -> Path:
-    """Draw that exploration of a bag in which most was learnt on the way, and the confusion of all of them.
+def draw(bag: Path, surface: str, report: Report, source: str, path: Path) -> Path:
+    """Draw an exploration of a surface, and the confusion of all explorations in the bag.
 
     Parameters
     ----------
     bag
         With the signal, the states and the live estimates.
+    surface
+        Of which surface: the exploration in which most was learnt on the way.
     report
         Of the model on this bag.
     source
         Where the signal comes from, in words.
     """
     states, estimates, batches = _gather(bag)
-    name = min(estimates, key=lambda each: _first_share(estimates[each]))
+    candidates = [name for name in estimates if states[name][0].surface == surface]
+    name = min(candidates, key=lambda each: _first_share(estimates[each]))
     samples, rate_hz, unit = _sliding_part(states[name], batches)
-    tour = Tour(
-        source, states[name][0].surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion
-    )
+    tour = Tour(source, surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion)
     return picture(tour, path)
 
 

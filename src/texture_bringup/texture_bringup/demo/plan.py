@@ -16,7 +16,8 @@ class Plan:
     The finger touches each time at another place; every second slide goes the other way.
     """
 
-    surfaces: tuple[str, ...] = ('glass', 'brushed_metal', 'leather', 'woven_cloth', 'ridge_2mm_deep')
+    surfaces: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
+    shown: str = 'ridge_2mm_deep'  # in the picture: its ridges make a line in the spectrum, at speed / pitch
     learning_slides: int = 3
     recognition_slides: int = 2
     speed_m_s: float = 0.05

@@ -93,7 +93,7 @@ def demonstrate(out: Path, recipe: str, seed: int, plan: Plan, story: Story) -> 
         bench.use_model(places.model.resolve())
         story.line('the running classifier has taken the model over')
         rows = _recognise(bench, places, plan, story)
-    report = _report(rows, places, story)
+    report = _report(rows, places, plan, story)
     return all(row.right for row in rows) and len(report.known) == len(rows)
 
 
@@ -128,7 +128,7 @@ def _recognise(bench: DemoBench, places: Places, plan: Plan, story: Story) -> li
     return rows
 
 
-def _report(rows: list[Row], places: Places, story: Story) -> Report:
+def _report(rows: list[Row], places: Places, plan: Plan, story: Story) -> Report:
     story.chapter('Result')
     latencies: Mapping[str, float] = latencies_s(places.recognition_bag)
     for line in table(rows, latencies):
@@ -140,7 +140,7 @@ def _report(rows: list[Row], places: Places, story: Story) -> Report:
     report.write(places.figures)
     windows = percent(report.as_json()['window_accuracy'])
     story.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
-    draw(places.recognition_bag, report, SOURCE, places.picture)
+    draw(places.recognition_bag, plan.shown, report, SOURCE, places.picture)
     story.chapter(f'Done. Look at {places.picture}')
     story.line(f'recordings, model, figures and the log of the nodes are in {places.folder}/')
     return report
