@@ -19,7 +19,8 @@ from texture_simulation.scene import Scene
 from texture_simulation.sensors import daq, pvdf
 from texture_simulation.surfaces import Surface
 
-LONGEST_BURST_S = 0.5  # after a longer stall of the machine the rest is skipped, and the driver sees a loss
+# After a longer stall of the machine the rest is skipped, and the driver sees a loss: the line's buffer takes no more.
+LONGEST_BURST_S = 0.25
 
 
 class Model(Protocol):
