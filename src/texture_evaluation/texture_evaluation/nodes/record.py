@@ -68,8 +68,9 @@ class Record(Node):
 
     def _subscribe(self, topic: Topic) -> None:
         name = self.resolve_topic_name(topic.name)
-        # Deep queues: a burst must not be lost while the executor is busy.
-        qos = QoSProfile(depth=1000, reliability=topic.qos.reliability, durability=topic.qos.durability)
+        # Deep queues: a burst must not be lost while the executor is busy. Volatile: of an exploration that was over
+        # before the recording began, the states alone would come, without the signal.
+        qos = QoSProfile(depth=1000, reliability=topic.qos.reliability)
         self.create_subscription(topic.type, topic.name, lambda raw: self._on_message(name, topic, raw), qos, raw=True)
 
     def _on_message(self, name: str, topic: Topic, raw: bytes) -> None:
