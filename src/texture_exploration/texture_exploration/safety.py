@@ -23,6 +23,15 @@ class SafetyLimits:
     force_limit_n: float = param(10.0, 'A higher measured force aborts.', unit='N', low=0.1, high=100.0)
     min_distance_m: float = param(0.002, 'Shortest slide that may be asked for.', unit='m', low=1e-4)
     max_distance_m: float = param(1.0, 'Longest slide that may be asked for.', unit='m', low=1e-3)
+    min_radius_m: float = param(0.005, 'Smallest circle that may be asked for.', unit='m', low=1e-3)
+    max_radius_m: float = param(0.1, 'Largest circle that may be asked for.', unit='m', low=1e-3)
+    min_turns: float = param(0.1, 'Fewest turns that may be asked for.', low=0.01)
+    max_turns: float = param(100.0, 'Most turns that may be asked for.', low=0.01)
+    max_turning_m_s2: float = param(
+        5.0, 'Highest acceleration towards the centre of a circle.', unit='m/s²', low=0.05, high=20.0
+    )
+    min_duration_s: float = param(0.1, 'Shortest slide in the hand that may be asked for.', unit='s', low=0.01)
+    max_duration_s: float = param(60.0, 'Longest slide in the hand that may be asked for.', unit='s', low=0.01)
     x_low_m: float = param(-0.2, 'Lowest x the finger may reach.', unit='m', low=-2.0, high=2.0)
     x_high_m: float = param(0.2, 'Highest x the finger may reach.', unit='m', low=-2.0, high=2.0)
     y_low_m: float = param(-0.2, 'Lowest y the finger may reach.', unit='m', low=-2.0, high=2.0)
@@ -71,6 +80,14 @@ class SafetyLimits:
                 raise MotionRefused(f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}')
 
     @staticmethod
+    def check_direction(request: ExplorationRequest) -> None:
+        """Refuse a direction that is none."""
+        if not math.isfinite(request.direction_rad):
+            raise MotionRefused(
+                f'{request.motion}: direction_rad is {request.direction_rad}; a finite number is needed'
+            )
+
+    @staticmethod
     def refuse_unused(request: ExplorationRequest, names: Iterable[str]) -> None:
         """Refuse a request that gives a number which the motion does not know: it means another motion."""
         given = [name for name in names if getattr(request, name) != 0.0]
@@ -103,4 +120,7 @@ RANGES = {
     'speed_m_s': ('min_speed_m_s', 'max_speed_m_s', 'm/s'),
     'force_n': ('min_force_n', 'max_force_n', 'N'),
     'distance_m': ('min_distance_m', 'max_distance_m', 'm'),
+    'radius_m': ('min_radius_m', 'max_radius_m', 'm'),
+    'turns': ('min_turns', 'max_turns', 'turns'),
+    'duration_s': ('min_duration_s', 'max_duration_s', 's'),
 }

@@ -26,6 +26,10 @@ class Line:
     length_m: float
     heading_rad: float
 
+    def place(self, travelled_m: float) -> tuple[float, float]:
+        """Return the place, m."""
+        return travelled_m * math.cos(self.heading_rad), travelled_m * math.sin(self.heading_rad)
+
     def direction_rad(self, travelled_m: float) -> float:
         """Return the same direction everywhere."""
         return self.heading_rad
@@ -47,15 +51,14 @@ def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, 
     )
     limits.check(request, ('speed_m_s', 'force_n', 'distance_m'))
     limits.refuse_unused(request, ('radius_m', 'turns', 'duration_s'))
+    limits.check_direction(request)
     _check_room(request, home, touch, limits)
-    follower = PathFollower(Line(request.distance_m, request.direction_rad))
+    follower = PathFollower(Line(request.distance_m, request.direction_rad), touch.arm_lag_s)
     return slide_over(follower, request, home, touch, limits)
 
 
 def _check_room(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
-    if not math.isfinite(request.direction_rad):
-        raise MotionRefused(f'{request.motion}: direction_rad is {request.direction_rad}; a finite number is needed')
-    ramps = ramps_m(request.speed_m_s, touch.acceleration_m_s2)
+    ramps = ramps_m(request.speed_m_s, touch.ramp_s(request.speed_m_s))
     allowed = max(0.0, limits.room_m(home, request.direction_rad) - ramps)
     if request.distance_m > allowed:
         raise MotionRefused(

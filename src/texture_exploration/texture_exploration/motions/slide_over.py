@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from texture_core.exploration import ExplorationRequest
 from texture_exploration.arms.protocol import Vector
-from texture_exploration.motions.path import PathFollower
+from texture_exploration.motions.path import Follower
 from texture_exploration.motions.staged_motion import StagedMotion
 from texture_exploration.motions.stages import Accelerate, Approach, Brake, GoHome, Lift, Settle, Slide
 from texture_exploration.motions.touch import TouchParams
@@ -12,7 +12,7 @@ from texture_exploration.safety import SafetyLimits
 
 
 def slide_over(
-    follower: PathFollower, request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits
+    follower: Follower, request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits
 ) -> StagedMotion:
     """Return the motion along a path, for a request whose speed and force are filled in and checked."""
     speed, force = request.speed_m_s, request.force_n
@@ -26,4 +26,4 @@ def slide_over(
         Brake(follower, speed, force, touch, limits),
         Lift(home, touch, limits),
     ]
-    return StagedMotion(stages, slide, follower)
+    return StagedMotion(stages, slide)

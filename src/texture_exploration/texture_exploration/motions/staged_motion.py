@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from texture_core.errors import MotionAborted
 from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState
-from texture_exploration.motions.path import PathFollower
 from texture_exploration.motions.protocol import MotionStep
 from texture_exploration.motions.stages import Slide, Stage
 
@@ -21,15 +20,12 @@ class StagedMotion:
         In their order; the last one lifts.
     slide
         The one among them that slides.
-    follower
-        Of the path on which it slides.
     """
 
-    def __init__(self, stages: Sequence[Stage], slide: Slide, follower: PathFollower) -> None:
+    def __init__(self, stages: Sequence[Stage], slide: Slide) -> None:
         self._ahead = list(stages)
         self._lift = stages[-1]
         self._slide = slide
-        self._follower = follower
         self._stage: Stage | None = None
         self._phase = Phase.IDLE
         self._abort_reason = ''
@@ -51,7 +47,7 @@ class StagedMotion:
             command=command,
             phase=self._phase,
             steady_s=self._stage.steady_s if self._stage else 0.0,
-            direction_rad=self._follower.direction_rad,
+            direction_rad=self._slide.direction_rad,
             progress=self._slide.progress,
         )
 

@@ -7,7 +7,7 @@ import math
 from texture_core.errors import MotionAborted
 from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
-from texture_exploration.motions.path import STEADY_S, PathFollower, ramp_s, smooth
+from texture_exploration.motions.path import STEADY_S, Follower, smooth
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -123,9 +123,9 @@ class Accelerate(Stage):
     """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
 
     def __init__(
-        self, follower: PathFollower, speed_m_s: float, force_n: float, touch: TouchParams, limits: SafetyLimits
+        self, follower: Follower, speed_m_s: float, force_n: float, touch: TouchParams, limits: SafetyLimits
     ) -> None:
-        self._ramp_s = ramp_s(speed_m_s, touch.acceleration_m_s2)
+        self._ramp_s = touch.ramp_s(speed_m_s)
         super().__init__(
             Phase.CONTACT,
             self._ramp_s + limits.contact_timeout_s,
@@ -138,7 +138,7 @@ class Accelerate(Stage):
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp, then wait for the arm to follow."""
-        self._follower.update(arm)
+        self._follower.update(time_ns, arm)
         elapsed_s = self.elapsed_s(time_ns)
         if elapsed_s >= self._ramp_s + STEADY_S and self._reached(arm):
             return None
@@ -155,8 +155,8 @@ class Accelerate(Stage):
 class Slide(Stage):
     """Keep speed and force for the length of the path."""
 
-    def __init__(self, follower: PathFollower, speed_m_s: float, force_n: float, limits: SafetyLimits) -> None:
-        planned_s = follower.path.length_m / speed_m_s
+    def __init__(self, follower: Follower, speed_m_s: float, force_n: float, limits: SafetyLimits) -> None:
+        planned_s = follower.length_m / speed_m_s
         super().__init__(Phase.SLIDE, planned_s + limits.slide_overtime_s, 'the slide to end')
         self._follower = follower
         self._speed_m_s = speed_m_s
@@ -165,6 +165,11 @@ class Slide(Stage):
         self._promised_ns = 0
         self._finish = False
         self.progress = 0.0
+
+    @property
+    def direction_rad(self) -> float:
+        """Present direction of travel."""
+        return self._follower.direction_rad
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """The slide counts from here."""
@@ -177,20 +182,20 @@ class Slide(Stage):
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Keep on sliding, and promise how long."""
-        self._follower.update(arm)
+        self._follower.update(time_ns, arm)
         left_s = self._left_s(time_ns, arm)
         # Anything shorter than a microsecond is rounding, not sliding.
         if left_s < 1e-6:
             self.steady_s = 0.0
             return None
-        self.steady_s = min(PROMISE_S, left_s)
+        self.steady_s = min(PROMISE_S, left_s, self._follower.steady_m / self._speed_m_s)
         self._promised_ns = max(self._promised_ns, time_ns + int(self.steady_s * 1e9))
         return ArmCommand(self._follower.velocity(self._speed_m_s), force_n=self._force_n)
 
     def _left_s(self, time_ns: int, arm: ArmState) -> float:
         age_s = max(0.0, (time_ns - arm.time_ns) * 1e-9)
         slid_m = self._follower.travelled_m - self._start_m + self._speed_m_s * age_s
-        length_m = self._follower.path.length_m
+        length_m = self._follower.length_m
         self.progress = min(1.0, slid_m / length_m)
         by_length = (length_m - slid_m) / self._speed_m_s
         return min(by_length, (self._promised_ns - time_ns) * 1e-9) if self._finish else by_length
@@ -200,17 +205,17 @@ class Brake(Stage):
     """Lose speed smoothly along the path, still pressing: a finger that lifts at speed is plucked off."""
 
     def __init__(
-        self, follower: PathFollower, speed_m_s: float, force_n: float, touch: TouchParams, limits: SafetyLimits
+        self, follower: Follower, speed_m_s: float, force_n: float, touch: TouchParams, limits: SafetyLimits
     ) -> None:
         super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to come to rest')
         self._follower = follower
         self._speed_m_s = speed_m_s
         self._force_n = force_n
-        self._ramp_s = ramp_s(speed_m_s, touch.acceleration_m_s2)
+        self._ramp_s = touch.ramp_s(speed_m_s)
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp down."""
-        self._follower.update(arm)
+        self._follower.update(time_ns, arm)
         share = self.elapsed_s(time_ns) / self._ramp_s
         if share >= 1.0:
             return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from texture_core.parameters import param
+from texture_exploration.motions.path import ramp_s
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,14 @@ class TouchParams:
     force_tolerance: float = param(0.1, 'The force has settled within this share.', low=0.01, high=0.5)
     speed_tolerance: float = param(0.05, 'The speed is reached within this share.', low=0.005, high=0.5)
     settle_s: float = param(0.1, 'So long the force must stay within its tolerance.', unit='s', low=0.0, high=2.0)
-    acceleration_m_s2: float = param(1.0, 'Highest acceleration along the surface.', unit='m/s²', low=0.05, high=10.0)
+    acceleration_m_s2: float = param(
+        1.0, 'Highest acceleration when gaining or losing speed along the surface.', unit='m/s²', low=0.05, high=10.0
+    )
+    jerk_m_s3: float = param(50.0, 'Highest jerk of the same.', unit='m/s³', low=1.0, high=1000.0)
+    arm_lag_s: float = param(0.005, 'The arm follows a command after.', unit='s', low=0.0, high=0.1)
     lift_speed_m_s: float = param(0.05, 'Speed away from the surface.', unit='m/s', low=0.005, high=0.5)
     clearance_m: float = param(0.005, 'The finger is lifted at least so far.', unit='m', low=0.001, high=0.1)
+
+    def ramp_s(self, speed_m_s: float) -> float:
+        """Return how long it takes to gain or lose a speed."""
+        return ramp_s(speed_m_s, self.acceleration_m_s2, self.jerk_m_s3)

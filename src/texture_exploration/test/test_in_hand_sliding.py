@@ -1,0 +1,51 @@
+import itertools
+
+import pytest
+
+from texture_core.errors import MotionRefused
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_exploration.motions.in_hand_sliding import in_hand_sliding
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+RUB = ExplorationRequest('in_hand_sliding')
+
+
+def sliding(table):
+    return [(s, p) for s, p in zip(table.states, table.places, strict=True) if s.phase is Phase.SLIDE]
+
+
+def test_two_seconds_of_sliding_stay_within_the_stroke(table):
+    assert table.explore(RUB).success
+    states = [state for state, _ in sliding(table)]
+    assert (states[-1].stamp_ns - states[0].stamp_ns) * 1e-9 == pytest.approx(2.0, abs=0.05)
+    along = [place[0] for place in table.places]
+    assert min(along) == pytest.approx(0.0, abs=0.0005)
+    assert max(along) == pytest.approx(0.02, abs=0.0005)
+
+
+def test_nothing_is_promised_for_a_turn(table):
+    table.explore(RUB)
+    promised = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
+    slow = [s.stamp_ns for s, _ in sliding(table) if abs(s.speed_m_s - 0.02) > 0.0005]
+    assert len(slow) >= 5
+    assert not any(begin <= stamp < end for stamp in slow for begin, end in promised if end > begin)
+
+
+def test_the_direction_alternates(table):
+    table.explore(RUB)
+    directions = [round(abs(state.direction_rad), 3) for state, _ in sliding(table)]
+    assert set(directions) == {0.0, 3.142}
+
+
+def test_no_turn_exceeds_the_acceleration(table):
+    table.explore(ExplorationRequest('in_hand_sliding', speed_m_s=0.1, distance_m=0.08))
+    velocities = [(s.stamp_ns, p) for s, p in sliding(table)]
+    speeds = [(b[1][0] - a[1][0]) / ((b[0] - a[0]) * 1e-9) for a, b in itertools.pairwise(velocities)]
+    assert max(abs(b - a) / 0.02 for a, b in itertools.pairwise(speeds)) < 1.1
+
+
+def test_a_stroke_too_short_to_turn_is_refused():
+    request = ExplorationRequest('in_hand_sliding', speed_m_s=0.1, distance_m=0.01)
+    with pytest.raises(MotionRefused, match=r'the length of a stroke, is 0\.01; allowed is 0\.0'):
+        in_hand_sliding(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())

@@ -1,0 +1,51 @@
+import math
+from pathlib import Path
+
+import pytest
+
+from texture_core.errors import InvalidParameter, UnknownName
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.presets import load_preset, read_preset
+from texture_exploration.safety import SafetyLimits
+
+PRESETS = sorted(path.stem for path in (Path(__file__).parent.parent / 'config' / 'presets').glob('*.yaml'))
+
+
+@pytest.mark.parametrize('name', PRESETS)
+def test_every_motion_of_a_preset_can_be_planned_with_all_defaults(name):
+    preset = load_preset(name)
+    assert preset.paper
+    for request in preset.requests:
+        MOTIONS[request.motion](request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
+
+
+def test_the_first_paper_slid_at_three_speeds_and_three_forces_half_a_second_each():
+    preset = load_preset('ets-linear')
+    assert len(preset.requests) == 9
+    assert len(preset.all()) == 450
+    assert {round(request.distance_m / request.speed_m_s, 9) for request in preset.requests} == {0.5}
+    assert max(request.distance_m for request in preset.requests) == pytest.approx(0.1)
+
+
+def test_rounds_go_through_all_headings_before_they_repeat():
+    headings = [math.degrees(request.direction_rad) for request in load_preset('ets-circular').all(2)]
+    assert headings == pytest.approx([0, 30, 45, 90] * 2)
+
+
+def test_a_mistake_in_a_preset_is_told_with_its_place():
+    slide = {'motion': 'linear_slide'}
+    with pytest.raises(UnknownName, match="did you mean 'ets-linear'"):
+        load_preset('ets-linea')
+    with pytest.raises(UnknownName, match="did you mean 'linear_slide'"):
+        read_preset({'motion': 'linear_slid'}, 'mine')
+    with pytest.raises(InvalidParameter, match="preset 'mine': no key 'sped_m_s'; did you mean 'speed_m_s'"):
+        read_preset({**slide, 'sped_m_s': 1.0}, 'mine')
+    with pytest.raises(InvalidParameter, match="'force_n' is 'hard'; a number is needed"):
+        read_preset({**slide, 'force_n': 'hard'}, 'mine')
+    with pytest.raises(InvalidParameter, match='a list of numbers is needed'):
+        read_preset({**slide, 'vary': {'force_n': 2.0}}, 'mine')
+    with pytest.raises(InvalidParameter, match="'slide_s' needs 'speed_m_s'"):
+        read_preset({**slide, 'slide_s': 1.0}, 'mine')
+    with pytest.raises(InvalidParameter, match="'repeats' is 0"):
+        read_preset({**slide, 'repeats': 0}, 'mine')

@@ -1,0 +1,135 @@
+"""Rub a surface to and fro with a fingertip, as the free fingers of a hand do on what the others hold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from texture_core.errors import MotionRefused
+from texture_core.exploration import ExplorationRequest
+from texture_exploration.arms.protocol import ArmState, Vector
+from texture_exploration.motions.path import ramps_m
+from texture_exploration.motions.protocol import Motion
+from texture_exploration.motions.slide_over import slide_over
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+DEFAULT_SPEED_M_S = 0.02
+DEFAULT_FORCE_N = 1.0
+DEFAULT_STROKE_M = 0.02  # about what a fingertip reaches
+DEFAULT_DURATION_S = 2.0  # Kaboli et al. 2015
+TURN_MARGIN_S = 0.01  # a promise of steady speed ends one step before the turn
+
+
+class Strokes:
+    """Steer a finger to and fro on a line; a `Follower`.
+
+    A turn follows a cosine from full speed one way to full speed the other way, so the finger neither stops with a jolt
+    nor rests.
+
+    Parameters
+    ----------
+    heading_rad, stroke_m
+        Direction of the first stroke, and the way from turn to turn.
+    speed_m_s
+        Between the turns.
+    turn_s
+        How long a turn takes.
+    length_m
+        The way of all strokes together as if it had no turns: a turn counts as long as it takes.
+    """
+
+    def __init__(self, heading_rad: float, stroke_m: float, speed_m_s: float, turn_s: float, length_m: float) -> None:
+        self.length_m = length_m
+        self.travelled_m = 0.0
+        self._heading_rad = heading_rad
+        self._speed_m_s = speed_m_s
+        self._turn_s = turn_s
+        runs_on_m = speed_m_s * turn_s / math.pi  # until it stands: the integral of the cosine over half a turn
+        self._low_m, self._high_m = runs_on_m, stroke_m - runs_on_m
+        self._forth = True
+        self._along_m = 0.0
+        self._age_m = 0.0
+        self._turning_s = math.nan  # since the turn began; NaN between turns
+        self._time_ns = 0
+        self._origin: tuple[float, float] | None = None
+
+    @property
+    def direction_rad(self) -> float:
+        """Present direction of travel."""
+        forth = self._forth if math.isnan(self._turning_s) else self._forth is (self._turning_s > 0.5 * self._turn_s)
+        return math.remainder(self._heading_rad + (0.0 if forth else math.pi), 2 * math.pi)
+
+    @property
+    def steady_m(self) -> float:
+        """The way left until the finger turns; none while it does."""
+        if not math.isnan(self._turning_s):
+            return 0.0
+        left = self._high_m - self._along_m if self._forth else self._along_m - self._low_m
+        return max(0.0, left - self._age_m - TURN_MARGIN_S * self._speed_m_s)
+
+    def update(self, time_ns: int, arm: ArmState) -> None:
+        """Take note of where the finger is, and turn at the end of the stroke."""
+        x, y, _ = arm.position
+        if self._origin is None:
+            self._origin, self._time_ns = (x, y), time_ns
+        cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
+        along = (x - self._origin[0]) * cos + (y - self._origin[1]) * sin
+        passed_s = (time_ns - self._time_ns) * 1e-9
+        straight = math.isnan(self._turning_s)
+        self.travelled_m += abs(along - self._along_m) if straight else self._speed_m_s * passed_s
+        self._along_m = along
+        self._age_m = self._speed_m_s * max(0.0, (time_ns - arm.time_ns) * 1e-9)
+        self._turn(passed_s)
+        self._time_ns = time_ns
+
+    def velocity(self, speed_m_s: float) -> tuple[float, float]:
+        """Return the velocity for a speed, m/s; less than it while turning."""
+        turned = 1.0 if math.isnan(self._turning_s) else -math.cos(math.pi * self._turning_s / self._turn_s)
+        along = speed_m_s * (turned if self._forth else -turned)
+        return along * math.cos(self._heading_rad), along * math.sin(self._heading_rad)
+
+    def _turn(self, passed_s: float) -> None:
+        self._turning_s += passed_s
+        if self._turning_s >= self._turn_s:
+            self._turning_s = math.nan
+        beyond = self._along_m > self._high_m if self._forth else self._along_m < self._low_m
+        if math.isnan(self._turning_s) and beyond:
+            self._forth, self._turning_s = not self._forth, 0.0
+
+
+def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
+    """Plan strokes of `distance_m` to and fro, for `duration_s`.
+
+    Which fingers slide and which hold is the hand's business (`texture_exploration.arms.in_hand`).
+
+    Raises
+    ------
+    MotionRefused
+        If a number is out of its range, does not belong to this motion, or a stroke leaves the workspace.
+    """
+    request = replace(
+        request,
+        speed_m_s=request.speed_m_s or DEFAULT_SPEED_M_S,
+        force_n=request.force_n or DEFAULT_FORCE_N,
+        distance_m=request.distance_m or DEFAULT_STROKE_M,
+        duration_s=request.duration_s or DEFAULT_DURATION_S,
+    )
+    limits.check(request, ('speed_m_s', 'force_n', 'distance_m', 'duration_s'))
+    limits.refuse_unused(request, ('radius_m', 'turns'))
+    limits.check_direction(request)
+    speed = request.speed_m_s
+    turn_s = touch.ramp_s(2 * speed)
+    _check_stroke(request, home, limits, least_m=ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s)
+    strokes = Strokes(request.direction_rad, request.distance_m, speed, turn_s, speed * request.duration_s)
+    return slide_over(strokes, request, home, touch, limits)
+
+
+def _check_stroke(request: ExplorationRequest, home: Vector, limits: SafetyLimits, least_m: float) -> None:
+    room = limits.room_m(home, request.direction_rad)
+    if not least_m <= request.distance_m <= room:
+        raise MotionRefused(
+            f'{request.motion}: distance_m, the length of a stroke, is {request.distance_m:g}; allowed is '
+            f'{math.ceil(least_m * 1e4) / 1e4:g} m, to turn at this speed, to {math.floor(room * 1e3) / 1e3:g} m, the '
+            'end of the workspace'
+        )

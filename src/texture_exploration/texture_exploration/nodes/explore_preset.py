@@ -1,0 +1,69 @@
+"""Ask the explorer for every motion of a preset, one after the other."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rclpy.node import Node
+from texture_msgs import srv
+
+from texture_core.parameters import param
+from texture_core.ros.conversions import request_to_msg
+from texture_core.ros.parameters import declare
+from texture_core.ros.run import run
+from texture_exploration.presets import load_preset
+
+LOOK_S = 0.1
+
+
+@dataclass(frozen=True)
+class ExplorePresetParams:
+    """Which motions are made on what."""
+
+    preset: str = param('ets-linear', 'Preset that the package ships, or path of a preset file.')
+    surface: str = param('', 'True name of the surface, if known; it labels a recording.')
+    repeats: int = param(0, 'Rounds through all combinations; 0: as many as the preset says.', low=0, high=10000)
+
+
+class ExplorePreset(Node):
+    """A client of the service `explore`; its process ends when all is done, with 0 if all went well."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('explore_preset', **kwargs)
+        params = declare(self, ExplorePresetParams)
+        preset = load_preset(params.preset)
+        requests = preset.all(params.repeats)
+        self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0)
+        self._ahead = [replace(request, surface=params.surface) for request in requests]
+        self._total = len(self._ahead)
+        self._busy = False
+        self._client = self.create_client(srv.Explore, 'explore')
+        self._timer = self.create_timer(LOOK_S, self._go_on)
+        self.get_logger().info(f"preset '{preset.name}': {self._total} explorations; {preset.paper}")
+
+    def _go_on(self) -> None:
+        """Ask for the next one; until the explorer is there, look again later."""
+        if self._busy or not self._client.service_is_ready():
+            return
+        if not self._ahead:
+            self.get_logger().info(f'ended: {dict(self.counts)}')
+            sys.exit(0 if self.counts['done'] == self._total else 1)
+        self._busy = True
+        request = request_to_msg(self._ahead.pop(0), srv.Explore.Request)
+        self._client.call_async(request).add_done_callback(self._on_answer)
+
+    def _on_answer(self, future: Any) -> None:
+        answer = future.result()
+        kind = 'done' if answer.success else 'aborted' if answer.exploration_id else 'refused'
+        self.counts[kind] += 1
+        number = self._total - len(self._ahead)
+        self.get_logger().info(f'{number} of {self._total}, {kind}: {answer.exploration_id} {answer.message}')
+        self._busy = False
+
+
+def main() -> None:
+    """Run the node."""
+    run(ExplorePreset)

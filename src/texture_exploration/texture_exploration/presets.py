@@ -1,0 +1,109 @@
+"""A preset: the motions of a paper or of your own, as a list of requests from one YAML file.
+
+paper: where the numbers come from
+motion: linear_slide
+force_n: 2.5                    # any number of the request; 'direction_deg' and, for a slide, 'slide_s' as well
+vary: {speed_m_s: [0.1, 0.2]}   # every combination is made
+repeats: 50                     # how often each combination was made
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from texture_core.catalogue import find, unknown
+from texture_core.errors import InvalidParameter
+from texture_core.exploration import ExplorationRequest
+from texture_core.resources import find_file
+from texture_exploration.motions.catalogue import MOTIONS
+
+KEYS = ('paper', 'motion', 'repeats', 'vary')
+NUMBERS = tuple(name for name, kind in typing.get_type_hints(ExplorationRequest).items() if kind is float)
+SHORTHANDS = ('direction_deg', 'slide_s')
+
+
+@dataclass(frozen=True)
+class Preset:
+    """What a preset file says.
+
+    Parameters
+    ----------
+    requests
+        Each combination once.
+    repeats
+        How often each is to be made.
+    """
+
+    name: str
+    paper: str
+    requests: tuple[ExplorationRequest, ...]
+    repeats: int
+
+    def all(self, repeats: int = 0) -> list[ExplorationRequest]:
+        """Return all requests in turn, each combination once per round; `repeats` of 0 means the preset's own."""
+        return list(self.requests) * (repeats or self.repeats)
+
+
+def load_preset(name_or_path: str) -> Preset:
+    """Return a preset that the package ships (config/presets), or of a file.
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        With the nearest name, or the place in the file and what is allowed there.
+    """
+    path = find_file(name_or_path, 'texture_exploration', 'config/presets', 'preset')
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except yaml.YAMLError as error:
+        raise InvalidParameter(f"preset '{path.stem}' is no YAML: {error}") from error
+    if not isinstance(content, Mapping):
+        raise InvalidParameter(f"preset '{path.stem}': came {content!r}; a mapping with a motion is needed")
+    return read_preset(content, path.stem)
+
+
+def read_preset(content: Mapping[str, Any], name: str) -> Preset:
+    """Return the preset in what a preset file holds; raises as `load_preset`."""
+    where = f"preset '{name}'"
+    vary = content.get('vary', {})
+    given = {key: value for key, value in content.items() if key not in KEYS}
+    for key in (*given, *vary):
+        if key not in (*NUMBERS, *SHORTHANDS):
+            raise InvalidParameter(f'{where}: {unknown(str(key), (*KEYS, *NUMBERS, *SHORTHANDS), "key")}')
+    motion = str(content.get('motion', ''))
+    find(MOTIONS, motion, 'motion')
+    repeats = content.get('repeats', 1)
+    if not isinstance(repeats, int) or repeats < 1:
+        raise InvalidParameter(f"{where}: 'repeats' is {repeats!r}; a whole number of at least 1 is needed")
+    requests = [
+        _request(motion, {**given, **dict(zip(vary, values, strict=True))}, where)
+        for values in itertools.product(*(_sequence(key, value, where) for key, value in vary.items()))
+    ]
+    return Preset(name, str(content.get('paper', '')), tuple(requests), repeats)
+
+
+def _request(motion: str, numbers: Mapping[str, Any], where: str) -> ExplorationRequest:
+    for key, value in numbers.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise InvalidParameter(f"{where}: '{key}' is {value!r}; a number is needed")
+    values: dict[str, Any] = {key: float(value) for key, value in numbers.items() if key not in SHORTHANDS}
+    if 'direction_deg' in numbers:
+        values['direction_rad'] = math.radians(numbers['direction_deg'])
+    if 'slide_s' in numbers:
+        if 'speed_m_s' not in values:
+            raise InvalidParameter(f"{where}: 'slide_s' needs 'speed_m_s', to tell how far to slide")
+        values['distance_m'] = values['speed_m_s'] * numbers['slide_s']
+    return ExplorationRequest(motion, **values)
+
+
+def _sequence(key: str, values: Any, where: str) -> Sequence[Any]:
+    if not isinstance(values, list) or not values:
+        raise InvalidParameter(f"{where}: 'vary' gives {values!r} for '{key}'; a list of numbers is needed")
+    return values
