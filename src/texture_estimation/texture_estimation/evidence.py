@@ -81,7 +81,7 @@ class Evidence:
                 model=model.name if model else '',
                 message=self._message or (NO_WINDOW if final else ''),
             )
-        # Overlapping windows are worth only the sliding time that they add.
+        # Windows count alike, as the first of a slide is the least typical; together they are worth their sliding time.
         worth = self._evidence_ns / self._window_ns
         mean = self._sum / self._windows
         probabilities = np.exp(model.recipe.evidence.log_posterior(mean, worth, model.growth))
