@@ -137,11 +137,13 @@ def test_a_bad_line_costs_samples_and_every_one_is_counted(bench: Bench, sensor:
     assert (batches[-1].first_sample - batches[0].first_sample) / 1000 == pytest.approx(span_s, abs=0.01)
 
 
-def test_a_mute_device_is_woken(bench: Bench, sensor: Tsf85) -> None:
-    read(sensor, 200)
-    bench.tsf85.mute = True
+def test_a_device_that_is_silent_after_opening_is_woken(bench: Bench, tmp_path: Path) -> None:
+    bench.tsf85.deaf_starts = 3  # the one of opening and two more
+    sensor = Tsf85(SensorParams(device=str(tmp_path / 'tsf85')))
+    sensor.open()
     read(sensor, 300)
-    assert sensor.counts['revived'] >= 1
+    sensor.close()
+    assert (sensor.counts['revived'], sensor.counts['reopened']) == (3, 0)
 
 
 def test_the_second_finger_and_old_firmware_are_understood(tmp_path: Path) -> None:

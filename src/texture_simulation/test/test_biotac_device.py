@@ -16,7 +16,7 @@ from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.biotac.tables import LAYOUTS
 from texture_drivers.params import SensorParams
 from texture_simulation.devices.biotac import BoardFaults, EmulatedBioTac
-from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.faults import ByteFaults, FrameFaults
 
 FRAME_S = 0.01
 DEADLINE_S = 30.0
@@ -140,7 +140,7 @@ def test_bytes_lost_added_or_changed_never_become_samples(
     rig, sensor = make_rig(), make_sensor()
     collect(sensor, 22)
     with rig.lock:
-        rig.device.line_faults = faults
+        rig.device.faults = faults
     batches = collect(sensor, 4000)
     assert len(set(offsets(batches))) == 1
     assert sensor.counts['bogus'] > 0
@@ -167,7 +167,7 @@ def test_frames_left_out_or_sent_twice_are_counted(
     rig, sensor = make_rig(), make_sensor()
     collect(sensor, 22)
     with rig.lock:
-        rig.device.board_faults = BoardFaults(skip=0.1, duplicate=0.1)
+        rig.device.frame_faults = FrameFaults(skip=0.1, duplicate=0.1)
     batches = collect(sensor, 4000)
     assert len(set(offsets(batches))) == 1
     assert lost_samples(batches) > 0

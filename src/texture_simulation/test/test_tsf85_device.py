@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.faults import ByteFaults, FrameFaults
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 
 TEN_MS = np.arange(10, dtype=np.int16)
@@ -47,7 +47,7 @@ def test_it_streams_from_start_to_stop_only(device: EmulatedTsf85, host: Host) -
     assert host.read() == b''
     os.write(host.end, START)
     device.advance(TEN_MS, NO_IMAGE)
-    assert host.read().count(b'\x9a\x00\x58') == 11  # ten milliseconds and the image
+    assert host.read().count(b'\x9a\x00\x58') == 10
     os.write(host.end, STOP)
     device.advance(TEN_MS, NO_IMAGE)
     assert host.read() == b''
@@ -79,16 +79,37 @@ def test_unplugging_breaks_the_port_and_removes_the_link(device: EmulatedTsf85, 
     assert not device.streaming
 
 
-def test_a_mute_device_speaks_after_a_new_start(device: EmulatedTsf85, host: Host) -> None:
-    os.write(host.end, START)
-    device.advance(TEN_MS, NO_IMAGE)
-    host.read()
+def test_after_an_unclean_end_it_takes_several_starts(device: EmulatedTsf85, host: Host) -> None:
+    device.deaf_starts = 2
+    came = []
+    for _ in range(3):
+        os.write(host.end, STOP + START)
+        device.advance(TEN_MS, NO_IMAGE)
+        came.append(bool(host.read()))
+    assert came == [False, False, True]
+
+
+def test_a_mute_device_says_nothing_whatever_it_hears(device: EmulatedTsf85, host: Host) -> None:
     device.mute = True
-    device.advance(TEN_MS, NO_IMAGE)
-    assert host.read() == b''
     os.write(host.end, STOP + START)
     device.advance(TEN_MS, NO_IMAGE)
-    assert host.read()
+    assert host.read() == b''
+
+
+def test_packets_are_left_out_sent_twice_and_held_back(device: EmulatedTsf85, host: Host) -> None:
+    os.write(host.end, START)
+    device.frame_faults = FrameFaults(skip=1.0)
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read() == b''
+    device.frame_faults = FrameFaults(duplicate=1.0)
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read().count(b'\x9a\x00\x58') == 20
+    device.frame_faults, device.stalled = FrameFaults(), True
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read() == b''
+    device.stalled = False
+    device.advance(TEN_MS, NO_IMAGE)
+    assert host.read().count(b'\x9a\x00\x58') == 20
 
 
 def test_a_file_in_the_place_of_the_link_is_left_alone(tmp_path: Path) -> None:

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from texture_core.parameters import param
-from texture_simulation.devices.biotac_encoder import Bytes, Values, encode_replies, reply_frame, serials_frame
-from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.biotac_encoder import VERSION, Bytes, Values, encode_replies, reply_frame, serials_frame
+from texture_simulation.devices.faults import ByteFaults, FrameFaults
 from texture_simulation.devices.pty_port import PtyPort
 
 SLOT_US = 1e6 / 4400
 FRAMES_PER_SERIALS = 100
+WRONG_VERSION = 99
 
 
 @dataclass(frozen=True)
@@ -22,8 +23,6 @@ class BoardFaults:
     """What goes wrong before the bridge's check sum is made."""
 
     flip: float = param(0.0, 'Probability that one bit of a byte on the SPI bus is changed.', low=0.0, high=1.0)
-    skip: float = param(0.0, 'Probability that the bridge does not send a frame.', low=0.0, high=1.0)
-    duplicate: float = param(0.0, 'Probability that the bridge sends a frame twice.', low=0.0, high=1.0)
 
 
 class EmulatedBioTac:
@@ -44,10 +43,12 @@ class EmulatedBioTac:
     def __init__(
         self, link: Path, rng: np.random.Generator, serials: Sequence[str] = ('BT-2P-02.2.0-B-11-E-00-04',)
     ) -> None:
-        self.line_faults = ByteFaults()
+        self.faults = ByteFaults()
+        self.frame_faults = FrameFaults()
         self.board_faults = BoardFaults()
-        self.mute = False  # open but silent
-        self.stalled = False  # keeps what it samples, and sends it all at once when it goes on
+        self.mute = False
+        self.stalled = False
+        self.wrong_firmware = False
         self._port = PtyPort(link)
         self._rng = rng
         self._serials = serials
@@ -59,6 +60,11 @@ class EmulatedBioTac:
     def plugged(self) -> bool:
         """Whether the device is there."""
         return self._port.plugged
+
+    @property
+    def streaming(self) -> bool:
+        """Whether it sends."""
+        return self.plugged and not self.mute
 
     @property
     def dropped_bytes(self) -> int:
@@ -88,24 +94,21 @@ class EmulatedBioTac:
         """
         replies = self._disturb(encode_replies(values, self._absent))
         data = b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(values, replies, strict=True))
-        if not self.plugged or self.mute:
+        if not self.streaming:
             return
         self._kept += data
         if not self.stalled:
-            self._port.write(self.line_faults.apply(self._kept, self._rng))
+            self._port.write(self.faults.apply(self._kept, self._rng))
             self._kept = b''
 
     def _sent(self, values: Values, reply: bytes) -> bytes:
         """Return the bytes that one frame becomes."""
         time_us = round(self._frames * len(values) * SLOT_US)
-        data = reply_frame(self._frames, time_us, values, reply)
+        data = reply_frame(self._frames, time_us, values, reply, WRONG_VERSION if self.wrong_firmware else VERSION)
         serials_sent, turn = divmod(self._frames, FRAMES_PER_SERIALS)
         self._frames += 1
-        if self._rng.random() < self.board_faults.skip:
-            return b''
-        if self._rng.random() < self.board_faults.duplicate:
-            return data * 2
-        return data if turn else serials_frame(serials_sent, time_us, self._serials) + data
+        sent = self.frame_faults.apply(data, self._rng)
+        return sent if turn else serials_frame(serials_sent, time_us, self._serials) + sent
 
     def _disturb(self, replies: Bytes) -> Bytes:
         """Return replies with flipped bits."""

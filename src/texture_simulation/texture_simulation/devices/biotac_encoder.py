@@ -59,10 +59,10 @@ def encode_replies(values: Values, absent: Sequence[int] = ()) -> Bytes:
     return replies.reshape(n_frames, n_slots * (2 + 2 * n_fingers))
 
 
-def reply_frame(sequence: int, time_us: int, values: Values, reply: bytes) -> bytes:
+def reply_frame(sequence: int, time_us: int, values: Values, reply: bytes, version: int = VERSION) -> bytes:
     """Return one reply on the wire; `values`, (n_slots, n_fingers), are what it holds."""
     rows, columns = values.shape
-    return _frame(struct.pack('<cBHIBB', b'B', VERSION, sequence % 2**16, time_us % 2**32, rows, columns) + reply)
+    return _frame(struct.pack('<cBHIBB', b'B', version, sequence % 2**16, time_us % 2**32, rows, columns) + reply)
 
 
 def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:

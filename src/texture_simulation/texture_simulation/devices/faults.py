@@ -1,4 +1,4 @@
-"""Bytes lost, added and changed on the way."""
+"""What goes wrong on the way: with bytes, and with whole frames."""
 
 from __future__ import annotations
 
@@ -27,3 +27,17 @@ class ByteFaults:
         values = values[rng.random(len(values)) >= self.drop]
         places = np.flatnonzero(rng.random(len(values)) < self.insert)
         return np.insert(values, places, rng.integers(0, 256, len(places), dtype=np.uint8)).tobytes()
+
+
+@dataclass(frozen=True)
+class FrameFaults:
+    """What goes wrong with whole frames or packets."""
+
+    skip: float = param(0.0, 'Probability that a frame is made and not sent.', low=0.0, high=1.0)
+    duplicate: float = param(0.0, 'Probability that a frame is sent twice.', low=0.0, high=1.0)
+
+    def apply(self, frame: bytes, rng: np.random.Generator) -> bytes:
+        """Return what is sent of a frame."""
+        if rng.random() < self.skip:
+            return b''
+        return frame * 2 if rng.random() < self.duplicate else frame

@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.parameters import param
 from texture_simulation.devices.biotac_encoder import stuff
-from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.faults import ByteFaults, FrameFaults
 from texture_simulation.devices.pty_port import PtyPort
 
 Counts = NDArray[np.int16]
 VERSION = 1
+WRONG_VERSION = 99
 MICROSECONDS = 1_000_000
 
 
@@ -33,14 +33,6 @@ class Sampled:
     rate_hz: float
     columns: int
     rows: int  # in a frame
-
-
-@dataclass(frozen=True)
-class FrameFaults:
-    """What goes wrong with whole frames."""
-
-    skip: float = param(0.0, 'Probability that a frame is made and not sent.', low=0.0, high=1.0)
-    duplicate: float = param(0.0, 'Probability that a frame is sent twice.', low=0.0, high=1.0)
 
 
 class EmulatedSampler:
@@ -65,6 +57,7 @@ class EmulatedSampler:
         self.frame_faults = FrameFaults()
         self.mute = False  # open but silent
         self.stalled = False  # keeps what it samples, and sends it all at once when it goes on
+        self.wrong_firmware = False
         self._port = PtyPort(link)
         self._rng = rng
         self._start_us = start_us
@@ -75,6 +68,11 @@ class EmulatedSampler:
     def plugged(self) -> bool:
         """Whether the device is there."""
         return self._port.plugged
+
+    @property
+    def streaming(self) -> bool:
+        """Whether it sends."""
+        return self.plugged and not self.mute
 
     @property
     def dropped_bytes(self) -> int:
@@ -119,7 +117,7 @@ class EmulatedSampler:
                 self._waiting[name] = self._waiting[name][rows:]
         if self.stalled:
             return
-        if self.plugged and not self.mute:
+        if self.streaming:
             self._port.write(self.faults.apply(self._kept, self._rng))
         self._kept = b''
 
@@ -128,15 +126,13 @@ class EmulatedSampler:
         stream, number = self._streams[name], self._frames[name]
         self._frames[name] += 1
         time_us = self._start_us + round(number * stream.rows * MICROSECONDS / stream.rate_hz)
-        data = encode(stream, number, time_us, counts)
-        if self._rng.random() < self.frame_faults.skip:
-            return b''
-        return data * 2 if self._rng.random() < self.frame_faults.duplicate else data
+        data = encode(stream, number, time_us, counts, WRONG_VERSION if self.wrong_firmware else VERSION)
+        return self.frame_faults.apply(data, self._rng)
 
 
-def encode(stream: Sampled, number: int, time_us: int, counts: Counts) -> bytes:
+def encode(stream: Sampled, number: int, time_us: int, counts: Counts, version: int = VERSION) -> bytes:
     """Return a frame on the wire; number and time wrap."""
     rows, columns = counts.shape
-    content = struct.pack('<BBHIBB', stream.kind, VERSION, number % 2**16, time_us % 2**32, rows, columns)
+    content = struct.pack('<BBHIBB', stream.kind, version, number % 2**16, time_us % 2**32, rows, columns)
     content += counts.astype('<i2').tobytes()
     return stuff(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF))) + b'\x00'

@@ -8,6 +8,7 @@ images every millisecond in packets of their own.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ RESTING_ROTATION = bytes(6)
 
 
 class Tsf85Encoder:
-    """Make the bytes of consecutive milliseconds; one finger feels, the other one and the inertial sensors rest.
+    """Make the packets of consecutive milliseconds; a finger that does not feel and the inertial sensors rest.
 
     Parameters
     ----------
@@ -39,8 +40,6 @@ class Tsf85Encoder:
         self._stamp_type = '>u8' if long_stamps else '>u2'
         self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
         self._stamp_at = slice(5, 5 + np.dtype(self._stamp_type).itemsize)
-        dynamic_at = self._stamp_at.stop + finger * 17 + 1
-        self._dynamic_at = slice(dynamic_at, dynamic_at + 2)
 
     def _resting_packet(self) -> bytes:
         items = b'\x70' + bytes(8 if self._long_stamps else 2)
@@ -51,28 +50,39 @@ class Tsf85Encoder:
         return bytes([0x9A, 0x00, 0x58, len(items)]) + items
 
     def encode(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> bytes:
-        """Return the bytes of some milliseconds.
+        """Return the bytes of some milliseconds; see `packets`."""
+        return b''.join(self.packets(first_ms, dynamic, image, image_is_new))
+
+    def packets(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> Iterator[bytes]:
+        """Yield the packets of some milliseconds.
 
         Parameters
         ----------
         first_ms
             The device's clock at the first of them.
-        dynamic : (n,)
-        image : (28,)
+        dynamic : (n,) or (n, 2)
+            Of the finger that feels, or of both.
+        image : (n_taxels,) or (2, n_taxels)
+            The same.
         image_is_new
             Whether it has changed since the last call.
         """
         rows = np.tile(self._template, (len(dynamic), 1))
         stamps = (first_ms + np.arange(len(dynamic))).astype(self._stamp_type)  # 16 bits wrap, as they do in the device
         rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
-        rows[:, self._dynamic_at] = dynamic.astype('>i2')[:, None].view(np.uint8)
-        return b''.join(self._interleave(rows, self._image_packet(image), image_is_new))
-
-    def _interleave(self, rows: Bytes, image: bytes, image_is_new: bool) -> Iterator[bytes]:
+        for finger, counts in self._by_finger(dynamic.T):
+            at = self._stamp_at.stop + finger * 17 + 1
+            rows[:, at : at + 2] = counts.astype('>i2')[:, None].view(np.uint8)
+        images = [_image_packet(finger, taxels) for finger, taxels in self._by_finger(image)]
         for number, row in enumerate(rows):
             if not self._long_stamps or (image_is_new and number == 0):
-                yield image
+                yield from images
             yield row.tobytes()
 
-    def _image_packet(self, image: Image) -> bytes:
-        return bytes([0x9A, 0x00, 0x58, 1 + 2 * TAXELS, 0x10 | self._finger << 2]) + image.astype('>u2').tobytes()
+    def _by_finger(self, values: NDArray[Any]) -> Iterator[tuple[int, NDArray[Any]]]:
+        """Yield finger and values of each that feels, (n,) or (2, n)."""
+        yield from [(self._finger, values)] if values.ndim == 1 else enumerate(values)
+
+
+def _image_packet(finger: int, taxels: NDArray[Any]) -> bytes:
+    return bytes([0x9A, 0x00, 0x58, 1 + 2 * len(taxels), 0x10 | finger << 2]) + taxels.astype('>u2').tobytes()
