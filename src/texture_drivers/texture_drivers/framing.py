@@ -16,7 +16,7 @@ from binascii import crc_hqx
 from struct import Struct
 from typing import NamedTuple
 
-from texture_drivers.cobs import stuff, unstuff
+from cobs import cobs
 
 HEADER = Struct('<BBHIBB')
 CRC = Struct('<H')
@@ -99,8 +99,11 @@ class Deframer:
 
 def unpack(piece: bytes) -> Frame | None:
     """Return the frame in what stood between two zero bytes, or None if it is damaged."""
-    raw = unstuff(piece)
-    if raw is None or len(raw) < HEADER.size + CRC.size:
+    try:
+        raw = cobs.decode(piece)
+    except cobs.DecodeError:
+        return None
+    if len(raw) < HEADER.size + CRC.size:
         return None
     checked = raw[: -CRC.size]
     if CRC.unpack(raw[-CRC.size :]) != (crc_hqx(checked, CRC_START),):
@@ -114,7 +117,7 @@ def pack(frame: Frame) -> bytes:
     sequence, time_us = frame.sequence % (1 << SEQUENCE_BITS), frame.time_us % (1 << TIME_BITS)
     header = HEADER.pack(frame.kind, frame.version, sequence, time_us, frame.rows, frame.columns)
     checked = header + frame.body
-    return stuff(checked + CRC.pack(crc_hqx(checked, CRC_START))) + DELIMITER
+    return bytes(cobs.encode(checked + CRC.pack(crc_hqx(checked, CRC_START)))) + DELIMITER
 
 
 class WrappingCounter:
