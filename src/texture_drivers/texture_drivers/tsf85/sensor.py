@@ -14,7 +14,7 @@ from texture_drivers.serial_port import SerialPort
 from texture_drivers.settings import load_settings
 from texture_drivers.tsf85 import tables
 from texture_drivers.tsf85.finger import Finger
-from texture_drivers.tsf85.protocol import PacketParser, start_command, stop_command
+from texture_drivers.tsf85.protocol import Packet, PacketParser, start_command, stop_command
 from texture_drivers.tsf85.sets import SetSplitter
 from texture_drivers.tsf85.settings import Tsf85Settings
 
@@ -69,6 +69,8 @@ class Tsf85:
             finger: Finger(layout, settings, params.static_rate_hz, params.frame_id) for finger in self._prefixes
         }
         self._serial = ''
+        self._last_packet: Packet | None = None
+        self._repeated = 0
         self._silent_reads = self._silent_bytes = 0
         self._opened = self._revived = self._revivals = 0
 
@@ -91,7 +93,7 @@ class Tsf85:
         time.sleep(self._params.batch_s)
         data = self._port.read()
         arrival_ns = self._now_ns()
-        packets = self._parser.feed(data)
+        packets = self._without_repeats(self._parser.feed(data))
         topics: dict[str, Sequence[TactileSignal]] = {}
         alive = False
         for number, finger in self._fingers.items():
@@ -120,6 +122,7 @@ class Tsf85:
             'lost': sum(cutter.lost for cutter in cutters),
             'bogus': self._parser.refused,
             'refused_bytes': self._parser.refused_bytes,
+            'repeated': self._repeated,
             'damaged_stamps': sum(finger.counter.damaged_stamps for finger in self._fingers.values()),
             'images': sum(cutter.images for cutter in cutters),
             'repeated_images': sum(cutter.repeated_images for cutter in cutters),
@@ -143,6 +146,17 @@ class Tsf85:
             for number, prefix in self._prefixes.items()
             for topic, rate in self._fingers[number].rates_hz.items()
         }
+
+    def _without_repeats(self, packets: Sequence[Packet]) -> list[Packet]:
+        """Leave out what came twice: the same to the last bit, stamp and all."""
+        once = []
+        for packet in packets:
+            if packet == self._last_packet and any(item.kind == tables.TIMESTAMP for item in packet.items):
+                self._repeated += 1
+            else:
+                once.append(packet)
+            self._last_packet = packet
+        return once
 
     def _watch_silence(self, port: SerialPort, alive: bool, n_bytes: int) -> None:
         """Wake a device that is open but silent; DeviceError when that does not help."""
