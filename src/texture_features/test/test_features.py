@@ -126,8 +126,9 @@ def test_bursts_lie_above_what_is_typical_and_a_steady_hum_does_not():
 
 
 def test_low_lines_tell_ridges_apart_that_share_a_band():
-    lines = [int(FEATURES['low_lines']()(windows(tone(hz)))[0].argmax()) for hz in (98.0, 106.0)]
-    assert lines == [24, 26]  # line k stands at (k + 1) · 1000 / 256 Hz
+    feature = FEATURES['low_lines'](points=256)
+    lines = [feature.names[int(feature(windows(tone(hz)))[0].argmax())] for hz in (98.0, 106.0)]
+    assert lines == ['25', '27']  # line k stands at k · 1000 / 256 Hz
 
 
 def test_hjorth_of_a_tone_is_its_power_and_angular_frequency():

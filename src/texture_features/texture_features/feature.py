@@ -11,9 +11,6 @@ import numpy as np
 from texture_core.arrays import Array, Samples
 from texture_core.errors import InvalidData
 
-# Far below the square of any sample, far above the smallest number.
-TINY = 1e-290
-
 
 @dataclass(frozen=True, eq=False)
 class Windows:
@@ -96,9 +93,3 @@ def slopes(rows: Array) -> Array:
     if rows.shape[-1] == 1:
         return np.zeros_like(rows)
     return rows[..., 1:] - rows[..., :-1]
-
-
-def ratio(above: Array, below: Array) -> Array:
-    """Return above / below for numbers that are 0 together; 0 / 0 is 0."""
-    quotient: Array = above / (below + TINY)
-    return quotient

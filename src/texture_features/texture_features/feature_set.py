@@ -150,11 +150,11 @@ class FeatureSet:
 
     def _values(self, inputs: Sequence[Windows]) -> Array:
         """Return the values of windows, (..., n_values)."""
-        blocks = [
-            block.reshape(*block.shape[:-2], -1)
-            for item, windows in zip(self.inputs, inputs, strict=True)
-            for block in [feature(windows) for _, feature in item.features]
-        ]
+        blocks = []
+        for item, windows in zip(self.inputs, inputs, strict=True):
+            for _, feature in item.features:
+                block = feature(windows)
+                blocks.append(block.reshape((*block.shape[:-2], -1)))
         return np.concatenate(blocks, axis=-1)
 
     def _vector(self, piece: CutWindow, layout: Layout, values: Array) -> FeatureVector:

@@ -23,9 +23,9 @@ class ArraySvm:
     mean, scale : (n_features,)
         Of the standardisation.
     vectors : (n_labels · width, n_features)
-        Standardised support vectors, label by label; twice their value, so that no factor is left for each window.
+        Standardised support vectors, label by label, times 2 gamma.
     squares : (n_labels · width,)
-        Square of the length of each support vector.
+        Square of the length of each support vector, times gamma.
     coefficients : (n_labels, n_labels - 1, width)
         0 for padding.
     intercepts : (n_pairs,)
@@ -59,11 +59,9 @@ class ArraySvm:
         """Return the decision value of each pair, (..., n_pairs); positive for its first label."""
         standard = (values - self.mean) / self.scale
         # |x - s|² = |x|² + |s|² - 2 x·s, one product with all support vectors
-        squares = np.add.reduce(standard * standard, axis=-1, keepdims=True)
+        squares = self.gamma * np.add.reduce(standard * standard, axis=-1, keepdims=True)
         exponents = self.vectors @ standard if standard.ndim == 1 else standard @ self.vectors.T
-        exponents -= self.squares
-        exponents -= squares
-        exponents *= self.gamma
+        exponents -= self.squares + squares
         kernel = np.exp(exponents, out=exponents)
         n_labels, rows, width = self.coefficients.shape
         parts = self.coefficients @ kernel.reshape(*kernel.shape[:-1], n_labels, width, 1)
@@ -88,13 +86,14 @@ def export(scaler: Any, svc: Any, coupling: PairCoupling) -> ArraySvm:
         coefficients[label, :, :count] = sign * svc.dual_coef_[:, start : start + count]
         start += count
     flat = vectors.reshape(-1, n_features)
+    gamma = float(svc.gamma)
     return ArraySvm(
         mean=np.asarray(scaler.mean_),
         scale=np.asarray(scaler.scale_),
-        vectors=2.0 * flat,
-        squares=(flat * flat).sum(axis=1),
+        vectors=2.0 * gamma * flat,
+        squares=gamma * (flat * flat).sum(axis=1),
         coefficients=coefficients,
         intercepts=sign * np.asarray(svc.intercept_),
-        gamma=float(svc.gamma),
+        gamma=gamma,
         coupling=coupling,
     )

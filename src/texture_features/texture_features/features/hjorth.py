@@ -9,7 +9,10 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows, power, ratio, slopes
+from texture_features.feature import Windows, power, slopes
+
+# Far below any deviation, far above the smallest number: 0 / 0 becomes 0.
+TINY = 1e-150
 
 
 @dataclass(frozen=True)
@@ -49,18 +52,15 @@ def hjorth(rows: Array) -> Array:
     Source: Hjorth 1970; Kaboli et al. 2015, eq. 1 to 3.
     """
     slope = slopes(rows)
-    activity = power(rows)
-    slope_power = _step_variance(rows, slope)
-    bend_power = _step_variance(slope, slopes(slope))
-    values = np.empty((*activity.shape, 3))
-    values[..., 0] = activity
-    values[..., 1] = np.sqrt(ratio(slope_power, activity))
-    values[..., 2] = np.sqrt(ratio(bend_power, slope_power))
-    values[..., 2] = ratio(values[..., 2], values[..., 1])
+    bend = slopes(slope)
+    values = np.empty((*rows.shape[:-1], 3))
+    values[..., 0] = power(rows)
+    values[..., 1] = power(slope)
+    values[..., 2] = power(bend)
+    # The mean of the steps is known from the first and the last sample.
+    values[..., 1] -= ((rows[..., -1] - rows[..., 0]) / slope.shape[-1]) ** 2
+    values[..., 2] -= ((slope[..., -1] - slope[..., 0]) / bend.shape[-1]) ** 2
+    roots = np.sqrt(np.maximum(values, 0.0))
+    values[..., 1:] = roots[..., 1:] / (roots[..., :2] + TINY)
+    values[..., 2] /= values[..., 1] + TINY
     return values
-
-
-def _step_variance(rows: Array, steps: Array) -> Array:
-    """Return the variance of the steps of rows; their mean is known from the first and the last sample."""
-    mean = (rows[..., -1] - rows[..., 0]) / steps.shape[-1]
-    return np.maximum(power(steps) - mean * mean, 0.0)

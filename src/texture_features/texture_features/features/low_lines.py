@@ -23,7 +23,7 @@ class LowLines:
     of_signal: ClassVar[bool] = True
 
     lines: int = param(32, 'Number of lines, from the first above 0 Hz.', low=1, high=512)
-    points: int = param(256, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
+    points: int = param(128, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
     floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
 
     @property
