@@ -1,4 +1,4 @@
-"""An arm without a robot: a kinematic finger over an elastic plane at z = 0."""
+"""An arm without a robot: a kinematic finger over an elastic surface; with a force mode of its own, or without."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import socket
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -13,6 +14,8 @@ from texture_core.errors import DeviceError
 from texture_core.finger import FingerState
 from texture_core.parameters import param
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+from texture_exploration.arms.simulated_surface import SimulatedSurface, SimulatedSurfaceParams
+from texture_exploration.force_control import ForceLoop, ForceLoopParams
 
 RATE_HZ = 250.0
 RESTING_PERIOD_S = 0.05  # a finger at rest is still reported, but costs next to nothing
@@ -20,12 +23,16 @@ STANDSTILL = ArmCommand()
 
 
 @dataclass(frozen=True)
-class SimulatedArmParams:
+class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams):
     """The simulated arm and the surface under it."""
+
+    force_mode: bool = param(
+        True, 'The arm controls forces itself, ideally; false: it knows velocities alone, and follows late.'
+    )
 
     stiffness_n_m: float = param(2000.0, 'Stiffness of finger and surface; 0: there is none.', unit='N/m', low=0.0)
     admittance_m_s_n: float = param(
-        0.01, 'Normal speed per force error of the force control.', unit='m/s/N', low=1e-4, high=1.0
+        0.01, "Normal speed per force error of the arm's own force mode.", unit='m/s/N', low=1e-4, high=1.0
     )
     start_height_m: float = param(0.01, 'Height of the finger at the start.', unit='m', low=0.0, high=0.2)
     command_timeout_s: float = param(0.1, 'A command holds so long.', unit='s', low=0.02, high=2.0)
@@ -33,7 +40,9 @@ class SimulatedArmParams:
 
 
 class SimulatedArm:
-    """A finger that follows velocities exactly and approaches a wanted force exponentially.
+    """A finger that follows velocities exactly and, if it has a force mode, approaches a wanted force exponentially.
+
+    Without a force mode the normal velocity comes into effect after `loop_delay_s`.
 
     Parameters
     ----------
@@ -43,6 +52,11 @@ class SimulatedArm:
         CLOCK_MONOTONIC in ns.
     own_thread
         Move by itself at 250 Hz once connected. If False, whoever owns the arm calls `step`.
+
+    Raises
+    ------
+    InvalidParameter
+        If the force control would be unstable.
     """
 
     Params = SimulatedArmParams
@@ -65,6 +79,9 @@ class SimulatedArm:
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._report = FingerReport(params.finger_port)
+        self._surface = SimulatedSurface(params, params.stiffness_n_m)
+        self._loop = None if params.force_mode else ForceLoop(params, 1 / RATE_HZ)
+        self._late = DelayedVelocity(params.loop_delay_s, clock())
 
     def connect(self) -> None:
         """Start to move in time; clears what was injected."""
@@ -126,21 +143,32 @@ class SimulatedArm:
         left_s = self._params.command_timeout_s + (given_ns - now_ns) * 1e-9
         moving_s = max(0.0, dt_s + min(0.0, left_s))
         (vx, vy), (x, y, z) = command.tangential_m_s, self._state.position
-        dz = self._normal_step(command, moving_s)
+        dz = self._late.way_m(now_ns) if self._loop else self._normal_step(command, moving_s)
         position = (x + vx * moving_s, y + vy * moving_s, z + dz)
         velocity: Vector = (vx, vy, dz / moving_s if moving_s > 0 else 0.0)
         if left_s < 0:
             velocity = (0.0, 0.0, 0.0)
+            command = STANDSTILL
             self._order = (STANDSTILL, now_ns)
-        self._state = ArmState(now_ns, position, velocity, self._force(position[2]), self._fault)
+        force_n = self._surface.force_n(position[0], position[2]) + self._push_n
+        self._state = ArmState(now_ns, position, velocity, force_n, self._fault)
+        if self._loop:
+            self._late.set(now_ns, self._normal_speed(self._loop, command, dt_s))
         self._report.send(self._state)
 
     @property
     def _resting(self) -> bool:
         return self._order[0] == STANDSTILL
 
-    def _force(self, height_m: float) -> float:
-        return self._params.stiffness_n_m * max(0.0, -height_m) + self._push_n
+    def _normal_speed(self, loop: ForceLoop, command: ArmCommand, dt_s: float) -> float:
+        """Return the velocity to ask for, of an arm without a force mode."""
+        height_m, force_n = self._state.position[2], self._state.force_n
+        speed_m_s = math.hypot(*command.tangential_m_s)
+        loop.feel(height_m, force_n, speed_m_s)
+        if command.force_n is None:
+            loop.restart()
+            return max(command.normal_m_s, -loop.closing_m_s(height_m))
+        return loop.velocity_m_s(command.force_n, height_m, force_n, speed_m_s, dt_s)
 
     def _normal_step(self, command: ArmCommand, dt_s: float) -> float:
         """Return the change of height in one step, m.
@@ -168,6 +196,31 @@ class SimulatedArm:
             now_ns = self._clock()
             self.step((now_ns - last_ns) * 1e-9)
             last_ns = now_ns
+
+
+class DelayedVelocity:
+    """A velocity that comes into effect late."""
+
+    def __init__(self, delay_s: float, now_ns: int) -> None:
+        self._delay_ns = round(delay_s * 1e9)
+        self._coming: deque[tuple[int, float]] = deque()
+        self._now = 0.0
+        self._done_ns = now_ns
+
+    def set(self, now_ns: int, velocity_m_s: float) -> None:
+        """Ask for a velocity."""
+        self._coming.append((now_ns + self._delay_ns, velocity_m_s))
+
+    def way_m(self, until_ns: int) -> float:
+        """Return how far it goes from the last time asked until now."""
+        way = 0.0
+        while self._coming and self._coming[0][0] <= until_ns:
+            begin_ns, velocity = self._coming.popleft()
+            way += self._now * max(0, begin_ns - self._done_ns) * 1e-9
+            self._done_ns, self._now = max(self._done_ns, begin_ns), velocity
+        way += self._now * (until_ns - self._done_ns) * 1e-9
+        self._done_ns = until_ns
+        return way
 
 
 class FingerReport:

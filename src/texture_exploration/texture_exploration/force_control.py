@@ -1,0 +1,261 @@
+"""Press with a wanted force by an arm that knows velocities alone.
+
+The contact is a spring: F = k·(h − z), with h the height of the untouched surface under the finger. Each period T the
+controller sets the normal velocity
+
+    u = −g·(e + ∫e dt / Ti) + dh/dt,    e = F_wanted − F,
+
+and it comes into effect after the loop delay. The feed-forward dh/dt is not the arm's own movement: z + F/k is h
+whatever the controller does, so its slope is a disturbance that is observed, and adds no loop as far as k is right.
+k is estimated while the finger comes into contact, and g follows from it: see `texture_exploration.stability`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from texture_core.errors import InvalidParameter
+from texture_core.parameters import param
+from texture_exploration.stability import Loop, border_gain
+
+SOFTEST_N_M = 50.0
+MIN_POINTS = 3
+MIN_RISE_N = 0.1  # of the force, before a stiffness can be told from noise
+TOUCHING_N = 0.03
+OBSERVER_S = 0.006  # time constant of the feed-forward
+SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
+MOST_AHEAD = 3.0  # the feed-forward trusts a slope for a speed at most so many times that at which it was seen
+SETTLED = 0.3  # from an error of this share of the wanted force on, the slope is observed
+REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
+NEAR_M = 0.001  # above a surface whose height is known, the finger slows down to closing speed
+
+
+@dataclass(frozen=True)
+class ForceLoopParams:
+    """Force control by an arm without a force mode."""
+
+    loop_delay_s: float = param(0.008, 'From force to movement, at most.', unit='s', low=0.0, high=0.1)
+    force_gain_m_s_n: float = param(
+        0.0, 'Normal speed per force error; 0: chosen by the stiffness that is felt.', unit='m/s/N', low=0.0, high=1.0
+    )
+    stiffest_n_m: float = param(
+        5000.0, 'Stiffest contact of finger and surface that is expected.', unit='N/m', low=100.0, high=200000.0
+    )
+    gain_margin: float = param(4.0, 'So many times the gain is below the border of stability.', low=2.0, high=50.0)
+    integral_s: float = param(0.5, 'Time constant of the integral part.', unit='s', low=0.05, high=100.0)
+    force_speed_m_s: float = param(0.05, 'Highest normal speed under force control.', unit='m/s', low=0.001, high=0.25)
+    impact_n: float = param(
+        0.15, 'The stiffest surface may be met so hard before the arm can react.', unit='N', low=0.01, high=5.0
+    )
+
+    def loop(self, stiffness_n_m: float, period_s: float, gain_m_s_n: float = 0.0) -> Loop:
+        """Return the closed loop on a contact."""
+        return Loop(stiffness_n_m, gain_m_s_n, self.loop_delay_s, period_s, self.integral_s)
+
+    def best_gain(self, stiffness_n_m: float, period_s: float) -> float:
+        """Return the gain for a contact, m/s/N: below the border by the margin."""
+        return border_gain(self.loop(stiffness_n_m, period_s)) / self.gain_margin
+
+    def check(self, period_s: float) -> None:
+        """Refuse a gain that is not stable on the stiffest contact.
+
+        Raises
+        ------
+        InvalidParameter
+            With the gain that would do.
+        """
+        border = border_gain(self.loop(self.stiffest_n_m, period_s))
+        if self.force_gain_m_s_n >= border:
+            raise InvalidParameter(
+                f"parameter 'force_gain_m_s_n' is {self.force_gain_m_s_n:g}; on a contact of {self.stiffest_n_m:g} N/m "
+                f'with a loop delay of {1e3 * self.loop_delay_s:g} ms, once every {1e3 * period_s:g} ms, that is '
+                f'unstable from {border:.2g} m/s/N on; choose {border / self.gain_margin:.2g}, or 0 to let it be chosen'
+            )
+
+    @property
+    def closing_force_rate(self) -> float:
+        """Impact per stiffness, m: how deep the finger may run into the stiffest surface."""
+        return self.impact_n / self.stiffest_n_m
+
+
+class StiffnessEstimate:
+    """Feel how stiff a contact is, by the slope of force over height while the force rises: least squares."""
+
+    def __init__(self) -> None:
+        self.value_n_m = math.nan
+        self.restart()
+
+    @property
+    def empty(self) -> bool:
+        """Whether this contact has just begun."""
+        return not self._points
+
+    def restart(self) -> None:
+        """The contact ended: forget the points, not the value."""
+        self.fixed = False  # for the rest of this contact
+        self._points: list[tuple[float, float]] = []
+
+    def update(self, height_m: float, force_n: float) -> None:
+        """Take a point; those before the contact are passed over."""
+        if self.fixed or force_n < TOUCHING_N or (self._points and force_n <= self._points[-1][1]):
+            return
+        self._points.append((height_m, force_n))
+        if len(self._points) >= MIN_POINTS and force_n - self._points[0][1] > MIN_RISE_N:
+            self.value_n_m = max(SOFTEST_N_M, self._slope())
+
+    def _slope(self) -> float:
+        count = len(self._points)
+        z_mean = sum(z for z, _ in self._points) / count
+        f_mean = sum(f for _, f in self._points) / count
+        spread = sum((z - z_mean) ** 2 for z, _ in self._points)
+        shared = sum((z - z_mean) * (f - f_mean) for z, f in self._points)
+        return -shared / spread if spread > 0 else math.nan
+
+
+class ForceController:
+    """The PI part, with a limit of the speed and no windup at it.
+
+    Parameters
+    ----------
+    gain_m_s_n, integral_s
+        See the head of this file.
+    max_speed_m_s
+        Of the answer.
+    """
+
+    def __init__(self, gain_m_s_n: float, integral_s: float, max_speed_m_s: float = math.inf) -> None:
+        self.gain_m_s_n = gain_m_s_n
+        self._integral_s = integral_s
+        self._max_m_s = max_speed_m_s
+        self._sum_ns = 0.0
+
+    def restart(self) -> None:
+        """Forget the past errors."""
+        self._sum_ns = 0.0
+
+    def update(self, error_n: float, dt_s: float, feed_forward_m_s: float = 0.0) -> float:
+        """Return the normal velocity, positive away from the surface, for an error of the force, wanted less felt."""
+        added = self._sum_ns + error_n * dt_s
+        wanted = feed_forward_m_s - self.gain_m_s_n * (error_n + added / self._integral_s)
+        limited = min(self._max_m_s, max(-self._max_m_s, wanted))
+        # Anti-windup: an error that only pushes further against the limit is not added up.
+        if limited == wanted or (wanted > 0) == (error_n > 0):
+            self._sum_ns = added
+        return limited
+
+
+class SlopeObserver:
+    """How fast the surface under the finger rises, freed from what the controller does itself.
+
+    Rise and way are smoothed alike: a change of the slope is seen late, a change of speed on the same slope at once.
+    """
+
+    def __init__(self) -> None:
+        self.restart()
+
+    @property
+    def running(self) -> bool:
+        """Whether it has seen a height."""
+        return not math.isnan(self._height_m)
+
+    def restart(self) -> None:
+        """The finger left the surface."""
+        self._rise_m_s = 0.0
+        self._speed_m_s = 0.0
+        self._height_m = math.nan
+
+    def update(self, surface_m: float, speed_m_s: float, dt_s: float) -> float:
+        """Return how fast the surface rises, m/s.
+
+        Parameters
+        ----------
+        surface_m
+            Height of the untouched surface, z + F/k.
+        speed_m_s
+            Along the surface.
+        """
+        if self.running and dt_s > 0:
+            share = -math.expm1(-dt_s / OBSERVER_S)
+            self._rise_m_s += share * ((surface_m - self._height_m) / dt_s - self._rise_m_s)
+            self._speed_m_s += share * (speed_m_s - self._speed_m_s)
+        self._height_m = surface_m
+        faster = speed_m_s / self._speed_m_s if self._speed_m_s > SLOWEST_M_S else 1.0
+        return self._rise_m_s * min(MOST_AHEAD, faster)
+
+
+class ForceLoop:
+    """Come down, feel the stiffness, press with the wanted force: the force mode of an arm that has none.
+
+    Parameters
+    ----------
+    params
+        The loop.
+    period_s
+        How often `velocity_m_s` is called.
+
+    Raises
+    ------
+    InvalidParameter
+        If the loop would be unstable.
+    """
+
+    def __init__(self, params: ForceLoopParams, period_s: float) -> None:
+        params.check(period_s)
+        self._params = params
+        self._period_s = period_s
+        self.stiffness = StiffnessEstimate()
+        self._observer = SlopeObserver()
+        self._surface_m: float | None = None  # where the finger met it last
+        self._chosen_for = math.nan
+        self.controller = ForceController(
+            params.force_gain_m_s_n or params.best_gain(params.stiffest_n_m, period_s),
+            params.integral_s,
+            params.force_speed_m_s,
+        )
+
+    def restart(self) -> None:
+        """The finger is not under force control, or the command ended."""
+        self.controller.restart()
+        self._observer.restart()
+
+    def feel(self, height_m: float, force_n: float, speed_m_s: float = 0.0) -> None:
+        """Take note of a contact, whatever is commanded; call it once a period. Sliding tells nothing of stiffness."""
+        if force_n < TOUCHING_N:
+            self.stiffness.restart()
+            return
+        if self.stiffness.empty:
+            self._surface_m = height_m
+        if speed_m_s > SLOWEST_M_S or self._observer.running:
+            self.stiffness.fixed = True
+        self.stiffness.update(height_m, force_n)
+        self._choose_gain()
+
+    def velocity_m_s(self, wanted_n: float, height_m: float, force_n: float, speed_m_s: float, dt_s: float) -> float:
+        """Return the normal velocity that leads to a wanted force, at a speed along the surface."""
+        if force_n < TOUCHING_N:
+            self.restart()
+            return -self.closing_m_s(height_m)
+        felt = self.stiffness.value_n_m
+        settled = abs(wanted_n - force_n) < SETTLED * wanted_n
+        rising = 0.0
+        if not math.isnan(felt) and (settled or self._observer.running):
+            rising = self._observer.update(height_m + force_n / felt, speed_m_s, dt_s)
+        return self.controller.update(wanted_n - force_n, dt_s, rising)
+
+    def closing_m_s(self, height_m: float) -> float:
+        """Return how fast the finger may come down: slowly where the surface may be."""
+        params = self._params
+        reaction_s = params.loop_delay_s + REACTION_PERIODS * self._period_s
+        slow = min(params.force_speed_m_s, params.closing_force_rate / reaction_s)
+        if self._surface_m is None:
+            return slow
+        above_m = height_m - self._surface_m - NEAR_M
+        return min(params.force_speed_m_s, max(slow, above_m / (4 * reaction_s)))
+
+    def _choose_gain(self) -> None:
+        felt = self.stiffness.value_n_m
+        if self._params.force_gain_m_s_n or math.isnan(felt) or felt == self._chosen_for:
+            return
+        self._chosen_for = felt
+        self.controller.gain_m_s_n = self._params.best_gain(felt, self._period_s)
