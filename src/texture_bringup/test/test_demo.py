@@ -89,7 +89,8 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
 @pytest.mark.ros
 def test_the_nodes_end_even_if_the_demonstration_is_killed(tmp_path) -> None:
     command = [sys.executable, '-m', 'texture_bringup.command', 'demo', '--out', str(tmp_path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as demo:
+    environment = {**os.environ, 'TMPDIR': str(tmp_path)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as demo:
         log = tmp_path / 'nodes.log'
         deadline = time.monotonic() + DEADLINE_S
         while not (log.exists() and 'classifier started' in log.read_text()):

@@ -19,7 +19,7 @@ class Launched:
     """A running launcher."""
 
     def __init__(self, file: Path, prefix: Path) -> None:
-        environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix)}
+        environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix), 'TMPDIR': str(prefix)}
         command = [sys.executable, '-m', 'texture_bringup.command', 'launch', str(file)]
         self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
         self.lines = []
