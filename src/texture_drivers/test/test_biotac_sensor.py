@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError
+from texture_core.framing import Frame
 from texture_core.signal import TactileSignal, lost_samples
 from texture_drivers.biotac.bridge import REPLY, Run
 from texture_drivers.biotac.link import SpiFrame
 from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.biotac.tables import LAYOUTS, Layout
-from texture_drivers.framing import Frame
 from texture_drivers.params import SensorParams
 
 BIOTAC = LAYOUTS['biotac']

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_drivers.framing import Deframer
+from texture_core.framing import Deframer
 
 PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'sensors' / 'daq.md'
 COMPILER = shutil.which('g++')

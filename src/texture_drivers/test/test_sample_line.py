@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.framing import Frame, pack
 from texture_core.signal import lost_samples
-from texture_drivers.framing import Frame, pack
 from texture_drivers.sample_line import SampleLine, Stream
 
 SECOND = 1_000_000_000

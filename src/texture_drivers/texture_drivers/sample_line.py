@@ -1,6 +1,6 @@
 """Streams of samples on a framed serial line: numbered, timed, in physical units. Knows no port.
 
-Each frame (see `texture_drivers.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
+Each frame (see `texture_core.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
 endian, row after row; its kind tells the stream, its time is that of the first row.
 """
 
@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from texture_core.arrays import Array
 from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.framing import TIME_BITS, Deframer, Frame, WrappingCounter
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.clock import StreamClock
-from texture_drivers.framing import TIME_BITS, Deframer, Frame, WrappingCounter
 from texture_drivers.numbering import BlockCounter
 
 VERSION = 1

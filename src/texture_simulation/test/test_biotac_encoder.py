@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from texture_core.framing import Deframer
 from texture_drivers.biotac.protocol import decode
 from texture_drivers.biotac.tables import LAYOUTS, sampling_command
-from texture_drivers.framing import Deframer
 from texture_simulation.devices.biotac_encoder import commands, encode_replies, reply_frame, serials_frame, stuff
 
 

@@ -1,7 +1,7 @@
 """A microcontroller that samples a BioTac board over SPI and streams the replies over a serial line.
 
 Our own design, for whoever has no Cheetah adapter: see docs/sensors/biotac.md. It sends without being asked, framed as
-in `texture_drivers.framing`: the reply to one frame of sampling commands in each, and now and then the serial numbers.
+in `texture_core.framing`: the reply to one frame of sampling commands in each, and now and then the serial numbers.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import time
 from collections.abc import Mapping, Sequence
 
 from texture_core.errors import DeviceError
+from texture_core.framing import SEQUENCE_BITS, TIME_BITS, Deframer, Frame, WrappingCounter
 from texture_drivers.biotac.link import SpiFrame
 from texture_drivers.biotac.tables import ECHO_BYTES, WORD_BYTES, Layout
-from texture_drivers.framing import SEQUENCE_BITS, TIME_BITS, Deframer, Frame, WrappingCounter
 from texture_drivers.serial_port import SerialPort
 
 VERSION = 1

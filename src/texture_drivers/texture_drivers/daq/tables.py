@@ -1,6 +1,6 @@
 """Numbers of the data acquisition finger.
 
-The layout of the frames is our own (see `texture_drivers.framing`); rate and channels are of Jamali & Sammut 2010.
+The layout of the frames is our own (see `texture_core.framing`); rate and channels are of Jamali & Sammut 2010.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Numbers of the PVDF finger and of the line to its microcontroller.
 
-Film, force sensor and machine are those of Hu et al. 2014; the frames are our own (see `texture_drivers.framing`).
+Film, force sensor and machine are those of Hu et al. 2014; the frames are our own (see `texture_core.framing`).
 The paper tells neither sampling rates nor the gains of its amplifiers. Its spectra have 12 288 points: at 4096 Hz that
 are 3 s, or 76 mm of fabric at its 25.5 mm/s.
 """

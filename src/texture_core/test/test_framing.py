@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from texture_drivers.framing import CRC_START, Deframer, Frame, WrappingCounter, pack
+from texture_core.framing import CRC_START, Deframer, Frame, WrappingCounter, pack
 
 BODIES = st.lists(st.binary(max_size=40), min_size=2, max_size=8)
 
