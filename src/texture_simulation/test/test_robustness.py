@@ -2,13 +2,23 @@ import numpy as np
 import pytest
 
 from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.robustness import line_figures
+from texture_simulation.robustness import CHECKED, LINES, line_figures
 
 
-def test_a_good_line_loses_nothing() -> None:
-    figures = line_figures(ByteFaults(), np.random.default_rng(0), n_packets=2000)
-    assert figures.genuine in (figures.sent, figures.sent - 1)  # the very last may still wait for its successor
-    assert (figures.bogus, figures.refused) == (0, 0)
+@pytest.mark.parametrize('sensor', LINES)
+def test_a_good_line_loses_nothing(sensor: str) -> None:
+    figures = line_figures(ByteFaults(), np.random.default_rng(0), n_packets=2000, sensor=sensor)
+    assert (figures.genuine, figures.bogus, figures.refused) == (figures.sent, 0, 0)
+
+
+@pytest.mark.parametrize('sensor', sorted(CHECKED))
+@pytest.mark.parametrize('kind', ['drop', 'insert', 'flip'])
+@pytest.mark.parametrize('rate', [1e-4, 1e-2])
+def test_a_checksum_lets_nothing_bogus_through(sensor: str, kind: str, rate: float) -> None:
+    figures = line_figures(ByteFaults(**{kind: rate}), np.random.default_rng(3), n_packets=3000, sensor=sensor)
+    assert figures.bogus == 0
+    assert 0 < figures.genuine < figures.sent
+    assert figures.refused > 0
 
 
 @pytest.mark.parametrize('faults', [ByteFaults(drop=1e-3), ByteFaults(insert=1e-3), ByteFaults(drop=1e-4)])

@@ -1,17 +1,25 @@
-"""How many packets of a TSF-85 survive a bad line, and whether anything false is believed."""
+"""How many packets of a sensor survive a bad line, and whether anything false is believed."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
+from texture_core.catalogue import find
+from texture_core.framing import Deframer, Frame
 from texture_drivers.tsf85.protocol import Packet, PacketParser
+from texture_simulation.devices import daq, pvdf
+from texture_simulation.devices.biotac_encoder import encode_replies, reply_frame
 from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.sampler import MICROSECONDS, Sampled, encode
 from texture_simulation.devices.tsf85_encoder import TAXELS, Tsf85Encoder
 
 MILLISECONDS_PER_IMAGE = 16
+BIOTAC_SLOTS, BIOTAC_FRAME_US = 44, 10_000
 CHUNK_BYTES = 512  # as a driver reads: the parser sees no more at once
 
 
@@ -19,8 +27,8 @@ CHUNK_BYTES = 512  # as a driver reads: the parser sees no more at once
 class LineFigures:
     """What came of the packets that were sent.
 
-    `bogus` are accepted packets that were never sent. With bytes lost or added, the strict walk can refuse them all;
-    a changed value byte inside an intact packet cannot be seen by anyone, as the protocol has no checksum.
+    `bogus` are accepted packets that were never sent. A checksum refuses them all. The TSF-85 has none: with bytes lost
+    or added, the strict walk can refuse them; a changed value byte inside an intact packet cannot be seen by anyone.
     """
 
     sent: int
@@ -34,34 +42,122 @@ class LineFigures:
         return self.genuine / self.sent
 
 
-def line_figures(faults: ByteFaults, rng: np.random.Generator, n_packets: int = 20_000) -> LineFigures:
-    """Send packets of random content over a bad line and parse what arrives."""
-    blocks = _blocks(rng, n_packets)
-    sent = Counter(packet for block in blocks for packet in _parsed(block))
-    parser = PacketParser()
-    wire = faults.apply(b''.join(blocks), rng)
-    chunks = (wire[first : first + CHUNK_BYTES] for first in range(0, len(wire), CHUNK_BYTES))
-    came = Counter(packet for chunk in chunks for packet in parser.feed(chunk))
+class Listener(Protocol):
+    """A driver's parser."""
+
+    def feed(self, data: bytes) -> Sequence[Hashable]:
+        """Return the packets completed by `data`."""
+
+    @property
+    def refused(self) -> int:
+        """How many candidates were refused."""
+
+
+class Tsf85Listener:
+    """The TSF-85's parser."""
+
+    def __init__(self) -> None:
+        self._parser = PacketParser()
+
+    def feed(self, data: bytes) -> list[Packet]:
+        """Return packets."""
+        return self._parser.feed(data)
+
+    @property
+    def refused(self) -> int:
+        """Start bytes that led to no packet."""
+        return self._parser.refused
+
+
+class FrameListener:
+    """The parser of all devices with framed lines."""
+
+    def __init__(self) -> None:
+        self._deframer = Deframer()
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """Return frames, whatever was missing before them."""
+        return [frame._replace(lost=0) for frame in self._deframer.feed(data)]
+
+    @property
+    def refused(self) -> int:
+        """Frames that failed the check."""
+        return self._deframer.bad_frames
+
+
+@dataclass(frozen=True)
+class Line:
+    """What a device sends, and what hears it.
+
+    Parameters
+    ----------
+    packets
+        Yields so many packets of random content, as bytes.
+    listener
+        Makes a parser.
+    """
+
+    packets: Callable[[np.random.Generator, int], Iterator[bytes]]
+    listener: Callable[[], Listener]
+
+
+def line_figures(
+    faults: ByteFaults, rng: np.random.Generator, n_packets: int = 20_000, sensor: str = 'tsf85'
+) -> LineFigures:
+    """Send packets of random content over a bad line and parse what arrives.
+
+    Raises
+    ------
+    UnknownName
+        If no such sensor has a line.
+    """
+    line = find(LINES, sensor, 'line of a sensor')
+    packets = list(line.packets(rng, n_packets))
+    sent = _heard(line.listener(), b''.join(packets))
+    listener = line.listener()
+    came = _heard(listener, faults.apply(b''.join(packets), rng))
     genuine = (sent & came).total()
-    return LineFigures(sent=sent.total(), genuine=genuine, bogus=came.total() - genuine, refused=parser.refused)
+    return LineFigures(len(packets), genuine, came.total() - genuine, listener.refused)
 
 
-def _blocks(rng: np.random.Generator, n_packets: int) -> list[bytes]:
-    """Return the bytes of a stream in pieces of 16 ms: an image and 16 dynamic packets each."""
+def _heard(listener: Listener, wire: bytes) -> Counter[Hashable]:
+    # The start byte after the end lets the very last packet of a TSF-85 out, which waits for its successor.
+    chunks = [wire[first : first + CHUNK_BYTES] for first in range(0, len(wire), CHUNK_BYTES)]
+    return Counter(packet for chunk in [*chunks, b'\x9a'] for packet in listener.feed(chunk))
+
+
+def _tsf85(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
+    """Yield an image and 16 dynamic packets, again and again."""
     encoder = Tsf85Encoder()
-    values = [
-        (
-            rng.integers(-(2**15), 2**15, MILLISECONDS_PER_IMAGE, dtype=np.int16),
-            rng.integers(0, 2**16, TAXELS, dtype=np.uint16),
-        )
-        for _ in range(n_packets // (MILLISECONDS_PER_IMAGE + 1))
-    ]
-    return [
-        encoder.encode(number * MILLISECONDS_PER_IMAGE, dynamic, image, image_is_new=True)
-        for number, (dynamic, image) in enumerate(values)
-    ]
+    for number in range(n_packets // (MILLISECONDS_PER_IMAGE + 1)):
+        dynamic = rng.integers(-(2**15), 2**15, MILLISECONDS_PER_IMAGE, dtype=np.int16)
+        image = rng.integers(0, 2**16, TAXELS, dtype=np.uint16)
+        yield from encoder.packets(number * MILLISECONDS_PER_IMAGE, dynamic, image, image_is_new=True)
 
 
-def _parsed(block: bytes) -> list[Packet]:
-    """Return the packets of an unharmed block; the start byte of a next one lets the last one out."""
-    return PacketParser().feed(block + b'\x9a')
+def _biotac(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
+    """Yield frames of a board with one finger."""
+    values = rng.integers(0, 2**12, (n_packets, BIOTAC_SLOTS, 1), dtype=np.uint16)
+    for number, reply in enumerate(encode_replies(values)):
+        yield reply_frame(number, number * BIOTAC_FRAME_US, values[number], reply.tobytes())
+
+
+def _sampled(stream: Sampled) -> Callable[[np.random.Generator, int], Iterator[bytes]]:
+    """Return what yields frames of a stream."""
+
+    def packets(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
+        frame_us = stream.rows * MICROSECONDS / stream.rate_hz
+        values = rng.integers(-(2**15), 2**15, (n_packets, stream.rows, stream.columns), dtype=np.int16)
+        for number, counts in enumerate(values):
+            yield encode(stream, number, round(number * frame_us), counts)
+
+    return packets
+
+
+LINES: Mapping[str, Line] = {
+    'tsf85': Line(_tsf85, Tsf85Listener),
+    'biotac': Line(_biotac, FrameListener),
+    'daq': Line(_sampled(daq.STREAM), FrameListener),
+    'pvdf': Line(_sampled(pvdf.FILM), FrameListener),
+}
+CHECKED = frozenset({'biotac', 'daq', 'pvdf'})  # lines with a checksum
