@@ -2,12 +2,15 @@
 
 import contextlib
 import math
+import tempfile
 import time
+from pathlib import Path
 
 import pytest
 
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.protocol import ArmCommand
+from texture_simulation.devices.rails import EmulatedRails
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
@@ -19,7 +22,16 @@ def ur_controller():
         yield {'ip': '127.0.0.56'}
 
 
-DEVICES = {'ur': ur_controller}  # what must be there for an arm, and the parameters that lead to it
+@contextlib.contextmanager
+def emulated_rails():
+    with tempfile.TemporaryDirectory() as folder, EmulatedRails(Path(folder) / 'rails') as rails:
+        yield {'device': str(rails.port.link)}
+
+
+DEVICES = {
+    'ur': ur_controller,
+    'rails': emulated_rails,
+}  # what must be there for an arm, and the parameters that lead to it
 
 
 @pytest.fixture(params=ARMS)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from texture_exploration.arms.protocol import ArmClass
+from texture_exploration.arms.rails import RailsArm
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.arms.ur import UrArm
 
 ARMS: Mapping[str, ArmClass] = {
     'simulated': SimulatedArm,  # kinematic, over an elastic plane; drives the emulated bench
     'ur': UrArm,  # Universal Robots, through ur-rtde
+    'rails': RailsArm,  # Hu et al. 2014: two rails and a pressing motor behind a microcontroller
 }

@@ -1,0 +1,163 @@
+"""The rails through their serial line, on the emulated microcontroller."""
+
+import socket
+import struct
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.errors import DeviceError
+from texture_core.exploration import ExplorationRequest
+from texture_core.finger import FingerState
+from texture_core.framing import Frame, pack, unpack
+from texture_core.parameters import markdown_table
+from texture_exploration.arms import rails_tables as tables
+from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.rails import RailsArm, RailsParams
+from texture_exploration.explorer import Explorer
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.rails import EmulatedRails, RailsFirmware, RailsMachine
+
+DEADLINE_S = 20.0
+SLIDING = ArmCommand(tangential_m_s=(0.02, 0.01))
+
+
+def until(condition):
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+@pytest.fixture
+def rails(tmp_path):
+    with EmulatedRails(tmp_path / 'rails') as made:
+        yield made
+
+
+@pytest.fixture
+def arm(rails):
+    made = RailsArm(RailsParams(device=str(rails.port.link)))
+    made.connect()
+    yield made
+    made.close()
+
+
+def order(kind, body=b'', number=0):
+    return pack(Frame(kind, tables.VERSION, number, 0, 1, 1, body))
+
+
+def move(vx=0.0, vy=0.0, mode=tables.HOLD, value=0):
+    return order(tables.MOVE, tables.MOVE_BODY.pack(round(vx * 1e6), round(vy * 1e6), mode, value))
+
+
+def advance(firmware, seconds, keep=b''):
+    for _ in range(round(seconds / 0.0025)):
+        firmware.hear(keep)
+        firmware.advance(0.0025)
+
+
+def test_a_move_is_these_bytes():
+    # kind, version, sequence, time, 1, 1, 25500 µm/s, 0, press, 1500 mN
+    content = unpack(move(0.0255, 0.0, tables.PRESS, 1500)[:-1])
+    assert content.kind == 0xA0
+    assert content.body == struct.pack('<iiBi', 25500, 0, 2, 1500)
+
+
+def test_pressing_stops_at_the_force_and_locks():
+    firmware = RailsFirmware(RailsMachine(start_height_m=0.002))
+    advance(firmware, 3.0, move(mode=tables.PRESS, value=1500))
+    assert firmware.force_n == pytest.approx(1.5, rel=0.02)
+    firmware.surface_m = 0.0001  # a locked motor does not give way
+    advance(firmware, 0.5, move(mode=tables.PRESS, value=1500))
+    assert firmware.force_n == pytest.approx(1.7, rel=0.03)
+    assert firmware.velocity[2] == 0.0
+
+
+def test_the_page_lists_the_parameters_as_they_are():
+    page = Path(__file__).parents[3] / 'docs' / 'robots' / 'rails.md'
+    assert markdown_table(RailsParams) in page.read_text()
+
+
+def test_silence_of_150_ms_stops_everything():
+    firmware = RailsFirmware(RailsMachine())
+    firmware.hear(move(0.02))
+    advance(firmware, 0.14)
+    assert firmware.velocity[0] == pytest.approx(0.02)
+    advance(firmware, 0.05)
+    assert firmware.velocity[0] == 0.0
+    assert firmware.watchdog_stops == 1
+
+
+def test_the_end_switches_stop_a_rail():
+    firmware = RailsFirmware(RailsMachine(travel_m=0.01))
+    advance(firmware, 1.0, move(0.05, 0.002))
+    assert firmware.position[:2] == pytest.approx([0.01, 0.002], abs=1e-4)
+    advance(firmware, 0.1, move(-0.05))
+    assert firmware.position[0] < 0.009
+
+
+def test_an_overload_lifts_the_finger_and_is_a_fault_until_cleared(rails, arm):
+    rails.firmware.surface_m = 0.1
+    until(lambda: 'overloaded' in arm.state().fault)
+    rails.firmware.surface_m = 0.0
+    arm.connect()
+    until(lambda: arm.state().fault == '')
+
+
+def test_something_in_the_way_is_a_fault(rails, arm):
+    rails.firmware.machine = RailsMachine(stalled=True)
+    arm.command(SLIDING)
+    until(lambda: 'does not follow its motor' in arm.state().fault)
+
+
+def test_an_exploration_on_the_rails_slides_as_in_the_paper(rails, arm):
+    states = []
+    explorer = Explorer(arm, TouchParams(), SafetyLimits(stale_s=1.0), states.append)
+    explorer.connect()
+    request = ExplorationRequest('linear_slide', speed_m_s=0.0255, force_n=1.5, distance_m=0.02)
+    exploration = explorer.begin('one', request)
+    assert exploration.ended.wait(DEADLINE_S)
+    assert exploration.outcome.success, exploration.outcome.message
+    sliding = [state for state in states if state.phase.value == 'slide']
+    assert np.mean([state.speed_m_s for state in sliding]) == pytest.approx(0.0255, rel=0.02)
+    assert np.mean([state.force_n for state in sliding]) == pytest.approx(1.5, rel=0.05)
+    explorer.close()
+
+
+def test_bytes_lost_on_the_line_are_counted_and_survived(rails, arm):
+    rails.faults = ByteFaults(drop=0.01)
+    until(lambda: arm.counts['bad_frames'] > 3)
+    before = arm.state().time_ns
+    until(lambda: arm.state().time_ns > before)
+
+
+def test_unplugged_rails_are_told_and_can_be_connected_again(rails, arm):
+    rails.port.unplug()
+    with pytest.raises(DeviceError, match='cannot be reached'):
+        until(lambda: not arm.state())
+    with pytest.raises(DeviceError, match='cannot be reached'):
+        arm.command(SLIDING)
+    with pytest.raises(DeviceError, match='check that they are plugged in'):
+        arm.connect()
+    rails.port.plug()
+    arm.connect()
+    assert arm.state().fault == ''
+
+
+def test_a_silent_device_is_told(rails):
+    rails.mute = True
+    with pytest.raises(DeviceError, match='sends no state of rails'):
+        RailsArm(RailsParams(device=str(rails.port.link))).connect()
+
+
+def test_the_bench_is_told_where_the_finger_is(tmp_path):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
+        bench.bind(('127.0.0.1', 0))
+        bench.settimeout(DEADLINE_S)
+        with EmulatedRails(tmp_path / 'rails', finger_port=bench.getsockname()[1]):
+            assert FingerState.from_bytes(bench.recv(1024)).z_m == pytest.approx(0.01)

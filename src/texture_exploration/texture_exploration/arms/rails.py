@@ -1,0 +1,190 @@
+"""Two linear rails with encoders and a pressing motor, behind a microcontroller on a serial line."""
+
+from __future__ import annotations
+
+import contextlib
+import termios
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import serial
+
+from texture_core.errors import DeviceError
+from texture_core.framing import Deframer, Frame, pack
+from texture_core.parameters import param
+from texture_exploration.arms import rails_tables as tables
+from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+
+# An unplugged port raises termios.error from tcflush, which is no OSError.
+LINE_FAULTS = (serial.SerialException, OSError, termios.error, TypeError)
+FIRST_STATE_S = 2.0
+SPEED_OVER = 4  # states; a count of 5 µm in 30 ms is 0.7 % of 25.5 mm/s
+READ_S = 0.05
+
+
+@dataclass(frozen=True)
+class RailsParams:
+    """Where the rails are, and what their encoders count."""
+
+    device: str = param('/tmp/texture/rails', 'Serial device; the default is that of the emulated one.')
+    baud: int = param(230400, 'Baud rate of a real UART; USB ignores it.', low=9600, high=12_000_000)
+    xy_counts_m: float = param(200_000.0, 'Encoder counts per metre of the rails.', unit='1/m', low=1e3, high=1e8)
+    z_counts_m: float = param(1_000_000.0, 'The same, of the pressing motor.', unit='1/m', low=1e3, high=1e8)
+    height_m: float = param(0.01, 'Height of the finger above the surface at 0 counts.', unit='m', low=-0.5, high=0.5)
+
+
+class RailsArm:
+    """The rails as an arm; see `texture_exploration.arms.protocol.Arm`."""
+
+    Params = RailsParams
+
+    def __init__(self, params: RailsParams = RailsParams()) -> None:
+        self._params = params
+        self._port: serial.Serial | None = None
+        self._thread: threading.Thread | None = None
+        self._closing = threading.Event()
+        self._fresh = threading.Event()
+        self._trouble = 'the rails are not connected; connect them first'
+        self._deframer = Deframer()
+        self._sending = threading.Lock()
+        self._sent = 0
+        self._states: deque[tuple[int, Vector]] = deque(maxlen=SPEED_OVER)  # device time in µs, and place
+        self._state: ArmState | None = None
+        self._watchdog_stops = 0
+        self._refused = 0
+
+    def connect(self) -> None:
+        """Open the line, clear faults and wait for the first state."""
+        self.close()
+        self._closing.clear()
+        self._fresh.clear()
+        self._deframer.restart()
+        self._states.clear()
+        with self._line():
+            self._port = serial.Serial(
+                self._params.device, self._params.baud, exclusive=True, timeout=READ_S, write_timeout=0.2
+            )
+        self._trouble = ''
+        self._thread = threading.Thread(target=self._read, name='rails', daemon=True)
+        self._thread.start()
+        try:
+            self._send(tables.CLEAR)
+            if not self._fresh.wait(FIRST_STATE_S):
+                raise DeviceError(
+                    self._trouble
+                    or f"device '{self._params.device}' is open and sends no state of rails; check that it is the "
+                    f'right device, and its baud rate ({self._params.baud} is set)'
+                )
+        except DeviceError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Stop, and close the line."""
+        if self._port is not None:
+            with contextlib.suppress(DeviceError):
+                self._send(tables.STOP)
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        if self._port is not None:
+            with contextlib.suppress(*LINE_FAULTS):
+                self._port.close()
+            self._port = None
+        self._trouble = self._trouble or 'the rails are not connected; connect them first'
+
+    def state(self) -> ArmState:
+        """Return the newest state."""
+        if self._trouble or self._state is None:
+            raise DeviceError(self._trouble)
+        return self._state
+
+    def command(self, command: ArmCommand) -> None:
+        """Send an order."""
+        vx, vy = (round(speed * tables.MICRO) for speed in command.tangential_m_s)
+        mode, value = tables.MOVING, round(command.normal_m_s * tables.MICRO)
+        if command.force_n is not None:
+            mode, value = tables.PRESS, round(command.force_n * tables.MILLI)
+        elif value == 0:
+            mode = tables.HOLD
+        self._send(tables.MOVE, tables.MOVE_BODY.pack(vx, vy, mode, value))
+
+    def stop(self) -> None:
+        """Let the rails stand still; the pressing motor locks."""
+        self._send(tables.STOP)
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals: states taken, damaged or lost on the line, of another version, and stops of the watchdog."""
+        return {
+            'states': self._deframer.frames,
+            'bad_frames': self._deframer.bad_frames,
+            'lost_frames': self._deframer.lost,
+            'refused_frames': self._refused,
+            'watchdog_stops': self._watchdog_stops,
+        }
+
+    def _send(self, kind: int, body: bytes = b'') -> None:
+        if self._trouble or self._port is None:
+            raise DeviceError(self._trouble)
+        with self._sending, self._line():
+            frame = Frame(kind, tables.VERSION, self._sent, time.monotonic_ns() // 1000, 1, 1, body)
+            self._sent += 1
+            self._port.write(pack(frame))
+
+    def _read(self) -> None:
+        port = self._port
+        assert port is not None
+        with contextlib.suppress(DeviceError), self._line():
+            while not self._closing.is_set():
+                data = port.read(max(1, port.in_waiting))
+                for frame in self._deframer.feed(data):
+                    self._take(frame)
+
+    def _take(self, frame: Frame) -> None:
+        """Make a state of a frame; frames of other kinds are the finger's, on the same line."""
+        if frame.kind != tables.STATE:
+            return
+        if frame.version != tables.VERSION or len(frame.body) != tables.STATE_BODY.size:
+            self._refused += 1
+            self._trouble = (
+                f'the rails send states of version {frame.version}, and {tables.VERSION} is known; update the firmware '
+                'or this package'
+            )
+            return
+        x, y, z, force_mn, flags, self._watchdog_stops = tables.STATE_BODY.unpack(frame.body)
+        per_m, params = self._params.xy_counts_m, self._params
+        place: Vector = (x / per_m, y / per_m, params.height_m + z / params.z_counts_m)
+        self._states.append((frame.time_us, place))
+        self._state = ArmState(
+            time_ns=time.monotonic_ns(),
+            position=place,
+            velocity=self._velocity(),
+            force_n=force_mn / tables.MILLI,
+            fault='; '.join(text for flag, text in tables.FAULTS.items() if flags & flag),
+        )
+        self._fresh.set()
+
+    def _velocity(self) -> Vector:
+        """Return the speed by the clock of the rails, over the last states."""
+        (begin_us, first), (end_us, last) = self._states[0], self._states[-1]
+        passed_s = ((end_us - begin_us) % (1 << 32)) * 1e-6
+        if not passed_s:
+            return 0.0, 0.0, 0.0
+        vx, vy, vz = ((b - a) / passed_s for a, b in zip(first, last, strict=True))
+        return vx, vy, vz
+
+    @contextlib.contextmanager
+    def _line(self) -> Iterator[None]:
+        try:
+            yield
+        except LINE_FAULTS as error:
+            self._trouble = (
+                f"the rails on '{self._params.device}' cannot be reached ({error}); check that they are plugged in, "
+                'that you may open the device, and that no other program has it open'
+            )
+            raise DeviceError(self._trouble) from error
