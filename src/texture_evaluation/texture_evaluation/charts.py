@@ -119,6 +119,28 @@ def line_chart(
     return Path(path)
 
 
+def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], title: str, path: str | Path) -> Path:
+    """Draw what is recovered of packets, and dashed what false ones are believed; a panel for each kind of fault.
+
+    Parameters
+    ----------
+    panels
+        Kind of fault → name of the line → faults per byte, share recovered and share of false ones, 0 to 1, (n,) each.
+    """
+    with _chart(path, (4.0 * len(panels), 4.0)) as figure:
+        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+        rows = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+        for axes, (kind, series) in zip(rows, panels.items(), strict=True):
+            for (name, (rates, recovered, false)), colour in zip(series.items(), COLOURS, strict=False):
+                axes.plot(rates, 100 * recovered, label=f'{name}: recovered', marker='.', color=colour)
+                if false.any():
+                    axes.plot(rates, 100 * false, label=f'{name}: false', marker='.', color=colour, linestyle='--')
+            axes.set(xlabel='faults per byte', title=kind, xscale='log', ylim=(-2, 102))
+        rows[0].set_ylabel('share of the packets sent (%)')
+        rows[-1].legend(loc='center left', bbox_to_anchor=(0.0, 0.42))
+    return Path(path)
+
+
 def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, path: str | Path) -> Path:
     """Draw how values are spread, each group on its own row; the line stands at 99 % of them."""
     with _chart(path, (7.0, 1.0 + 1.3 * len(series))) as figure:

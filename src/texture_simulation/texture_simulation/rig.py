@@ -6,7 +6,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +19,12 @@ from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.catalogue import SENSORS
 from texture_drivers.params import SensorParams
 from texture_simulation.devices.catalogue import DEVICES
+from texture_simulation.devices.daq import EmulatedDaq
+from texture_simulation.devices.device import Device
 
 DEADLINE_S = 30.0
 STEP_S = 0.003
+MOST_TICKS_PER_S = 5000.0  # beyond this rate as many
 MOST_AT_ONCE_S = 0.04  # after a stall of the machine the line's buffer must not run over
 DAQ = '{channels: [' + ', '.join(f'{{name: c{i}, unit: count}}' for i in range(8)) + ']}'
 
@@ -125,6 +128,15 @@ CASES: Mapping[str, Case] = {
 }  # fmt: skip
 
 
+def fast_daq(link: Path, factor: float) -> Rig:
+    """Return a DAQ finger of another rate."""
+    case = CASES['daq']
+    rate_hz = factor * case.ticks_per_s
+    fast = replace(case, ticks_per_s=rate_hz, config=case.config.replace('{', f'{{rate_hz: {rate_hz}, ', 1))
+    device = EmulatedDaq(link, np.random.default_rng(0), rate_hz=rate_hz)
+    return Rig('daq', link, case=fast, device=device)
+
+
 class Rig:
     """A device, its driver, and the time that passes for the device; usable as a context manager.
 
@@ -136,12 +148,16 @@ class Rig:
         Path for the device.
     pace
         How much faster than the host's the device's clock goes.
+    case, device
+        Another way to feed and another device than those of the tables.
     """
 
-    def __init__(self, name: str, link: Path, pace: float = 1.0) -> None:
-        self.case = CASES[name]
+    def __init__(
+        self, name: str, link: Path, pace: float = 1.0, case: Case | None = None, device: Device | None = None
+    ) -> None:
+        self.case = case or CASES[name]
         self.link = link
-        self.device = DEVICES[name](link, np.random.default_rng(0))
+        self.device = device or DEVICES[name](link, np.random.default_rng(0))
         self.device.plug()
         self.start_ns = time.time_ns()
         self._name = name
@@ -170,7 +186,7 @@ class Rig:
         self.device.unplug()
 
     def _run(self) -> None:
-        done, most = 0, max(1, round(MOST_AT_ONCE_S * self.case.ticks_per_s))
+        done, most = 0, max(1, round(MOST_AT_ONCE_S * min(self.case.ticks_per_s, MOST_TICKS_PER_S)))
         while not self._stop.wait(STEP_S):
             due = int((time.time_ns() - self.start_ns) / NANOSECONDS * self.case.ticks_per_s * self._pace)
             ticks = min(due - done, most)

@@ -25,6 +25,8 @@ class Bench:
         Folder that holds the recorded data sets, each in its own folder; None if there is none.
     seed
         Of everything random.
+    duration_s
+        Of the one measurement whose length may be chosen.
     quick
         Fewer repetitions, for tests; such numbers are not for publishing.
     """
@@ -33,6 +35,7 @@ class Bench:
     data: Path | None = None
     seed: int = 0
     quick: bool = False
+    duration_s: float = 30.0
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,10 @@ STREAM = Sampled(kind=0x01, rate_hz=2500.0, columns=8, rows=10)  # 250 frames of
 class EmulatedDaq(EmulatedSampler):
     """Eight channels at 2.5 kHz; see `EmulatedSampler`."""
 
-    def __init__(self, link: Path, rng: np.random.Generator, start_us: int = 0) -> None:
-        super().__init__(link, rng, {'daq': STREAM}, start_us)
+    def __init__(
+        self, link: Path, rng: np.random.Generator, start_us: int = 0, rate_hz: float = STREAM.rate_hz
+    ) -> None:
+        super().__init__(link, rng, {'daq': replace(STREAM, rate_hz=rate_hz)}, start_us)
 
     def feel(self, counts: Counts) -> None:
         """Take samples, (n_samples, 8)."""
