@@ -1,14 +1,18 @@
 """A bag replayed through the running nodes gives the estimates that the evaluation gets from it."""
 
 import os
+import time
 from collections import defaultdict
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from texture_core.estimates import TextureEstimate
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.ros.conversions import to_msg
 from texture_estimation.model import Model, load_model
 from texture_evaluation.dataset import cut_slides
 from texture_evaluation.datasets.biotac20 import import_biotac20
@@ -48,6 +52,7 @@ def live(model: Path, bags: Path, slides: str, rate: float, domain_id: int) -> t
     ):
         graph.listen('texture', on_estimate)
         graph.listen('diagnostics', reader_of(health))
+        call_through(graph, heard)
         with node(
             'texture_evaluation', 'replay', bag=str(bags), slides=slides, rate=rate, start_delay_s=2.0, deadline_s=60.0
         ) as replay:
@@ -55,7 +60,23 @@ def live(model: Path, bags: Path, slides: str, rate: float, domain_id: int) -> t
             assert replay.wait(60.0) == 0, replay.output
         counted = health.copy()
         graph.wait_until(lambda: health != counted, 30.0, 'a diagnosis after the last window')
-    return dict(heard), health
+    return {name: estimates for name, estimates in heard.items() if name in wanted}, health
+
+
+def call_through(graph: Graph, heard: Estimates) -> None:
+    """Wait until an empty slide is answered: only then has every node found the next one."""
+    states = graph.publisher('exploration')
+    calls = count()
+
+    def answered() -> bool:
+        name = f'call {next(calls)}'
+        for phase in (Phase.SLIDE, Phase.DONE):
+            states.publish(to_msg(ExplorationState(time.time_ns(), name, '', phase)))
+        return bool(heard)
+
+    graph.wait_until(answered, 60.0, 'the answer to an empty slide')
+    graph.spin(0.5)
+    heard.clear()
 
 
 def ended(heard: Estimates) -> set[str]:
