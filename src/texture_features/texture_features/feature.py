@@ -84,8 +84,9 @@ def centred(rows: Array) -> Array:
 
 def power(rows: Array) -> Array:
     """Return the mean square of each row, (...)."""
-    squares: Array = np.add.reduce(rows * rows, axis=-1) / rows.shape[-1]
-    return squares
+    # A product of vectors for each row: no array of squares, and the same rounding for one row as for many.
+    squares: Array = (rows[..., None, :] @ rows[..., :, None])[..., 0, 0]
+    return squares / rows.shape[-1]
 
 
 def slopes(rows: Array) -> Array:

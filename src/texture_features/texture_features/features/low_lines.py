@@ -29,10 +29,14 @@ class LowLines:
     @property
     def names(self) -> tuple[str, ...]:
         """Number of the line, from 1."""
-        return tuple(str(line + 1) for line in range(min(self.lines, self.points // 2)))
+        return tuple(str(line + 1) for line in range(self._count))
+
+    @property
+    def _count(self) -> int:
+        return min(self.lines, self.points // 2)
 
     def __call__(self, windows: Windows) -> Array:
         """Return log(mean density + floor)."""
         segment = 2 * (self.points // 2)
-        densities = densities_of(windows, segment, segment // 2, len(self.names))
+        densities = densities_of(windows, segment, segment // 2, self._count)
         return np.log(mean_over_segments(densities) + self.floor)
