@@ -125,9 +125,9 @@ def test_replugging_gives_another_device_behind_the_same_link(bench: Bench, sens
 
 def test_a_bad_line_costs_samples_and_every_one_is_counted(bench: Bench, sensor: Tsf85) -> None:
     read(sensor, 200)
-    bench.tsf85.faults = ByteFaults(drop=1e-3)
+    bench.device.faults = ByteFaults(drop=1e-3)
     batches = read(sensor, 3000)
-    bench.tsf85.faults = ByteFaults()
+    bench.device.faults = ByteFaults()
     batches += read(sensor, 200)
     share = lost_samples(batches) / (batches[-1].next_sample - batches[0].first_sample)
     # A packet has 47 bytes, so 1 − 0.999^47 = 4.6 % are hit; each may take its forerunner or successor along.
@@ -138,7 +138,7 @@ def test_a_bad_line_costs_samples_and_every_one_is_counted(bench: Bench, sensor:
 
 
 def test_a_device_that_is_silent_after_opening_is_woken(bench: Bench, tmp_path: Path) -> None:
-    bench.tsf85.deaf_starts = 3  # the one of opening and two more
+    bench.device.deaf_starts = 3  # the one of opening and two more
     sensor = Tsf85(SensorParams(device=str(tmp_path / 'tsf85')))
     sensor.open()
     read(sensor, 300)

@@ -105,8 +105,8 @@ def test_the_surface_is_a_parameter_that_refuses_unknown_names(graph: Graph) -> 
 def test_deactivating_stops_the_stream_and_activating_brings_it_back(graph: Graph) -> None:
     graph.spin_until(lambda: len(graph.batches) > 5)
     graph.sensor.trigger_deactivate()
-    assert not graph.bench._bench.tsf85.plugged or graph.sensor._reader is None
-    graph.spin_until(lambda: not graph.bench._bench.tsf85.streaming)
+    assert not graph.bench._bench.device.plugged or graph.sensor._reader is None
+    graph.spin_until(lambda: not graph.bench._bench.device.streaming)
     graph.sensor.trigger_activate()
     count = len(graph.batches)
     graph.spin_until(lambda: len(graph.batches) > count + 5)

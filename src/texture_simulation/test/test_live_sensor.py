@@ -1,4 +1,4 @@
-"""The DAQ and the PVDF finger on the emulated bench: scene, model, device, line and driver together."""
+"""The other sensors on the emulated bench: scene, model, device, line and driver together."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ import pytest
 
 from texture_core.finger import FingerState
 from texture_core.signal import NANOSECONDS
+from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.daq.sensor import daq
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
 from texture_simulation.bench import Bench, BenchParams
-from texture_simulation.live_sensor import live_daq
+from texture_simulation.live_sensor import live_biotac, live_daq
 from texture_simulation.scene import load_scene
 
 DEADLINE_S = 30.0
@@ -102,3 +103,20 @@ def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
     live.advance(0)
     live.advance(10 * NANOSECONDS)
     assert live.device._frames['daq'] == 2500  # the driver sees a gap of 9.75 s, and then 0.25 s of samples
+
+
+def test_the_bench_may_hold_a_biotac_alone(tmp_path: Path) -> None:
+    params = BenchParams(sensor='biotac', tsf85_link=str(tmp_path / 'biotac'), finger_port=0)
+    with Bench(params) as bench:
+        found = read(BioTac(SensorParams(device=str(tmp_path / 'biotac'))), 1.0)
+    assert bench.counts['bytes nobody took'] == 0
+    assert found['signal'].mean() == pytest.approx(2030, abs=30)  # nothing touches: PAC idles
+    assert found['signal_static'].shape[1] == 22
+
+
+def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:
+    scene = load_scene('bench')
+    live = live_biotac(scene, scene.surface('glass'), tmp_path / 'biotac', np.random.default_rng(0))
+    live.advance(0)
+    live.advance(10 * NANOSECONDS)
+    assert (live.done, live.skipped) == (1000, 975)

@@ -1,4 +1,4 @@
-"""Sensors beside the TSF-85 on the emulated bench: a model on its device, brought forward in real time."""
+"""Sensors on the emulated bench: a model on its device, brought forward in real time."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ import numpy as np
 
 from texture_core.finger import FingerState
 from texture_core.signal import NANOSECONDS
+from texture_drivers.biotac.tables import LAYOUTS
+from texture_drivers.tsf85.tables import RATE_HZ
+from texture_simulation.devices.biotac import EmulatedBioTac
 from texture_simulation.devices.daq import EmulatedDaq
+from texture_simulation.devices.device import Device
 from texture_simulation.devices.pvdf import EmulatedPvdf
-from texture_simulation.devices.sampler import EmulatedSampler
+from texture_simulation.devices.tsf85 import EmulatedTsf85
 from texture_simulation.live import FingerTrack
 from texture_simulation.path import Path
 from texture_simulation.scene import Scene
-from texture_simulation.sensors import daq, pvdf
+from texture_simulation.sensors import biotac, daq, pvdf, tsf85
 from texture_simulation.surfaces import Surface
 
 # After a longer stall of the machine the rest is skipped, and the driver sees a loss: the line's buffer takes no more.
@@ -41,29 +45,34 @@ class LiveSensor:
         What feels, and what sends.
     feel
         Measures along a piece of path and sends.
+    pass_by
+        Lets so many steps pass of which nothing is sent.
     rate_hz
-        Samples a second.
-    oversampling
-        Points of the path in a sample.
+        Steps a second: samples, or frames of them.
+    points
+        Of the path in a step.
     """
 
     def __init__(
         self,
         model: Model,
-        device: EmulatedSampler,
+        device: Device,
         feel: Callable[[Path], None],
+        pass_by: Callable[[int], None],
         *,
         rate_hz: float,
-        oversampling: int,
+        points: int,
     ) -> None:
         self.model = model
         self.device = device
+        self.done = 0  # steps, those that were skipped among them
+        self.skipped = 0
         self._feel = feel
+        self._pass_by = pass_by
         self._rate_hz = rate_hz
-        self._oversampling = oversampling
+        self._points = points
         self._track = FingerTrack()
         self._start_ns: int | None = None
-        self._done = 0
 
     def update(self, state: FingerState) -> None:
         """Take note of where the finger is."""
@@ -72,20 +81,57 @@ class LiveSensor:
     def advance(self, now_ns: int) -> None:
         """Measure and send what is due; the first call is the beginning of time."""
         self._start_ns = now_ns if self._start_ns is None else self._start_ns
-        due = int((now_ns - self._start_ns) / NANOSECONDS * self._rate_hz) - self._done
+        due = int((now_ns - self._start_ns) / NANOSECONDS * self._rate_hz) - self.done
         skipped = max(0, due - round(LONGEST_BURST_S * self._rate_hz))
-        self.device.pass_by(skipped / self._rate_hz)
-        self._done += due
-        samples = due - skipped
-        if samples:
-            self._slide(samples, self._start_ns + round(self._done / self._rate_hz * NANOSECONDS))
+        if skipped:
+            self.skipped += skipped
+            self._pass_by(skipped)
+        self.done += due
+        if due > skipped:
+            self._slide(due - skipped, self._start_ns + round(self.done / self._rate_hz * NANOSECONDS))
 
-    def _slide(self, samples: int, until_ns: int) -> None:
+    def _slide(self, steps: int, until_ns: int) -> None:
         was_touching = self._track.touching
-        path = self._track.advance(until_ns, self._oversampling * samples, self._oversampling * self._rate_hz)
+        path = self._track.advance(until_ns, self._points * steps, self._points * self._rate_hz)
         if not was_touching and self._track.touching:
             self.model.touch_elsewhere()
         self._feel(path)
+
+
+def live_tsf85(
+    scene: Scene,
+    surface: Surface,
+    link: FilePath,
+    rng: np.random.Generator,
+    *,
+    finger: int = 0,
+    long_stamps: bool = True,
+) -> LiveSensor:
+    """Return a TSF-85 of which one finger touches."""
+    model = tsf85.Tsf85Model(scene, surface, rng)
+    device = EmulatedTsf85(link, rng, finger, long_stamps)
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.advance(*model.advance(path)),
+        device.pass_by,
+        rate_hz=RATE_HZ,
+        points=tsf85.OVERSAMPLING,
+    )
+
+
+def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return a BioTac alone on its board."""
+    layout = LAYOUTS['biotac']
+    model, device = biotac.BioTacModel(scene, surface, rng, layout), EmulatedBioTac(link, rng)
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.advance(model.advance(path)[:, :, None]),
+        device.pass_by,
+        rate_hz=layout.frame_rate_hz,
+        points=model.points_per_frame,
+    )
 
 
 def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
@@ -95,24 +141,30 @@ def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Gene
         model,
         device,
         lambda path: device.feel(model.advance(path)),
+        lambda samples: device.pass_by(samples / daq.RATE_HZ),
         rate_hz=daq.RATE_HZ,
-        oversampling=daq.OVERSAMPLING,
+        points=daq.OVERSAMPLING,
     )
 
 
 def live_pvdf(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 5."""
     model, device = pvdf.PvdfModel(scene, surface, rng), EmulatedPvdf(link, rng)
+    rate_hz = pvdf.PATH_RATE_HZ / pvdf.OVERSAMPLING
     return LiveSensor(
         model,
         device,
         lambda path: device.feel(*model.advance(path)),
-        rate_hz=pvdf.PATH_RATE_HZ / pvdf.OVERSAMPLING,
-        oversampling=pvdf.OVERSAMPLING,
+        lambda samples: device.pass_by(samples / rate_hz),
+        rate_hz=rate_hz,
+        points=pvdf.OVERSAMPLING,
     )
 
 
-LIVE_SENSORS: Mapping[str, Callable[[Scene, Surface, FilePath, np.random.Generator], LiveSensor]] = {
+MakeLive = Callable[[Scene, Surface, FilePath, np.random.Generator], LiveSensor]
+LIVE_SENSORS: Mapping[str, MakeLive] = {
+    'tsf85': live_tsf85,
+    'biotac': live_biotac,
     'daq': live_daq,
     'pvdf': live_pvdf,
 }

@@ -47,9 +47,9 @@ def run(bench: Bench) -> BenchResult:
     return BenchResult(
         name='sensors-load',
         measured=(
-            f'the node `sensor` as a process of its own: each alone for {alone_s:g} s, four together for {seconds:g} s, '
-            f'each other rate for {rate_s:g} s, with one subscriber. Samples and losses by its own counts, computing '
-            'time in percent of one core. '
+            f'the node `sensor` as a process of its own: each alone for {alone_s:g} s, four together for {seconds:g} '
+            f's, each other rate for {rate_s:g} s, with one subscriber. Samples and losses by its own counts, '
+            'computing time in percent of one core. '
             'unsent_bytes: what the emulated device could not send, for the machine was busy'
         ),
         data='emulated devices on pseudo-terminals, fed in real time on the same machine',

@@ -85,6 +85,10 @@ class EmulatedBioTac:
         self._frames = 0
         self._kept = b''
 
+    def pass_by(self, frames: int) -> None:
+        """Let time pass without sending: frames are lost."""
+        self._frames += frames
+
     def advance(self, values: Values) -> None:
         """Sample some frames and send them.
 

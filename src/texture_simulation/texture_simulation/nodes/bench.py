@@ -25,7 +25,7 @@ class BenchNode(Node):
         on_change(self, BenchParams, self._change)
         self._diagnostics = Diagnostics(self, self._report, hardware_id=self._params.tsf85_link)
         self.get_logger().info(
-            f"'{self._params.surface}' lies under the finger; TSF-85 at {self._params.tsf85_link}, "
+            f"'{self._params.surface}' lies under the finger; {self._params.sensor} at {self._params.tsf85_link}, "
             f'finger states at UDP port {self._bench.finger_port}'
         )
 
@@ -45,7 +45,7 @@ class BenchNode(Node):
     def _report(self) -> tuple[str, str, dict[str, Any]]:
         if not self._bench.running:
             return 'ERROR', 'the bench has stopped; see its log and start it again', dict(self._bench.counts)
-        state = 'streaming' if self._bench.tsf85.streaming else 'waiting for a driver'
+        state = 'streaming' if self._bench.device.streaming else 'waiting for a driver'
         return 'OK', f"{state}; '{self._bench.surface}' lies under the finger", dict(self._bench.counts)
 
 
