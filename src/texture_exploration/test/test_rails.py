@@ -137,14 +137,14 @@ def test_bytes_lost_on_the_line_are_counted_and_survived(rails, arm):
 
 
 def test_unplugged_rails_are_told_and_can_be_connected_again(rails, arm):
-    rails.port.unplug()
+    rails.unplug()
     with pytest.raises(DeviceError, match='cannot be reached'):
         until(lambda: not arm.state())
     with pytest.raises(DeviceError, match='cannot be reached'):
         arm.command(SLIDING)
     with pytest.raises(DeviceError, match='check that they are plugged in'):
         arm.connect()
-    rails.port.plug()
+    rails.plug()
     arm.connect()
     assert arm.state().fault == ''
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from texture_exploration.arms.in_hand import InHandArm
 from texture_exploration.arms.protocol import ArmClass
 from texture_exploration.arms.rails import RailsArm
 from texture_exploration.arms.simulated import SimulatedArm
@@ -12,5 +13,6 @@ from texture_exploration.arms.ur import UrArm
 ARMS: Mapping[str, ArmClass] = {
     'simulated': SimulatedArm,  # kinematic, over an elastic plane; drives the emulated bench
     'ur': UrArm,  # Universal Robots, through ur-rtde
+    'hand': InHandArm,  # the sliding fingers of a hand, while the others hold
     'rails': RailsArm,  # Hu et al. 2014: two rails and a pressing motor behind a microcontroller
 }

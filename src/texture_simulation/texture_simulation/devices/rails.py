@@ -205,6 +205,7 @@ class EmulatedRails:
         self._rng = rng or np.random.default_rng(0)
         self._bench = ('127.0.0.1', finger_port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._using = threading.Lock()  # the port: it is unplugged by others
         self._closing = threading.Event()
         self._steps = 0
         self._thread = threading.Thread(target=self._run, name='rails', daemon=True)
@@ -222,14 +223,25 @@ class EmulatedRails:
         self.port.unplug()
         self._socket.close()
 
+    def plug(self) -> None:
+        """Plug it in again; it gets another device name."""
+        with self._using:
+            self.port.plug()
+
+    def unplug(self) -> None:
+        """Pull its plug."""
+        with self._using:
+            self.port.unplug()
+
     def _run(self) -> None:
         due_s = time.monotonic()
         while not self._closing.wait(STEP_S):
             passed = int((time.monotonic() - due_s) / STEP_S)
             due_s += passed * STEP_S
-            self.firmware.hear(self.port.read())
-            for _ in range(min(passed, MOST_STEPS)):
-                self._step()
+            with self._using:
+                self.firmware.hear(self.port.read())
+                for _ in range(min(passed, MOST_STEPS)):
+                    self._step()
 
     def _step(self) -> None:
         self.firmware.advance(STEP_S)

@@ -1,0 +1,115 @@
+"""The sliding fingers of a hand as an arm: they move as one, while the other fingers hold."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from texture_core.catalogue import find
+from texture_core.errors import DeviceError
+from texture_core.parameters import param
+from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+from texture_exploration.arms.simulated import FingerReport
+from texture_exploration.hands.dynamixel import DynamixelHand
+from texture_exploration.hands.protocol import FingerSet, Fingertip, Hand
+from texture_exploration.hands.simulated import SimulatedHand
+
+LOST_SHARE = 0.5  # of the wanted force: a finger that presses less has lost the object
+LOOK_S = 0.01
+
+
+@dataclass(frozen=True)
+class InHandParams:
+    """Which hand holds what how."""
+
+    hand: str = param('simulated', 'Name of the hand (simulated, dynamixel).', choices=('simulated', 'dynamixel'))
+    finger_set: str = param('kaboli-train', 'Which fingers hold and which slide; the sets are those of the hand.')
+    grip_force_n: float = param(2.0, 'Each holding finger presses with this.', unit='N', low=0.1, high=20.0)
+    grip_timeout_s: float = param(3.0, 'The fingers must have the object within.', unit='s', low=0.1, high=30.0)
+    profile: str = param('leap', 'Profile of a Dynamixel hand: shipped, or path of a file.')
+    device: str = param('/tmp/texture/dynamixel', 'Serial device of a Dynamixel hand.')
+    torque_off_on_fault: bool = param(False, 'A Dynamixel hand lets go when a motor reports a fault.')
+    finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
+
+
+HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
+    'simulated': lambda params: SimulatedHand(),
+    'dynamixel': lambda params: DynamixelHand(params.profile, params.device, params.torque_off_on_fault),
+}
+
+
+class InHandArm:
+    """Hold from `connect` on, move the sliding fingers alike; see `texture_exploration.arms.protocol.Arm`.
+
+    The state is the mean of the sliding fingers. A holding finger that presses with less than half of the wanted force
+    is a fault.
+    """
+
+    Params = InHandParams
+
+    def __init__(self, params: InHandParams = InHandParams(), hand: Hand | None = None) -> None:
+        self._params = params
+        self.hand = hand or HANDS[params.hand](params)
+        self.fingers: FingerSet = find(self.hand.finger_sets, params.finger_set, 'finger set')
+        self._report = FingerReport(params.finger_port)
+        self._connected = False
+
+    def connect(self) -> None:
+        """Reach the hand and close the holding fingers around the object."""
+        self.close()
+        self.hand.connect()
+        self._connected = True
+        self._report.open()
+        self.hand.grip(dict.fromkeys(self.fingers.hold, self._params.grip_force_n))
+        end_s = time.monotonic() + self._params.grip_timeout_s
+        while weak := self._weak():
+            if time.monotonic() > end_s:
+                self.close()
+                raise DeviceError(f'there is nothing to hold: {weak}; give the hand an object')
+            time.sleep(LOOK_S)
+
+    def close(self) -> None:
+        """Let go."""
+        self._connected = False
+        self.hand.close()
+        self._report.close()
+
+    def state(self) -> ArmState:
+        """Return the mean of the sliding fingers."""
+        if not self._connected:
+            raise DeviceError('the hand is not connected; connect it first')
+        hand = self.hand.state()
+        tips = [hand.fingers[name] for name in self.fingers.slide]
+        weak = self._weak()
+        state = ArmState(
+            time_ns=hand.time_ns,
+            position=_mean([tip.position for tip in tips]),
+            velocity=_mean([tip.velocity for tip in tips]),
+            force_n=sum(tip.force_n for tip in tips) / len(tips),
+            fault=hand.fault or (f'the grip is lost: {weak}' if weak else ''),
+        )
+        self._report.send(state)
+        return state
+
+    def command(self, command: ArmCommand) -> None:
+        """Let the sliding fingers follow."""
+        if not self._connected:
+            raise DeviceError('the hand is not connected; connect it first')
+        self.hand.command(self.fingers.slide, command)
+
+    def stop(self) -> None:
+        """Let the sliding fingers stand still; the others hold on."""
+        self.command(ArmCommand())
+
+    def _weak(self) -> str:
+        """Return which holding finger does not press, '' if all do."""
+        tips: Mapping[str, Fingertip] = self.hand.state().fingers
+        wanted = self._params.grip_force_n
+        weak = [name for name in self.fingers.hold if tips[name].force_n < LOST_SHARE * wanted]
+        return ', '.join(f'{name} presses with {tips[name].force_n:.2f} N of {wanted:g} N' for name in weak)
+
+
+def _mean(vectors: list[Vector]) -> Vector:
+    x, y, z = (sum(axis) / len(vectors) for axis in zip(*vectors, strict=True))
+    return x, y, z

@@ -1,0 +1,1 @@
+"""Hands: several fingers, of which some hold an object and others slide on it."""

@@ -1,0 +1,142 @@
+"""A profile: motors, control table, scales and fingers of a Dynamixel hand, from one YAML file (config/hands)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import yaml
+
+from texture_core.catalogue import unknown
+from texture_core.errors import InvalidParameter, TextureError
+from texture_core.resources import find_file
+from texture_exploration.hands.protocol import FingerSet
+
+ROLES = ('press', 'across', 'along')
+REGISTERS = (
+    'operating_mode',
+    'torque_enable',
+    'hardware_error',
+    'position_d',
+    'position_i',
+    'position_p',
+    'goal_current',
+    'goal_position',
+    'present_current',
+    'present_velocity',
+    'present_position',
+)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One motor of a finger: the fingertip moves `lever_m` per rad, linearised around the pose at the start."""
+
+    id: int
+    lever_m: float
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What a profile file says; registers are (address, bytes)."""
+
+    name: str
+    models: tuple[int, ...]
+    baud: int
+    rate_hz: float
+    operating_mode: int
+    gains: Mapping[str, int]
+    position_rad: float
+    zero: int
+    velocity_rad_s: float
+    current_a: float
+    torque_nm_a: float
+    idle_a: float
+    move_a: float
+    table: Mapping[str, tuple[int, int]]
+    fingers: Mapping[str, Mapping[str, Joint]]
+    finger_sets: Mapping[str, FingerSet]
+    start_height_m: float
+    hold_pose: tuple[int, ...] = field(default=())
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """All motors."""
+        moving = [joint.id for finger in self.fingers.values() for joint in finger.values()]
+        return tuple(sorted((*moving, *self.hold_pose)))
+
+    def owner(self, motor: int) -> str:
+        """Return what a motor does, in words."""
+        for name, finger in self.fingers.items():
+            for role, joint in finger.items():
+                if joint.id == motor:
+                    return f"motor {motor} ('{role}' of {name})"
+        return f'motor {motor}'
+
+
+def load_profile(name_or_path: str) -> Profile:
+    """Return a profile that the package ships, or of a file.
+
+    Raises
+    ------
+    UnknownName, InvalidParameter
+        With the nearest name, or what is missing in the file.
+    """
+    path = find_file(name_or_path, 'texture_exploration', 'config/hands', 'hand profile')
+    try:
+        return read_profile(yaml.safe_load(path.read_text(encoding='utf-8')), path.stem)
+    except TextureError:
+        raise
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InvalidParameter(
+            f"hand profile '{path.stem}' cannot be read ({type(error).__name__}: {error}); compare it with those of "
+            'the package, in config/hands'
+        ) from error
+
+
+def read_profile(content: Mapping[str, Any], name: str) -> Profile:
+    """Return the profile in what a file holds; raises as `load_profile`."""
+    where = f"hand profile '{name}'"
+    missing = [register for register in REGISTERS if register not in content['table']]
+    if missing:
+        raise InvalidParameter(f'{where}: the table lacks {", ".join(missing)}')
+    fingers = {finger: _joints(roles, f'{where}, {finger}') for finger, roles in content['fingers'].items()}
+    sets = {key: FingerSet(tuple(one['hold']), tuple(one['slide'])) for key, one in content['finger_sets'].items()}
+    for one in sets.values():
+        for finger in (*one.hold, *one.slide):
+            if finger not in fingers:
+                raise InvalidParameter(f'{where}: {unknown(finger, fingers, "finger")}')
+    scales = content['scales']
+    profile = Profile(
+        name=name,
+        models=tuple(content['models']),
+        baud=int(content['baud']),
+        rate_hz=float(content['rate_hz']),
+        operating_mode=int(content['operating_mode']),
+        gains={register: int(value) for register, value in content['gains'].items()},
+        position_rad=float(scales['position_rad']),
+        zero=int(scales['zero']),
+        velocity_rad_s=float(scales['velocity_rad_s']),
+        current_a=float(scales['current_a']),
+        torque_nm_a=float(content['torque_nm_a']),
+        idle_a=float(content['idle_a']),
+        move_a=float(content['move_a']),
+        table={register: (int(place[0]), int(place[1])) for register, place in content['table'].items()},
+        fingers=fingers,
+        finger_sets=sets,
+        start_height_m=float(content['start_height_m']),
+        hold_pose=tuple(content.get('hold_pose', ())),
+    )
+    if len(set(profile.ids)) != len(profile.ids):
+        raise InvalidParameter(f'{where}: a motor is named twice; each has one place')
+    return profile
+
+
+def _joints(roles: Mapping[str, Any], where: str) -> dict[str, Joint]:
+    for role in roles:
+        if role not in ROLES:
+            raise InvalidParameter(f'{where}: {unknown(str(role), ROLES, "joint")}')
+    if 'press' not in roles:
+        raise InvalidParameter(f"{where}: no motor for 'press'; every finger needs one")
+    return {role: Joint(int(one['id']), float(one['lever_m'])) for role, one in roles.items()}

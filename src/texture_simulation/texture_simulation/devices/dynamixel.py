@@ -1,0 +1,264 @@
+"""A bus of Dynamixel motors (protocol 2.0) on a pseudo-terminal, around an object: written from the protocol.
+
+`FF FF FD 00 | id | length | instruction | parameters | CRC`; the X series' control table. A motor in current-based
+position mode follows its goal by its gain, with at most its goal current; motors that press meet the object.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import struct
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_simulation.devices.pty_port import PtyPort
+
+HEADER = b'\xff\xff\xfd\x00'
+BROADCAST = 0xFE
+PING, READ, WRITE, STATUS, SYNC_READ, SYNC_WRITE = 1, 2, 3, 0x55, 0x82, 0x83
+ALERT, RANGE, ACCESS = 0x80, 4, 7
+EEPROM_END = 64
+MODE, TORQUE, ERROR, P_GAIN, GOAL_CURRENT, GOAL_POSITION, PRESENT = 11, 64, 70, 84, 102, 116, 126
+RAD_PER_COUNT, RAD_S_PER_COUNT, A_PER_COUNT = 0.001533981, 0.0239691, 0.001
+TORQUE_NM_A = 0.35
+A_PER_RAD_AND_GAIN = 0.005  # how much current an error makes, per gain
+DAMPING = 0.01  # N·m per rad/s
+PHYSICS_S = 0.0005
+TURN_S = 0.002
+IDLE_S = 0.0005
+MOST_STEPS = 100
+
+
+@dataclass(frozen=True)
+class Pressing:
+    """A motor whose lever presses a fingertip on the object."""
+
+    lever_m: float
+    height_m: float  # above the object at the start
+
+
+# The motors of a LEAP hand that bend its fingers forward: index, middle, ring, thumb.
+LEAP_PRESSING = {motor: Pressing(0.09, 0.01) for motor in (1, 5, 9, 13)}
+
+
+def crc16(data: bytes) -> int:
+    """Return the checksum of protocol 2.0: polynomial 8005, start 0, not reflected; of "123456789" FEE8."""
+    value = 0
+    for byte in data:
+        value ^= byte << 8
+        for _ in range(8):
+            value = ((value << 1) ^ 0x8005 if value & 0x8000 else value << 1) & 0xFFFF
+    return value
+
+
+class DynamixelMotors:
+    """Control tables and mechanics of all motors.
+
+    Parameters
+    ----------
+    ids
+        Of the motors.
+    pressing
+        Those that press, and how.
+    stiffness_n_m
+        Of fingertip and object; 0: there is no object.
+    model
+        Number of the model.
+    """
+
+    def __init__(
+        self, ids: list[int], pressing: Mapping[int, Pressing], stiffness_n_m: float = 2000.0, model: int = 1220
+    ) -> None:
+        self.ids = ids
+        self.absent: set[int] = set()  # cable out
+        self.stiffness_n_m = stiffness_n_m
+        self.tables = {motor: bytearray(256) for motor in ids}
+        self._angle: Array = np.zeros(len(ids))
+        self._speed: Array = np.zeros(len(ids))
+        self._current: Array = np.zeros(len(ids))
+        self._lever = np.array([pressing[motor].lever_m if motor in pressing else 0.0 for motor in ids])
+        self._height = np.array([pressing[motor].height_m if motor in pressing else 1.0 for motor in ids])
+        for motor in ids:
+            struct.pack_into('<H', self.tables[motor], 0, model)
+            struct.pack_into('<i', self.tables[motor], GOAL_POSITION, 2048)
+        self._show()
+
+    @property
+    def forces_n(self) -> dict[int, float]:
+        """The force of each motor's fingertip on the object."""
+        depth = np.maximum(0.0, self._angle * self._lever - self._height)
+        return dict(zip(self.ids, (self.stiffness_n_m * depth).tolist(), strict=True))
+
+    def angle_rad(self, motor: int) -> float:
+        """Return how far a motor has turned since the start."""
+        return float(self._angle[self.ids.index(motor)])
+
+    def advance(self, steps: int) -> None:
+        """Let time pass, in steps of `PHYSICS_S`."""
+        torque = np.array([self.tables[motor][TORQUE] for motor in self.ids], dtype=bool)
+        goal = (self._registers(GOAL_POSITION, '<i') - 2048) * RAD_PER_COUNT
+        most = np.abs(self._registers(GOAL_CURRENT, '<h')) * A_PER_COUNT
+        gain = self._registers(P_GAIN, '<H') * A_PER_RAD_AND_GAIN
+        for _ in range(steps):
+            self._current = np.where(torque, np.clip(gain * (goal - self._angle), -most, most), 0.0)
+            depth = np.maximum(0.0, self._angle * self._lever - self._height)
+            load = self.stiffness_n_m * depth * self._lever
+            self._speed = (self._current * TORQUE_NM_A - load) / (DAMPING + 2e-3)
+            self._angle = self._angle + self._speed * PHYSICS_S
+        self._show()
+
+    def write(self, motor: int, address: int, data: bytes) -> int:
+        """Write into a control table; return the error of the status packet."""
+        table = self.tables[motor]
+        if address + len(data) > len(table):
+            return RANGE
+        if address < EEPROM_END and table[TORQUE]:
+            return ACCESS
+        table[address : address + len(data)] = data
+        return ALERT if table[ERROR] else 0
+
+    def _registers(self, address: int, form: str) -> Array:
+        return np.array([struct.unpack_from(form, self.tables[motor], address)[0] for motor in self.ids], dtype=float)
+
+    def _show(self) -> None:
+        """Put what is measured into the control tables: current, velocity, position."""
+        for place, motor in enumerate(self.ids):
+            struct.pack_into(
+                '<hii',
+                self.tables[motor],
+                PRESENT,
+                round(self._current[place] / A_PER_COUNT),
+                round(self._speed[place] / RAD_S_PER_COUNT),
+                round(self._angle[place] / RAD_PER_COUNT) + 2048,
+            )
+
+
+class EmulatedDynamixelBus:
+    """The motors in real time behind a device path, in a thread of their own; usable as a context."""
+
+    def __init__(self, link: Path, motors: DynamixelMotors) -> None:
+        self.motors = motors
+        self.port = PtyPort(link)
+        self._heard = b''
+        self._using = threading.Lock()  # the port: it is unplugged by others
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='dynamixel bus', daemon=True)
+
+    def __enter__(self) -> EmulatedDynamixelBus:
+        self.port.plug()
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._closing.set()
+        self._thread.join()
+        self.port.unplug()
+
+    def _run(self) -> None:
+        due_s = time.monotonic()
+        while not self._closing.is_set():
+            with self._using:
+                data = self.port.read()
+                self.port.write(self.hear(data))
+            if not data:
+                self._closing.wait(IDLE_S)
+            steps = int((time.monotonic() - due_s) / PHYSICS_S)
+            if steps * PHYSICS_S >= TURN_S:
+                due_s += steps * PHYSICS_S
+                self.motors.advance(min(steps, MOST_STEPS))
+
+    def plug(self) -> None:
+        """Plug it in again; it gets another device name."""
+        with self._using:
+            self.port.plug()
+
+    def unplug(self) -> None:
+        """Pull its plug."""
+        with self._using:
+            self.port.unplug()
+
+    def hear(self, data: bytes) -> bytes:
+        """Return the answers to what came over the line."""
+        self._heard += data
+        answers = b''
+        while (at := self._heard.find(HEADER)) >= 0 and len(self._heard) >= at + 7:
+            length = int.from_bytes(self._heard[at + 5 : at + 7], 'little')
+            packet = self._heard[at : at + 7 + length]
+            if len(packet) < 7 + length:
+                break
+            self._heard = self._heard[at + 7 + length :]
+            if crc16(packet[:-2]) == int.from_bytes(packet[-2:], 'little'):
+                answers += self._obey(packet[4], packet[7], packet[8:-2].replace(b'\xff\xff\xfd\xfd', b'\xff\xff\xfd'))
+        return answers
+
+    def _obey(self, motor: int, instruction: int, params: bytes) -> bytes:
+        if instruction == SYNC_READ:
+            address, size = struct.unpack_from('<HH', params)
+            return self._sync_read(address, size, params[4:])
+        if instruction == SYNC_WRITE:
+            address, size = struct.unpack_from('<HH', params)
+            for at in range(4, len(params), size + 1):
+                if self._there(params[at]):
+                    self.motors.write(params[at], address, params[at + 1 : at + 1 + size])
+            return b''
+        if not self._there(motor):
+            return b''
+        return self._one(motor, instruction, params)
+
+    def _one(self, motor: int, instruction: int, params: bytes) -> bytes:
+        table = self.motors.tables[motor]
+        if instruction == PING:
+            return self._status(motor, bytes(table[0:2]) + bytes([table[6]]))
+        if instruction == READ:
+            address, size = struct.unpack('<HH', params)
+            return self._status(motor, bytes(table[address : address + size]))
+        if instruction == WRITE:
+            error = self.motors.write(motor, int.from_bytes(params[:2], 'little'), params[2:])
+            return self._status(motor, b'', error)
+        return self._status(motor, b'', 2)
+
+    def _sync_read(self, address: int, size: int, ids: bytes) -> bytes:
+        answers = b''
+        for motor in ids:
+            if not self._there(motor):
+                break  # each waits for the one before it
+            answers += self._status(motor, bytes(self.motors.tables[motor][address : address + size]))
+        return answers
+
+    def _there(self, motor: int) -> bool:
+        return motor in self.motors.tables and motor not in self.motors.absent
+
+    def _status(self, motor: int, params: bytes, error: int = 0) -> bytes:
+        error |= ALERT if self.motors.tables[motor][ERROR] else 0
+        body = (bytes([STATUS, error]) + params).replace(b'\xff\xff\xfd', b'\xff\xff\xfd\xfd')
+        packet = HEADER + bytes([motor]) + struct.pack('<H', len(body) + 2) + body
+        return packet + struct.pack('<H', crc16(packet))
+
+
+def main() -> None:
+    """Run an emulated LEAP hand until Ctrl-C, as in `python -m texture_simulation.devices.dynamixel`."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument(
+        'link', type=Path, nargs='?', default=Path('/tmp/texture/dynamixel'), help='device path to make'
+    )
+    options = parser.parse_args()
+    stopped = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda _number, _frame: stopped.set())
+    with EmulatedDynamixelBus(options.link, DynamixelMotors(list(range(16)), LEAP_PRESSING)):
+        print(f'the hand is at {options.link}', flush=True)
+        stopped.wait()
+
+
+if __name__ == '__main__':
+    main()
