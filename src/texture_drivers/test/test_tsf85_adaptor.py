@@ -18,6 +18,7 @@ from texture_msgs import msg
 from texture_core.errors import InvalidParameter
 from texture_core.ros.qos import SENSOR_QOS
 from texture_drivers.nodes.tsf85_adaptor import Tsf85Adaptor
+from texture_drivers.tsf85.messages import MessageStream
 
 pytestmark = pytest.mark.ros
 DEADLINE_S = 20.0
@@ -74,6 +75,27 @@ def test_the_vendors_messages_become_signals_and_silence_is_reported(context: An
     finally:
         node.destroy_node()
         listener.destroy_node()
+
+
+def test_a_message_is_handed_over_with_the_time_at_which_it_was_sent(
+    context: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken: list[tuple[str, int]] = []
+    monkeypatch.setattr(MessageStream, 'take', lambda _, topic, message, ns: taken.append((topic, ns)))
+    node = Tsf85Adaptor(context=context)
+    sender = node.create_publisher(String, 'TactileSensor/Dynamic', SENSOR_QOS)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    deadline_s = time.monotonic() + DEADLINE_S
+    try:
+        while not taken:
+            assert time.monotonic() < deadline_s
+            sender.publish(String())
+            executor.spin_once(timeout_sec=0.1)
+        assert taken[0][0] == 'Dynamic'
+        assert abs(time.time_ns() - taken[0][1]) < 5e9
+    finally:
+        node.destroy_node()
 
 
 def test_a_package_that_is_missing_is_told_in_one_sentence(context: Any) -> None:

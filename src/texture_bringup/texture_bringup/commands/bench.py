@@ -19,12 +19,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--out', type=Path, default=Path('docs/charts'), metavar='DIR', help='folder for the results')
     parser.add_argument('--data', type=Path, metavar='DIR', help='folder of the recorded data sets (DIR/biotac20)')
     parser.add_argument('--quick', action='store_true', help='fewer repetitions; not for publishing')
+    parser.add_argument(
+        '--duration', type=float, default=30.0, metavar='S', help='length of the long measurement of `load`, s'
+    )
     add_seed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run one benchmark, or all for which the data is there."""
-    bench = Bench(options.out, options.data, options.seed, options.quick)
+    bench = Bench(options.out, options.data, options.seed, options.quick, options.duration)
     if options.name == ALL:
         for name in BENCHES:
             _run_if_possible(name, bench)
