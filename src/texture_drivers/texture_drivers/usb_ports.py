@@ -47,7 +47,7 @@ def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: List = list
     seen = ', '.join(sorted(_described(port) for port in listed)) or 'none'
     wanted = ' or '.join(_numbers(*usb_id) for usb_id in usb_ids)
     raise DeviceError(
-        f"device 'auto' is no {kind} ({wanted}): the serial ports on USB are {seen}; plug it in, or set the parameter "
+        f"device 'auto' is no {kind} ({wanted}): the serial ports here are {seen}; plug it in, or set the parameter "
         'device to its path'
     )
 
