@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,9 +31,9 @@ class ExplorePresetParams:
 
 
 class ExplorePreset(Node):
-    """A client of the service `explore`; its process ends when all is done, with 0 if all went well."""
+    """A client of the service `explore`; calls `on_end` when all is done."""
 
-    def __init__(self, **kwargs: Any) -> None:
+    def __init__(self, on_end: Callable[[], None] = lambda: None, **kwargs: Any) -> None:
         super().__init__('explore_preset', **kwargs)
         params = declare(self, ExplorePresetParams)
         preset = load_preset(params.preset)
@@ -40,6 +42,7 @@ class ExplorePreset(Node):
         self._ahead = [replace(request, surface=params.surface) for request in requests]
         self._total = len(self._ahead)
         self._busy = False
+        self._on_end = on_end
         self._client = self.create_client(srv.Explore, 'explore')
         self._timer = self.create_timer(LOOK_S, self._go_on)
         self.get_logger().info(f"preset '{preset.name}': {self._total} explorations; {preset.paper}")
@@ -50,7 +53,9 @@ class ExplorePreset(Node):
             return
         if not self._ahead:
             self.get_logger().info(f'ended: {dict(self.counts)}')
-            sys.exit(0 if self.counts['done'] == self._total else 1)
+            self._timer.cancel()
+            self._on_end()
+            return
         self._busy = True
         request = request_to_msg(self._ahead.pop(0), srv.Explore.Request)
         self._client.call_async(request).add_done_callback(self._on_answer)
@@ -63,7 +68,19 @@ class ExplorePreset(Node):
         self.get_logger().info(f'{number} of {self._total}, {kind}: {answer.exploration_id} {answer.message}')
         self._busy = False
 
+    @property
+    def all_well(self) -> bool:
+        """Whether every exploration was made to its end."""
+        return self.counts['done'] == self._total
+
 
 def main() -> None:
-    """Run the node."""
-    run(ExplorePreset)
+    """Run the node until all is done; end with 1 if something went wrong."""
+    nodes: list[ExplorePreset] = []
+
+    def make() -> ExplorePreset:
+        nodes.append(ExplorePreset(lambda: signal.raise_signal(signal.SIGTERM)))
+        return nodes[0]
+
+    run(make)
+    sys.exit(0 if nodes[0].all_well else 1)
