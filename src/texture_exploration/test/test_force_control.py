@@ -1,14 +1,15 @@
 """The force loop alone, and through the explorer on an arm without a force mode."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_core.exploration import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.force_control import ForceController, ForceLoopParams, SlopeObserver, StiffnessEstimate
+from texture_exploration.force_trials import ARM, SURFACES, slide_trial, surface_trials
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.stability import growth
 
@@ -16,28 +17,17 @@ TILT = math.radians(10)
 PERIOD_S = 0.004
 
 
-def slide(make_table, stiffness, touch=None, **surface):
+def slide(stiffness, acceleration_m_s2=1.0, **surface):
     """Return overshoot, root mean square and speed error of a slide with 1 N, as shares."""
-    arm = {'force_mode': False, 'start_height_m': 0.002, 'stiffest_n_m': max(stiffness, 1000.0), **surface}
-    table = make_table(SimulatedArmParams(stiffness_n_m=stiffness, **arm), touch=touch or TouchParams())
-    log, pace = [], table.pace
-
-    def logging_pace():
-        pace()
-        log.append((table.exploration.state.phase, table.arm.state()))
-
-    table.pace = logging_pace
-    outcome = table.explore(ExplorationRequest('linear_slide', distance_m=0.06))
-    assert outcome.success, outcome.message
-    contact = [state.force_n for phase, state in log if phase in (Phase.APPROACH, Phase.CONTACT)]
-    force = np.array([state.force_n for phase, state in log if phase is Phase.SLIDE])
-    speed = np.array([math.hypot(*state.velocity[:2]) for phase, state in log if phase is Phase.SLIDE])
-    return max(contact) - 1, np.sqrt(np.mean((force - 1) ** 2)), abs(speed / 0.05 - 1).max()
+    arm = replace(ARM, stiffness_n_m=stiffness, stiffest_n_m=max(stiffness, 1000.0), **surface)
+    trial = slide_trial(arm, touch=TouchParams(acceleration_m_s2=acceleration_m_s2))
+    assert trial.success, trial.message
+    return trial.overshoot, trial.force_rms, trial.speed_error
 
 
 @pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
-def test_from_soft_to_stiff_the_contact_is_gentle_and_the_slide_steady(make_table, stiffness):
-    overshoot, rms, speed = slide(make_table, stiffness)
+def test_from_soft_to_stiff_the_contact_is_gentle_and_the_slide_steady(stiffness):
+    overshoot, rms, speed = slide(stiffness)
     assert overshoot < 0.2
     assert rms < 0.05
     assert speed < 0.02
@@ -45,25 +35,25 @@ def test_from_soft_to_stiff_the_contact_is_gentle_and_the_slide_steady(make_tabl
 
 @pytest.mark.parametrize('tilt', [-TILT, TILT])
 @pytest.mark.parametrize('stiffness', [200.0, 2000.0])
-def test_a_tilted_surface_is_followed(make_table, stiffness, tilt):
-    overshoot, rms, _ = slide(make_table, stiffness, tilt_rad=tilt)
+def test_a_tilted_surface_is_followed(stiffness, tilt):
+    overshoot, rms, _ = slide(stiffness, tilt_rad=tilt)
     assert overshoot < 0.2
     assert rms < 0.05
 
 
-def test_a_stiff_tilted_surface_wants_a_soft_start(make_table):
-    _, rms, _ = slide(make_table, 20000.0, TouchParams(acceleration_m_s2=0.2), tilt_rad=TILT)
+def test_a_stiff_tilted_surface_wants_a_soft_start():
+    _, rms, _ = slide(20000.0, 0.2, tilt_rad=TILT)
     assert rms < 0.05
 
 
-def test_a_bump_of_two_millimetres_is_followed(make_table):
-    _, rms, _ = slide(make_table, 2000.0, bump_m=0.002)
+def test_a_bump_of_two_millimetres_is_followed():
+    _, rms, _ = slide(2000.0, bump_m=0.002)
     assert rms < 0.05
 
 
-def test_a_sticky_surface_neither_holds_the_finger_nor_sets_it_swinging(make_table):
+def test_a_sticky_surface_neither_holds_the_finger_nor_sets_it_swinging():
     # The surface itself lets the force swing by 0.05 N, which is 0.029 N in the root mean square.
-    _, rms, speed = slide(make_table, 2000.0, adhesion_n=0.5, stick_slip_n=0.05)
+    _, rms, speed = slide(2000.0, adhesion_n=0.5, stick_slip_n=0.05)
     assert rms < 2 * 0.029
     assert speed < 0.02
 
@@ -112,3 +102,16 @@ def test_the_observer_sees_a_slope_at_once_when_the_speed_changes():
         height += 0.1 * speed * PERIOD_S
         rise = observer.update(height, speed, PERIOD_S)
     assert rise == pytest.approx(0.1 * speed, rel=0.02)
+
+
+def test_a_trial_without_a_surface_says_why():
+    trial = slide_trial(replace(ARM, stiffness_n_m=0.0))
+    assert not trial.success
+    assert 'no surface' in trial.message
+    assert math.isnan(trial.force_rms)
+
+
+def test_the_trials_cover_all_surfaces():
+    trials = surface_trials([2000.0])
+    assert set(trials) == set(SURFACES)
+    assert all(trial[2000.0].success for trial in trials.values())
