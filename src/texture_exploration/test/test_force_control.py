@@ -105,7 +105,7 @@ def test_the_observer_sees_a_slope_at_once_when_the_speed_changes():
 
 
 def test_a_trial_without_a_surface_says_why():
-    trial = slide_trial(replace(ARM, stiffness_n_m=0.0))
+    trial = slide_trial(replace(ARM, stiffness_n_m=0.0), touch=TouchParams(approach_travel_m=0.01))
     assert not trial.success
     assert 'no surface' in trial.message
     assert math.isnan(trial.force_rms)
