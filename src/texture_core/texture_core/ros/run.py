@@ -15,6 +15,11 @@ from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import TextureError
 
+try:  # from rclpy 7.1.4 on; half the computing time per message
+    from rclpy.experimental import EventsExecutor as OneThread
+except ImportError:
+    OneThread = SingleThreadedExecutor
+
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -31,7 +36,7 @@ def run(make_node: Callable[[], Any], args: Sequence[str] | None = None, threads
     node = None
     try:
         node = make_node()
-        executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(num_threads=threads)
+        executor = OneThread() if threads == 1 else MultiThreadedExecutor(num_threads=threads)
         executor.add_node(node)
         _wake_on_signals(executor)
         while rclpy.ok() and not stopped.is_set():
