@@ -19,7 +19,7 @@ from texture_exploration.hands.profile import load_profile
 from texture_exploration.hands.simulated import SimulatedHand
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.dynamixel import DynamixelMotors, EmulatedDynamixelBus, Pressing, crc16
+from texture_simulation.devices.dynamixel import DynamixelMotors, EmulatedDynamixelBus, Pressing
 
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')
@@ -103,11 +103,6 @@ def test_a_broken_profile_is_told(tmp_path):
     path.write_text('models: [1]\n')
     with pytest.raises(InvalidParameter, match="hand profile 'mine' cannot be read"):
         load_profile(str(path))
-
-
-def test_the_checksum_is_that_of_the_protocol():
-    assert crc16(b'123456789') == 0xFEE8
-    assert crc16(bytes.fromhex('fffffd0001030001')) == 0x4E19
 
 
 def test_the_page_lists_the_parameters_as_they_are():

@@ -20,7 +20,7 @@ from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.devices.rails import EmulatedRails, RailsFirmware, RailsMachine
+from texture_simulation.devices.rails import EmulatedRails, RailsMachine
 
 DEADLINE_S = 20.0
 SLIDING = ArmCommand(tangential_m_s=(0.02, 0.01))
@@ -55,12 +55,6 @@ def move(vx=0.0, vy=0.0, mode=tables.HOLD, value=0):
     return order(tables.MOVE, tables.MOVE_BODY.pack(round(vx * 1e6), round(vy * 1e6), mode, value))
 
 
-def advance(firmware, seconds, keep=b''):
-    for _ in range(round(seconds / 0.0025)):
-        firmware.hear(keep)
-        firmware.advance(0.0025)
-
-
 def test_a_move_is_these_bytes():
     # kind, version, sequence, time, 1, 1, 25500 µm/s, 0, press, 1500 mN
     content = unpack(move(0.0255, 0.0, tables.PRESS, 1500)[:-1])
@@ -68,37 +62,9 @@ def test_a_move_is_these_bytes():
     assert content.body == struct.pack('<iiBi', 25500, 0, 2, 1500)
 
 
-def test_pressing_stops_at_the_force_and_locks():
-    firmware = RailsFirmware(RailsMachine(start_height_m=0.002))
-    advance(firmware, 3.0, move(mode=tables.PRESS, value=1500))
-    assert firmware.force_n == pytest.approx(1.5, rel=0.02)
-    firmware.surface_m = 0.0001  # a locked motor does not give way
-    advance(firmware, 0.5, move(mode=tables.PRESS, value=1500))
-    assert firmware.force_n == pytest.approx(1.7, rel=0.03)
-    assert firmware.velocity[2] == 0.0
-
-
 def test_the_page_lists_the_parameters_as_they_are():
     page = Path(__file__).parents[3] / 'docs' / 'robots' / 'rails.md'
     assert markdown_table(RailsParams) in page.read_text()
-
-
-def test_silence_of_150_ms_stops_everything():
-    firmware = RailsFirmware(RailsMachine())
-    firmware.hear(move(0.02))
-    advance(firmware, 0.14)
-    assert firmware.velocity[0] == pytest.approx(0.02)
-    advance(firmware, 0.05)
-    assert firmware.velocity[0] == 0.0
-    assert firmware.watchdog_stops == 1
-
-
-def test_the_end_switches_stop_a_rail():
-    firmware = RailsFirmware(RailsMachine(travel_m=0.01))
-    advance(firmware, 1.0, move(0.05, 0.002))
-    assert firmware.position[:2] == pytest.approx([0.01, 0.002], abs=1e-4)
-    advance(firmware, 0.1, move(-0.05))
-    assert firmware.position[0] < 0.009
 
 
 def test_an_overload_lifts_the_finger_and_is_a_fault_until_cleared(rails, arm):

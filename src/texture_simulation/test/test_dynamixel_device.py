@@ -1,0 +1,77 @@
+"""The emulated Dynamixel bus, by the bytes of protocol 2.0."""
+
+import struct
+from pathlib import Path
+
+import pytest
+
+from texture_simulation.devices.dynamixel import DynamixelMotors, EmulatedDynamixelBus, Pressing, crc16
+
+PING_1 = bytes.fromhex('fffffd00010300 01 194e'.replace(' ', ''))
+
+
+@pytest.fixture
+def bus():
+    return EmulatedDynamixelBus(Path('/nowhere'), DynamixelMotors([1, 2], {1: Pressing(0.1, 0.01)}))
+
+
+def packet(motor, instruction, params=b''):
+    body = bytes([instruction]) + params.replace(b'\xff\xff\xfd', b'\xff\xff\xfd\xfd')
+    content = b'\xff\xff\xfd\x00' + bytes([motor]) + struct.pack('<H', len(body) + 2) + body
+    return content + struct.pack('<H', crc16(content))
+
+
+def write(motor, address, value, size):
+    return packet(motor, 3, struct.pack('<H', address) + (value % (1 << 8 * size)).to_bytes(size, 'little'))
+
+
+def read(bus, motor, address, form):
+    answer = bus.hear(packet(motor, 2, struct.pack('<HH', address, struct.calcsize(form))))
+    return struct.unpack(form, answer[9:-2])[0]
+
+
+def test_the_checksum_is_that_of_the_protocol():
+    assert crc16(b'123456789') == 0xFEE8
+    assert packet(1, 1) == PING_1
+
+
+def test_a_ping_answers_with_the_model_and_in_pieces(bus):
+    assert bus.hear(PING_1[:4]) == b''
+    answer = bus.hear(PING_1[4:])
+    assert answer[4] == 1
+    assert struct.unpack('<H', answer[9:11])[0] == 1220
+
+
+def test_noise_and_a_wrong_checksum_get_no_answer(bus):
+    assert bus.hear(b'\x00\xff' + PING_1[:-1] + b'\x00') == b''
+    assert bus.hear(PING_1)
+
+
+def test_the_mode_cannot_be_changed_under_torque(bus):
+    bus.hear(write(1, 64, 1, 1))
+    assert bus.hear(write(1, 11, 5, 1))[8] == 7
+    bus.hear(write(1, 64, 0, 1))
+    assert bus.hear(write(1, 11, 5, 1))[8] == 0
+
+
+def test_a_sync_read_ends_at_the_first_that_is_silent(bus):
+    bus.motors.absent = {1}
+    ask = packet(0xFE, 0x82, struct.pack('<HH', 132, 4) + bytes([1, 2]))
+    assert bus.hear(ask) == b''
+    bus.motors.absent = set()
+    assert bus.hear(ask).count(b'\xff\xff\xfd\x00') == 2
+
+
+def test_the_goal_current_bounds_the_force(bus):
+    for address, value, size in ((84, 600, 2), (102, 200, 2), (116, 2048 + 400, 4), (64, 1, 1)):
+        bus.hear(write(1, address, value, size))
+    bus.motors.advance(4000)
+    assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.35 / 0.1, rel=0.01)  # current · torque constant / lever
+    assert read(bus, 1, 126, '<h') == 200
+
+
+def test_a_free_motor_goes_to_its_goal(bus):
+    for address, value, size in ((84, 600, 2), (102, 300, 2), (116, 1948, 4), (64, 1, 1)):
+        bus.hear(write(2, address, value, size))
+    bus.motors.advance(2000)
+    assert read(bus, 2, 132, '<i') == 1948

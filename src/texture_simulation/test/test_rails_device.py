@@ -1,0 +1,84 @@
+"""The firmware of the emulated rails, by the bytes of its protocol."""
+
+import struct
+
+import pytest
+
+from texture_core.framing import Frame, pack, unpack
+from texture_simulation.devices.rails import LOCKED, OVERLOAD, RailsFirmware, RailsMachine
+
+HOLD, MOVING, PRESS = 0, 1, 2
+STEP_S = 0.0025
+
+
+def move(vx=0.0, vy=0.0, mode=HOLD, value=0):
+    return pack(Frame(0xA0, 1, 0, 0, 1, 1, struct.pack('<iiBi', round(vx * 1e6), round(vy * 1e6), mode, value)))
+
+
+def advance(firmware, seconds, keep=b''):
+    for _ in range(round(seconds / STEP_S)):
+        firmware.hear(keep)
+        firmware.advance(STEP_S)
+
+
+def state(firmware):
+    return struct.unpack('<iiiiBH', unpack(firmware.state()[:-1]).body)
+
+
+def test_pressing_stops_at_the_force_and_locks():
+    firmware = RailsFirmware(RailsMachine(start_height_m=0.002))
+    press = move(mode=PRESS, value=1500)
+    advance(firmware, 3.0, press)
+    assert firmware.force_n == pytest.approx(1.5, rel=0.02)
+    assert state(firmware)[4] & LOCKED
+    firmware.surface_m = 0.0001  # a locked motor does not give way
+    advance(firmware, 0.5, press)
+    assert firmware.force_n == pytest.approx(1.7, rel=0.03)
+    assert firmware.velocity[2] == 0.0
+
+
+def test_silence_of_150_ms_stops_everything():
+    firmware = RailsFirmware(RailsMachine())
+    firmware.hear(move(0.02))
+    advance(firmware, 0.14)
+    assert firmware.velocity[0] == pytest.approx(0.02)
+    advance(firmware, 0.05)
+    assert firmware.velocity[0] == 0.0
+    assert state(firmware)[5] == 1
+
+
+def test_the_end_switches_stop_a_rail_and_let_it_back():
+    firmware = RailsFirmware(RailsMachine(travel_m=0.01))
+    advance(firmware, 1.0, move(0.05, 0.002))
+    assert firmware.position[:2] == pytest.approx([0.01, 0.002], abs=1e-4)
+    assert state(firmware)[4] & 0b1111 == 0b0010
+    advance(firmware, 0.1, move(-0.05))
+    assert firmware.position[0] < 0.009
+    assert state(firmware)[4] & 0b1111 == 0
+
+
+def test_the_encoders_count_the_way():
+    firmware = RailsFirmware(RailsMachine(acceleration_m_s2=1e6))
+    advance(firmware, 1.0, move(0.0255, -0.01, MOVING, 1000))
+    x, y, z, *_ = state(firmware)
+    assert (x, y, z) == pytest.approx((0.0255 * 200_000, -0.01 * 200_000, 1000), abs=2)
+
+
+def test_an_overload_lifts_the_finger_whatever_is_ordered_until_cleared():
+    firmware = RailsFirmware(RailsMachine())
+    firmware.surface_m = 0.02
+    advance(firmware, 0.1, move(mode=PRESS, value=1000))
+    assert state(firmware)[4] & OVERLOAD
+    firmware.surface_m = 0.0
+    firmware.hear(pack(Frame(0xA2, 1, 0, 0, 1, 1, b'')))
+    assert not state(firmware)[4] & OVERLOAD
+
+
+def test_damaged_orders_are_counted_and_passed_over():
+    firmware = RailsFirmware(RailsMachine())
+    broken = bytearray(move(0.02))
+    broken[5] ^= 0x40  # not to zero, which would make two of one
+    firmware.hear(bytes(broken) + move(0.01))
+    advance(firmware, 0.1)
+    assert firmware.bad_frames == 1
+    assert firmware.velocity[0] == pytest.approx(0.01)
