@@ -69,3 +69,15 @@ def test_what_cannot_be_done_is_refused_with_what_can():
     assert refusal(distance_m=0.1) == 'circular knows no distance_m; leave it at 0'
     assert 'at most 0.158 m/s' in refusal(radius_m=0.005, speed_m_s=0.2)
     assert 'at most 0.05 m' in refusal(SafetyLimits(x_low_m=-0.05), radius_m=0.08)
+
+
+def test_an_offset_of_the_force_before_it_is_zeroed_is_no_touch(table):
+    table.arm.push(1.3)
+    table.pace()
+    table.when[Phase.APPROACH] = lambda: table.arm.push(0.0)
+    assert table.explore(ExplorationRequest('circular')).success
+
+
+def test_something_in_the_way_to_the_start_is_met(table):
+    table.when[Phase.APPROACH] = lambda: table.arm.push(1.3)
+    assert 'met something on the way' in table.explore(ExplorationRequest('circular')).message
