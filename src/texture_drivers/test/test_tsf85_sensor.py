@@ -273,6 +273,14 @@ def test_the_prototype_has_12_taxels_at_25_hz(wire: Wire, clock: Clock) -> None:
     assert sensor.counts['bogus'] == 0
 
 
+def test_all_that_has_come_is_read_at_once_after_a_pause(wire: Wire, sensor: Tsf85) -> None:
+    sensor.open()
+    for stamp_ms in range(500):  # 10 kB: more than the kernel hands over at once
+        wire.say(stamp_ms, 0)
+    sensor.read()
+    assert sensor._parser.packets == 500
+
+
 def test_a_third_finger_is_refused_with_a_sentence() -> None:
     with pytest.raises(InvalidParameter, match=r"'finger' is 2; a TSF-85 has the fingers 0 and 1"):
         Tsf85(SensorParams(finger=2))

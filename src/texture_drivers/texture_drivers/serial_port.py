@@ -13,6 +13,7 @@ from texture_core.errors import DeviceError
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
 FAULTS = (serial.SerialException, OSError, termios.error)
+MOST_BYTES = 65536  # at once
 MODEM_SETTLE_S = 0.2  # the vendor's pause between raising DTR and the first command
 
 
@@ -44,8 +45,12 @@ class SerialPort:
 
     def read(self) -> bytes:
         """Return what has arrived, without waiting."""
+        data = b''
         with self._faults():
-            return bytes(self._serial.read(self._serial.in_waiting))
+            # The kernel hands over 4 kB at once and holds more behind them; what comes meanwhile is for the next time.
+            while (waiting := self._serial.in_waiting) and len(data) < MOST_BYTES:
+                data += self._serial.read(waiting)
+        return data
 
     def write(self, data: bytes) -> None:
         """Send."""
