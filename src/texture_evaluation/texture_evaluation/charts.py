@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +53,8 @@ class Tour:
         The growing evidence, after each window.
     labels, table
         Confusion of test windows, as `metrics.confusion` counts it.
+    others
+        Slides over other surfaces, (n_samples,) each, whose spectra are drawn beside for comparison.
     """
 
     source: str
@@ -63,6 +65,7 @@ class Tour:
     estimates: Sequence[TextureEstimate]
     labels: Sequence[str]
     table: AnyArray
+    others: Mapping[str, Array] = field(default_factory=dict)
 
 
 def picture(tour: Tour, path: str | Path) -> Path:
@@ -183,13 +186,18 @@ def _signal(axes: Any, tour: Tour) -> None:
 
 
 def _spectrum(axes: Any, tour: Tour) -> None:
-    samples: Samples = np.asarray(tour.samples, dtype=float)
-    n_segment = min(len(samples), round(tour.rate_hz / 2))
-    hertz, power = welch(samples, fs=tour.rate_hz, nperseg=n_segment)
-    axes.semilogy(hertz[1:], power[1:], color=COLOURS[0], linewidth=1)
+    slides = {tour.surface: tour.samples, **tour.others}
+    for (name, slide), colour in zip(slides.items(), COLOURS, strict=False):
+        samples: Samples = np.asarray(slide, dtype=float)
+        n_segment = min(len(samples), round(tour.rate_hz / 2))
+        hertz, power = welch(samples, fs=tour.rate_hz, nperseg=n_segment)
+        own = name == tour.surface
+        axes.semilogy(hertz[1:], power[1:], color=colour, linewidth=1.4 if own else 0.7, label=name, zorder=2 + own)
     unit = f'{tour.unit}²/Hz' if tour.unit else '1/Hz'
     axes.set(xlabel='frequency (Hz)', ylabel=f'power density ({unit})')
     axes.set_title('2. Its spectrum is the mark of the surface')
+    if tour.others:
+        axes.legend(loc='upper right')
 
 
 def _evidence(axes: Any, tour: Tour) -> None:

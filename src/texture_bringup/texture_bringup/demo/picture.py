@@ -35,7 +35,9 @@ def draw(bag: Path, surface: str, report: Report, source: str, path: Path) -> Pa
     candidates = [name for name in estimates if states[name][0].surface == surface]
     name = min(candidates, key=lambda each: _first_share(estimates[each]))
     samples, rate_hz, unit = _sliding_part(states[name], batches)
-    tour = Tour(source, surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion)
+    others = {states[each][0].surface: _sliding_part(states[each], batches)[0] for each in estimates}
+    del others[surface]
+    tour = Tour(source, surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion, others)
     return picture(tour, path)
 
 
