@@ -1,6 +1,8 @@
 # The set-up is tools/workspace.py; every target below calls it first, and a finished set-up is recognised in a second.
 PYTHON ?= python3
 RUN := .venv/bin/ros-run
+# Public recordings for evaluation, if they lie beside the repository or where the user says.
+export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
 .PHONY: setup demo test lint bench clean
 

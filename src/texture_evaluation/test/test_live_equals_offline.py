@@ -24,7 +24,7 @@ from texture_evaluation.train import train_from_bags
 
 pytestmark = pytest.mark.ros
 
-DATA = Path(os.environ.get('TEXTURE_DATA', Path(__file__).resolve().parents[4] / 'shared' / 'data')) / 'biotac20'
+DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data') / 'biotac20'
 Estimates = dict[str, list[TextureEstimate]]
 
 

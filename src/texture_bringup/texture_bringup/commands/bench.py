@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 
 from texture_bringup.commands.options import add_seed
@@ -17,7 +18,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument('name', help=f'one of {", ".join(BENCHES)}, or {ALL}')
     parser.add_argument('--out', type=Path, default=Path('docs/charts'), metavar='DIR', help='folder for the results')
-    parser.add_argument('--data', type=Path, metavar='DIR', help='folder of the recorded data sets (DIR/biotac20)')
+    parser.add_argument(
+        '--data',
+        type=Path,
+        default=os.environ.get('TEXTURE_DATA') or None,
+        metavar='DIR',
+        help='folder of the recorded data sets (DIR/biotac20); default: $TEXTURE_DATA',
+    )
     parser.add_argument('--quick', action='store_true', help='fewer repetitions; not for publishing')
     parser.add_argument(
         '--duration', type=float, default=30.0, metavar='S', help='length of the long measurement of `load`, s'
