@@ -42,7 +42,6 @@ def run(bench: Bench) -> BenchResult:
         'Sensor node with 8 channels at ever higher rates (emulated DAQ finger)',
         ('samples of each channel a second (kHz)', '%'),
         bench.out / 'sensors-load.png',
-        logarithmic=True,
     )
     return BenchResult(
         name='sensors-load',

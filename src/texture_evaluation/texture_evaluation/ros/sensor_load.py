@@ -30,7 +30,7 @@ class Load:
     seconds
         How long.
     rate_hz
-        Samples of each channel that it published a second, by its own counts.
+        Samples that it published a second by its own counts, all fingers and streams together.
     lost
         Samples that the driver missed.
     unsent_bytes
