@@ -43,3 +43,11 @@ def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sent
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count('\n') == 1
+
+
+def test_the_arguments_shown_are_also_those_of_included_files(capsys) -> None:
+    assert main(['launch', 'ur', '--show-args']) == 0
+    shown = capsys.readouterr().out
+    assert 'ip:=127.0.0.2' in shown
+    assert 'surface:=glass' in shown
+    assert shown.count('finger_port:=') == 1

@@ -1,12 +1,24 @@
 """The emulated Dynamixel bus, by the bytes of protocol 2.0."""
 
+import socket
 import struct
+import time
 from pathlib import Path
 
 import pytest
 
-from texture_simulation.devices.dynamixel import DynamixelMotors, EmulatedDynamixelBus, Pressing, crc16
+from texture_core.finger import FingerState
+from texture_simulation.devices.dynamixel import (
+    LEAP_FINGERS,
+    LEAP_IDS,
+    LEAP_PRESSING,
+    DynamixelMotors,
+    EmulatedDynamixelBus,
+    Pressing,
+    crc16,
+)
 
+DEADLINE_S = 20.0
 PING_1 = bytes.fromhex('fffffd00010300 01 194e'.replace(' ', ''))
 
 
@@ -75,3 +87,26 @@ def test_a_free_motor_goes_to_its_goal(bus):
         bus.hear(write(2, address, value, size))
     bus.motors.advance(2000)
     assert read(bus, 2, 132, '<i') == 1948
+
+
+def test_the_bench_is_told_where_the_finger_is_and_how_hard_it_presses(tmp_path):
+    motors, finger = DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING), LEAP_FINGERS['index']
+    # 257 mA · 0.35 N·m/A / 0.09 m = 1 N
+    for motor, current_ma, angle_rad in ((finger.press, 257, 0.4), (finger.across, 350, 0.1)):
+        motors.write(motor, 84, struct.pack('<H', 600))
+        motors.write(motor, 102, struct.pack('<h', current_ma))
+        motors.write(motor, 116, struct.pack('<i', 2048 + round(angle_rad / 0.001533981)))
+        motors.write(motor, 64, b'\1')
+    deadline = time.monotonic() + DEADLINE_S
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
+        bench.bind(('127.0.0.1', 0))
+        bench.settimeout(DEADLINE_S)
+        state = FingerState(0)
+        with EmulatedDynamixelBus(tmp_path / 'bus', motors, finger, bench.getsockname()[1]):
+            while state.x_m < 0.0085 or state.force_n < 0.95:
+                assert time.monotonic() < deadline
+                state = FingerState.from_bytes(bench.recv(1024))
+    assert state.x_m == pytest.approx(0.009, abs=5e-4)
+    assert state.y_m == 0.0
+    assert state.force_n == pytest.approx(1.0, rel=0.05)
+    assert state.z_m == pytest.approx(-state.force_n / 2000.0)

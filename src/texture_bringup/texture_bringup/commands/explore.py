@@ -18,7 +18,12 @@ NUMBERS = (
     ('radius', 'radius_m', 'm', 'radius of a circular motion'),
     ('turns', 'turns', '', 'turns of a circular motion'),
     ('duration', 'duration_s', 's', 'duration of an in-hand slide'),
-    ('direction', 'direction_rad', 'rad', 'direction of travel, from +x towards +y'),
+    (
+        'direction',
+        'direction_rad',
+        'rad',
+        'direction of travel, from +x towards +y; of a circular motion, the angle at which the slide begins',
+    ),
 )
 BAR = 24
 

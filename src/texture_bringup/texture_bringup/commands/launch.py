@@ -10,7 +10,7 @@ from pathlib import Path
 
 from texture_bringup.launcher import process
 from texture_bringup.launcher.files import find_launch_file, given_arguments
-from texture_bringup.launcher.reader import declared_arguments, read
+from texture_bringup.launcher.reader import all_arguments, read
 from texture_bringup.launcher.supervisor import Supervisor
 
 
@@ -35,8 +35,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def arguments_text(path: Path) -> str:
-    """Return the arguments of a launch file with their defaults, one a line."""
-    items = declared_arguments(path)
+    """Return the arguments of a launch file and of those it includes with their defaults, one a line."""
+    items = all_arguments(path, os.environ)
     defaults = {item.name: f'{item.name}:={"(required)" if item.default is None else item.default}' for item in items}
     width = max(map(len, defaults.values()), default=0)
     return '\n'.join(f'{defaults[item.name]:<{width}}  {item.description}'.rstrip() for item in items)

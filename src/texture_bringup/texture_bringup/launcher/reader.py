@@ -6,6 +6,7 @@ scope of its own, an `include` is not, so the arguments given to it stay set beh
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,6 +59,17 @@ def declared_arguments(path: Path) -> list[Argument]:
     """Return the arguments that a launch file itself declares."""
     elements = [item for item in _parse(path).iter('arg') if is_declaration(item)]
     return [Argument(item.get('name', ''), item.get('default'), item.get('description', '')) for item in elements]
+
+
+def all_arguments(path: Path, environment: Mapping[str, str]) -> list[Argument]:
+    """Return the arguments of a launch file, and of those it includes at a place that no argument decides."""
+    found = {argument.name: argument for argument in declared_arguments(path)}
+    for element in _parse(path).iter('include'):
+        with contextlib.suppress(TextureError):
+            included = Path(Scope({}, dict(environment)).expand(attribute(element, 'file')))
+            for argument in all_arguments(included, environment):
+                found.setdefault(argument.name, argument)
+    return list(found.values())
 
 
 def _parse(path: Path) -> Element:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import signal
+import socket
 import struct
 import threading
 import time
@@ -19,6 +20,7 @@ from types import TracebackType
 import numpy as np
 
 from texture_core.arrays import Array
+from texture_core.finger import FingerState
 from texture_simulation.devices.pty_port import PtyPort
 
 HEADER = b'\xff\xff\xfd\x00'
@@ -45,8 +47,26 @@ class Pressing:
     height_m: float  # above the object at the start
 
 
-# The motors of a LEAP hand that bend its fingers forward: index, middle, ring, thumb.
-LEAP_PRESSING = {motor: Pressing(0.09, 0.01) for motor in (1, 5, 9, 13)}
+@dataclass(frozen=True)
+class Finger:
+    """The motors of a finger: what presses, and what moves the fingertip across and along the object, with levers."""
+
+    press: int
+    across: int
+    along: int
+    across_m: float = 0.09
+    along_m: float = 0.05
+
+
+# Of a LEAP hand: each finger bends forward by the motor that presses.
+LEAP_IDS = range(16)
+LEAP_FINGERS: Mapping[str, Finger] = {
+    'index': Finger(1, 0, 2),
+    'middle': Finger(5, 4, 6),
+    'ring': Finger(9, 8, 10),
+    'thumb': Finger(13, 12, 14),
+}
+LEAP_PRESSING = {finger.press: Pressing(0.09, 0.01) for finger in LEAP_FINGERS.values()}
 
 
 def crc16(data: bytes) -> int:
@@ -101,6 +121,16 @@ class DynamixelMotors:
         """Return how far a motor has turned since the start."""
         return float(self._angle[self.ids.index(motor)])
 
+    def finger_state(self, finger: Finger, time_ns: int) -> FingerState:
+        """Return where a fingertip is over the object, how fast, and how hard it presses."""
+        press, across, along = (self.ids.index(motor) for motor in (finger.press, finger.across, finger.along))
+        ways, speeds = (
+            (values[across] * finger.across_m, values[along] * finger.along_m, values[press] * self._lever[press])
+            for values in (self._angle.tolist(), self._speed.tolist())
+        )
+        height_m = float(self._height[press]) - ways[2]
+        return FingerState(time_ns, *ways[:2], height_m, *speeds[:2], -speeds[2], self.forces_n[finger.press])
+
     def advance(self, steps: int) -> None:
         """Let time pass, in steps of `PHYSICS_S`."""
         torque = np.array([self.tables[motor][TORQUE] for motor in self.ids], dtype=bool)
@@ -142,11 +172,24 @@ class DynamixelMotors:
 
 
 class EmulatedDynamixelBus:
-    """The motors in real time behind a device path, in a thread of their own; usable as a context."""
+    """The motors in real time behind a device path, in a thread of their own; usable as a context.
 
-    def __init__(self, link: Path, motors: DynamixelMotors) -> None:
+    Parameters
+    ----------
+    link
+        Symbolic link that leads to the device.
+    motors
+        On the bus.
+    finger, finger_port
+        Which finger is reported to the emulated bench, at which UDP port on loopback; 0: none.
+    """
+
+    def __init__(self, link: Path, motors: DynamixelMotors, finger: Finger | None = None, finger_port: int = 0) -> None:
         self.motors = motors
         self.port = PtyPort(link)
+        self._finger = finger if finger_port else None
+        self._bench = ('127.0.0.1', finger_port)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._heard = b''
         self._using = threading.Lock()  # the port: it is unplugged by others
         self._closing = threading.Event()
@@ -163,6 +206,12 @@ class EmulatedDynamixelBus:
         self._closing.set()
         self._thread.join()
         self.port.unplug()
+        self._socket.close()
+
+    @property
+    def running(self) -> bool:
+        """Whether time goes by."""
+        return self._thread.is_alive()
 
     def _run(self) -> None:
         due_s = time.monotonic()
@@ -176,6 +225,13 @@ class EmulatedDynamixelBus:
             if steps * PHYSICS_S >= TURN_S:
                 due_s += steps * PHYSICS_S
                 self.motors.advance(min(steps, MOST_STEPS))
+                self._tell()
+
+    def _tell(self) -> None:
+        """Tell the bench where the finger is."""
+        if self._finger is not None:
+            state = self.motors.finger_state(self._finger, time.monotonic_ns())
+            self._socket.sendto(state.to_bytes(), self._bench)
 
     def plug(self) -> None:
         """Plug it in again; it gets another device name."""
@@ -255,7 +311,7 @@ def main() -> None:
     stopped = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda _number, _frame: stopped.set())
-    with EmulatedDynamixelBus(options.link, DynamixelMotors(list(range(16)), LEAP_PRESSING)):
+    with EmulatedDynamixelBus(options.link, DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING)):
         print(f'the hand is at {options.link}', flush=True)
         stopped.wait()
 

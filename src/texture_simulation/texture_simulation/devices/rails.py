@@ -223,6 +223,11 @@ class EmulatedRails:
         self.port.unplug()
         self._socket.close()
 
+    @property
+    def running(self) -> bool:
+        """Whether time goes by."""
+        return self._thread.is_alive()
+
     def plug(self) -> None:
         """Plug it in again; it gets another device name."""
         with self._using:

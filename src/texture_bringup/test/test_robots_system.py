@@ -1,0 +1,70 @@
+"""Each emulated robot as a user starts and uses it: the launch file, then `texture explore`."""
+
+import os
+import re
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.ros
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from texture_bringup import command  # noqa: E402
+from texture_bringup.demo.isolation import free_port  # noqa: E402
+from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
+from texture_bringup.launcher.files import find_launch_file  # noqa: E402
+from texture_bringup.launcher.reader import read  # noqa: E402
+from texture_bringup.ros.operator import Operator  # noqa: E402
+from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
+from texture_evaluation.train import train_from_bags  # noqa: E402
+
+DEADLINE_S = 60.0
+SURFACE = 'ridge_2mm_deep'
+LINEAR = ['linear_slide', '--speed', '0.05', '--distance', '0.05']
+CIRCULAR = ['circular', '--speed', '0.05', '--radius', '0.02', '--turns', '0.5', '--direction', '0.8']
+IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
+
+# Domain, motion, and what it feels like. A label other than the true one would tell that the signal is not that of the
+# way the finger went. The hand is slower than the slides that the model knows: there only the evidence counts.
+ROBOTS = {'ur': (110, LINEAR, SURFACE), 'rails': (111, CIRCULAR, SURFACE), 'hand': (112, IN_HAND, '')}
+
+
+@pytest.fixture(scope='module')
+def model(tmp_path_factory):
+    """Return the path of a model of simulated slides."""
+    folder = tmp_path_factory.mktemp('model')
+    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
+    bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', SURFACE))
+    train_from_bags('default', bags, out=folder / 'model')
+    return folder / 'model.skops'
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
+def test_an_exploration_on_an_emulated_robot_ends_with_an_estimate(robot, model, tmp_path, monkeypatch, capsys):
+    domain, motion, label = ROBOTS[robot]
+    for name, value in {'ROS_DOMAIN_ID': str(domain), 'ROS_LOG_DIR': str(tmp_path)}.items():
+        monkeypatch.setenv(name, value)
+    place = {'ip': '127.0.0.110'} if robot == 'ur' else {'robot': tmp_path / robot}
+    given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'surface': SURFACE, 'model': model, **place}
+    with ChildLauncher(robot, given, dict(os.environ), tmp_path / 'nodes.log') as launcher:
+        with Operator(guard=launcher.check) as operator:
+            operator.wait_for_explorer(DEADLINE_S)
+            operator.wait_for_signal(DEADLINE_S)
+            # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
+            operator.set_parameters('explorer', {'stale_s': 1.5, 'estimate_timeout_s': 10.0})
+        code = command.main(['explore', *motion])
+    told = capsys.readouterr().out
+    assert code == 0, told + launcher.log.read_text()
+    assert 'the motion ended as asked' in told
+    found = re.search(r'texture: +(\w+), confidence [\d.]+ after ([\d.]+) s', told)
+    assert found, told
+    assert label in ('', found[1])
+    assert float(found[2]) > 0.5
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
+def test_a_real_robot_comes_without_anything_emulated(robot):
+    path = find_launch_file(robot)
+    emulated, real = (read(path, {'emulated': value}, {}) for value in ('true', 'false'))
+    assert {node.package for node in emulated} - {node.package for node in real} == {'texture_simulation'}
+    assert {node.executable for node in real} == {'explorer', 'sensor', 'feature_extractor', 'classifier'}

@@ -1,0 +1,62 @@
+"""The node that runs an emulated LEAP hand, so that a launch file can."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+
+from texture_core.parameters import param
+from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.parameters import declare
+from texture_core.ros.run import run
+from texture_simulation.devices.dynamixel import (
+    LEAP_FINGERS,
+    LEAP_IDS,
+    LEAP_PRESSING,
+    DynamixelMotors,
+    EmulatedDynamixelBus,
+)
+
+
+@dataclass(frozen=True)
+class LeapHandParams:
+    """Where the motors are reached, what they hold, and which finger feels it."""
+
+    link: str = param('/tmp/texture/dynamixel', 'Symbolic link to create; the device path for the arm.')
+    finger: str = param('index', 'Finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
+    finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
+    stiffness_n_m: float = param(2000.0, 'Stiffness of fingertip and object; 0: there is none.', unit='N/m', low=0.0)
+
+
+class LeapHandNode(Node):
+    """Keep the emulated hand for as long as the node lives."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('leap_hand', **kwargs)
+        params = declare(self, LeapHandParams)
+        motors = DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING, params.stiffness_n_m)
+        finger = LEAP_FINGERS[params.finger]
+        self._open = ExitStack()
+        self._bus = self._open.enter_context(
+            EmulatedDynamixelBus(Path(params.link).expanduser(), motors, finger, params.finger_port)
+        )
+        Diagnostics(self, self._report, hardware_id=params.link)
+        self.get_logger().info(f'an emulated LEAP hand is at {params.link}; its {params.finger} finger feels')
+
+    def shutdown(self) -> None:
+        """Unplug it."""
+        self._open.close()
+
+    def _report(self) -> Report:
+        if not self._bus.running:
+            return 'ERROR', 'the emulated hand ended; see the log and start the node again', {}
+        return 'OK', 'the emulated hand runs', {}
+
+
+def main() -> None:
+    """Run the node."""
+    run(LeapHandNode)

@@ -1,0 +1,55 @@
+"""The node that runs the emulated rails, so that a launch file can."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+
+from texture_core.parameters import param
+from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.parameters import declare
+from texture_core.ros.run import run
+from texture_simulation.devices.rails import EmulatedRails, RailsMachine
+
+
+@dataclass(frozen=True)
+class LinkParams:
+    """Where the rails are reached, and whom they tell where the finger is."""
+
+    link: str = param('/tmp/texture/rails', 'Symbolic link to create; the device path for the arm.')
+    finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
+
+
+class RailsNode(Node):
+    """Keep the emulated rails for as long as the node lives."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('rails', **kwargs)
+        params = declare(self, LinkParams)
+        machine = declare(self, RailsMachine)
+        self._open = ExitStack()
+        self._rails = self._open.enter_context(
+            EmulatedRails(Path(params.link).expanduser(), machine, finger_port=params.finger_port)
+        )
+        Diagnostics(self, self._report, hardware_id=params.link)
+        self.get_logger().info(f'emulated rails are at {params.link}')
+
+    def shutdown(self) -> None:
+        """Unplug them."""
+        self._open.close()
+
+    def _report(self) -> Report:
+        firmware = self._rails.firmware
+        numbers = {'watchdog stops': firmware.watchdog_stops, 'bad frames': firmware.bad_frames}
+        if not self._rails.running:
+            return 'ERROR', 'the emulated rails ended; see the log and start the node again', numbers
+        return 'OK', 'the emulated rails run', numbers
+
+
+def main() -> None:
+    """Run the node."""
+    run(RailsNode)
