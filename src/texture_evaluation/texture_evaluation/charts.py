@@ -122,6 +122,27 @@ def line_chart(
     return Path(path)
 
 
+def error_chart(
+    series: Mapping[str, tuple[Array, Array]],
+    title: str,
+    axis_labels: tuple[str, str],
+    path: str | Path,
+    *,
+    points: int,
+) -> Path:
+    """Draw positive errors over time on a logarithmic axis: the largest of each of `points` stretches of time."""
+    with _chart(path, (7.0, 4.2)) as figure:
+        axes = figure.subplots()
+        for (name, (x, y)), colour in zip(series.items(), COLOURS, strict=False):
+            size = max(1, len(x) // points)
+            rows = len(x) // size
+            largest = np.asarray(y)[: rows * size].reshape(rows, size).max(axis=1)
+            axes.semilogy(np.asarray(x)[: rows * size : size], largest, label=name, color=colour, linewidth=1)
+        axes.set(xlabel=axis_labels[0], ylabel=axis_labels[1], title=title)
+        axes.legend(loc='best')
+    return Path(path)
+
+
 def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], title: str, path: str | Path) -> Path:
     """Draw what is recovered of packets, and dashed what false ones are believed; a panel for each kind of fault.
 
