@@ -52,7 +52,10 @@ class PairCoupling:
     def scores(self, decisions: Array) -> Array:
         """Return -log(1 + Σ_j exp(-margin)), (..., n_labels)."""
         margins = decisions * self.slopes + self.offsets
-        against = np.concatenate((-margins, margins), axis=-1)
+        n_pairs = margins.shape[-1]
+        against = np.empty((*margins.shape[:-1], 2 * n_pairs))
+        np.negative(margins, out=against[..., :n_pairs])
+        against[..., n_pairs:] = margins
         np.minimum(against, LARGEST, out=against)
         odds = np.exp(against, out=against)
         scores: Array = -np.log1p(odds @ self._sides)  # type: ignore[attr-defined]

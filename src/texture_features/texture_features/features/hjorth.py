@@ -53,14 +53,17 @@ def hjorth(rows: Array) -> Array:
     """
     slope = slopes(rows)
     bend = slopes(slope)
-    values = np.empty((*rows.shape[:-1], 3))
-    values[..., 0] = power(rows)
-    values[..., 1] = power(slope)
-    values[..., 2] = power(bend)
+    powers = np.empty((3, *rows.shape[:-1]))
+    powers[0] = power(rows)
+    powers[1] = power(slope)
+    powers[2] = power(bend)
     # The mean of the steps is known from the first and the last sample.
-    values[..., 1] -= ((rows[..., -1] - rows[..., 0]) / slope.shape[-1]) ** 2
-    values[..., 2] -= ((slope[..., -1] - slope[..., 0]) / bend.shape[-1]) ** 2
-    roots = np.sqrt(np.maximum(values, 0.0))
-    values[..., 1:] = roots[..., 1:] / (roots[..., :2] + TINY)
-    values[..., 2] /= values[..., 1] + TINY
-    return values
+    drift = (rows[..., -1] - rows[..., 0]) / slope.shape[-1]
+    powers[1] -= drift * drift
+    drift = (slope[..., -1] - slope[..., 0]) / bend.shape[-1]
+    powers[2] -= drift * drift
+    roots = np.sqrt(np.maximum(powers, 0.0, out=powers))
+    mobility = roots[1:] / (roots[:2] + TINY)
+    powers[1] = mobility[0]
+    powers[2] = mobility[1] / (mobility[0] + TINY)
+    return powers.transpose((*range(1, powers.ndim), 0))
