@@ -50,8 +50,9 @@ def run(bench: Bench) -> BenchResult:
     return BenchResult(
         name='latency',
         measured=(
-            f'windows of 0.5 s at 1 kHz every 0.1 s, {CLASSES} surfaces. In one process: from window to estimate, after one pass to warm up. '
-            'Through DDS: from publishing the last sample to receiving the TextureEstimate, with feature_extractor and '
+            f'windows of 0.5 s at 1 kHz every 0.1 s, {CLASSES} surfaces. In one process: from window to estimate, '
+            'after one pass to warm up. Through DDS: from publishing the last sample to receiving the '
+            'TextureEstimate, with feature_extractor and '
             'classifier as processes while 1 kHz in batches of 10 ms and 28 taxels at 60 Hz stream. CPU in percent of '
             'one core; the sensor node reads an emulated TSF-85'
         ),
