@@ -23,6 +23,7 @@ class TypicalBands:
     of_signal: ClassVar[bool] = True
 
     bands: int = param(32, 'Number of bands; a segment is twice as many samples long.', low=2, high=512)
+    overlap: float = param(0.75, 'Share of a segment that the next one repeats.', low=0.0, high=0.9)
     floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
 
     @property
@@ -30,7 +31,11 @@ class TypicalBands:
         """Number of the band, from 1."""
         return tuple(str(band + 1) for band in range(self.bands))
 
+    @property
+    def _step(self) -> int:
+        return max(1, round(2 * self.bands * (1.0 - self.overlap)))
+
     def __call__(self, windows: Windows) -> Array:
         """Return the mean of log(density + floor)."""
-        densities = densities_of(windows, 2 * self.bands, max(1, self.bands // 2), self.bands)
+        densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
         return mean_over_segments(np.log(densities + self.floor))
