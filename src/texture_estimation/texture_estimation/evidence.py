@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from texture_core.estimates import TextureEstimate
@@ -59,7 +61,7 @@ class Evidence:
             self.refused += 1
             self._message = f"model '{model.name}' does not fit: {difference(vector.feature_set, model.feature_set)}"
             return
-        if not np.isfinite(vector.values).all():
+        if math.isnan(vector.values @ np.zeros(len(vector.values))):  # faster than isfinite().all(): inf · 0 is NaN
             self.not_finite += 1
             bad = vector.names[int((~np.isfinite(vector.values)).argmax())]
             self._message = f"a window was left out: its feature '{bad}' is not finite"
