@@ -100,7 +100,7 @@ class FeatureSet:
                 last=True,
                 skipped=piece.skipped,
             )
-        inputs = [piece.windows[topic] for topic in self.topics]
+        inputs = [piece.windows[item.topic] for item in self.inputs]
         speed, force = np.array(piece.speed_m_s), np.array(piece.force_n)
         values = self._values([Windows(item.samples, item.rate_hz, speed, force) for item in inputs])
         return self._vector(piece, _layout(inputs), values)

@@ -66,7 +66,8 @@ class ArraySvm:
         n_labels, rows, width = self.coefficients.shape
         parts = self.coefficients @ kernel.reshape(*kernel.shape[:-1], n_labels, width, 1)
         sums = parts.reshape(*kernel.shape[:-1], n_labels * rows)
-        decisions: Array = sums[..., self._first] + sums[..., self._second]  # type: ignore[attr-defined]
+        decisions: Array = sums.take(self._first, axis=-1)  # type: ignore[attr-defined]
+        decisions += sums.take(self._second, axis=-1)  # type: ignore[attr-defined]
         decisions += self.intercepts
         return decisions
 

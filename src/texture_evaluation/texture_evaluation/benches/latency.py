@@ -92,9 +92,9 @@ def _time(recipe: str, bags: list[Path], slides: int, folder: Path, bench: Bench
     from texture_evaluation.ros.live_latency import measure  # noqa: PLC0415
 
     model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
-    cut = cut_slides(find_slides(bags, str(slides)), model.recipe.feature_set)
+    cut = [list(pieces) for _, pieces in cut_slides(find_slides(bags, str(slides)), model.recipe.feature_set)]
     # The last of each is the end of the slide, which is no window; the first pass warms up.
-    passes = [[judge(model, pieces)[2][:-1] for _, pieces in cut] for _ in range(1 + PASSES)]
+    passes = [[judge(model, pieces)[2][:-1] for pieces in cut] for _ in range(1 + PASSES)]
     alone_us = np.concatenate([taken for one in passes[1:] for taken in one])
     live = measure(folder / f'{recipe}.skops', bench.seed, QUICK_LIVE_S if bench.quick else LIVE_S)
     return _Timing(alone_us, live)
