@@ -150,11 +150,12 @@ class FeatureSet:
 
     def _values(self, inputs: Sequence[Windows]) -> Array:
         """Return the values of windows, (..., n_values)."""
-        blocks = []
-        for item, windows in zip(self.inputs, inputs, strict=True):
-            for _, feature in item.features:
-                block = feature(windows)
-                blocks.append(block.reshape((*block.shape[:-2], -1)))
+        flat = (*inputs[0].samples.shape[:-2], -1)
+        blocks = [
+            feature(windows).reshape(flat)
+            for item, windows in zip(self.inputs, inputs, strict=True)
+            for _, feature in item.features
+        ]
         return np.concatenate(blocks, axis=-1)
 
     def _vector(self, piece: CutWindow, layout: Layout, values: Array) -> FeatureVector:
