@@ -38,7 +38,8 @@ def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
         (['bench', 'biotac20', '--quick'], '--data'),
     ],
 )
-def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys) -> None:
+def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:
+    monkeypatch.delenv('TEXTURE_DATA', raising=False)
     assert main(arguments) == 2
     said = capsys.readouterr().err
     assert sentence in said

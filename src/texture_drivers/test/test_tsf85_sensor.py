@@ -273,11 +273,13 @@ def test_the_prototype_has_12_taxels_at_25_hz(wire: Wire, clock: Clock) -> None:
     assert sensor.counts['bogus'] == 0
 
 
-def test_all_that_has_come_is_read_at_once_after_a_pause(wire: Wire, sensor: Tsf85) -> None:
+def test_nothing_that_came_during_a_pause_is_lost(wire: Wire, sensor: Tsf85) -> None:
     sensor.open()
     for stamp_ms in range(500):  # 10 kB: more than the kernel hands over at once
         wire.say(stamp_ms, 0)
-    sensor.read()
+    deadline = time.monotonic() + 10.0  # the kernel moves bytes through a pseudo-terminal in its own time
+    while sensor._parser.packets < 500 and time.monotonic() < deadline:
+        sensor.read()
     assert sensor._parser.packets == 500
 
 
