@@ -52,6 +52,14 @@ def test_force_control_is_stable_however_stiff_the_surface_and_long_the_step(clo
     assert arm.state().force_n == pytest.approx(1.0)
 
 
+def test_an_arm_that_slept_moves_no_longer_than_a_command_holds(clock):
+    arm = make(clock, stiffness_n_m=2000.0, start_height_m=0.0, command_timeout_s=0.1)
+    clock.now_ns += 500_000_000
+    arm.command(ArmCommand(normal_m_s=-0.02))  # of one who sees an old state
+    arm.step(0.5)
+    assert arm.state().force_n == pytest.approx(2000.0 * 0.02 * 0.1)
+
+
 def test_above_the_surface_force_control_comes_down(clock):
     arm = make(clock, start_height_m=0.002)
     run(arm, clock, ArmCommand(force_n=1.0), 1.0)

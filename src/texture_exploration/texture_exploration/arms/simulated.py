@@ -141,7 +141,8 @@ class SimulatedArm:
         now_ns = self._clock()
         command, given_ns = self._order if not self._fault else (STANDSTILL, now_ns)
         left_s = self._params.command_timeout_s + (given_ns - now_ns) * 1e-9
-        moving_s = max(0.0, dt_s + min(0.0, left_s))
+        # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
+        moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
         (vx, vy), (x, y, z) = command.tangential_m_s, self._state.position
         dz = self._late.way_m(now_ns) if self._loop else self._normal_step(command, moving_s)
         position = (x + vx * moving_s, y + vy * moving_s, z + dz)
