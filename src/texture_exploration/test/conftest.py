@@ -6,7 +6,7 @@ import pytest
 
 from texture_core.exploration import ExplorationRequest
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.exploration import Exploration
+from texture_exploration.exploration import Exploration, hear_nothing
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
@@ -31,6 +31,7 @@ class Table:
         self.states, self.places = [], []
         self.exploration = None
         self.asleep_ns = 0
+        self.silence = hear_nothing
         self.when = {}  # what to do at the third state of a phase
 
     def sleep(self):
@@ -55,6 +56,7 @@ class Table:
             limits=self.limits,
             clock=lambda: self.now_ns,
             on_state=self.on_state,
+            silence=self.silence,
         )
         return self.exploration.run(self.pace)
 

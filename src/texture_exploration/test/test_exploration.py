@@ -6,6 +6,7 @@ from texture_core.exploration import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArmParams
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.signal_watch import SignalWatch
 
 MOVING = (Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT)
 
@@ -116,3 +117,39 @@ def test_states_come_fifty_times_a_second_and_carry_who_and_what(table):
         ('one', 'linear_slide', 'cork')
     }
     assert [sliding[0].progress, sliding[-1].progress] == pytest.approx([0.0, 1.0], abs=0.02)
+
+
+@pytest.mark.parametrize('phase', MOVING)
+def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase):
+    watch = SignalWatch(0.12, lambda: table.now_ns)
+    table.silence, hear = watch.silence, watch.heard
+    fell_silent = []
+
+    go_on = table.pace
+
+    def pace():
+        if not fell_silent:
+            hear()
+        go_on()
+
+    table.pace = pace
+    table.when[phase] = lambda: fell_silent.append(table.now_ns)
+    outcome = table.explore()
+    assert re.fullmatch(r"no samples have come on 'signal' for 1[23]\d ms; check the sensor", outcome.message)
+    assert table.arm.state().force_n == 0
+    if phase is not Phase.LIFT:
+        lifted_ns = next(s.stamp_ns for s in table.states if s.phase is Phase.LIFT)
+        assert (lifted_ns - fell_silent[0]) * 1e-9 == pytest.approx(0.12, abs=0.02)
+
+
+def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
+    watch = SignalWatch(0.12, lambda: table.now_ns)
+
+    def silence(awake_ns):
+        told = watch.silence(awake_ns)
+        watch.heard()
+        return told
+
+    table.silence = silence
+    table.when[Phase.SLIDE] = table.sleep
+    assert table.explore().success

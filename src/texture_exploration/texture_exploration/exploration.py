@@ -29,6 +29,11 @@ class Outcome:
     slid: bool
 
 
+def hear_nothing(_awake_ns: int) -> str:
+    """Watch over no sensor."""
+    return ''
+
+
 class Exploration:
     """Step a motion until it ends, whatever happens to the arm.
 
@@ -40,6 +45,8 @@ class Exploration:
         Who moves, how, and what ends it at once.
     clock
         CLOCK_MONOTONIC in ns.
+    silence
+        Says in a sentence why the sensor feels nothing, '' if it does; it is given since when we are awake, in ns.
     on_state
         Called in the thread of `run` with each new phase and 50 times a second; stamps are of `clock`.
 
@@ -63,6 +70,7 @@ class Exploration:
         limits: SafetyLimits,
         clock: Callable[[], int],
         on_state: Callable[[ExplorationState], None],
+        silence: Callable[[int], str] = hear_nothing,
     ) -> None:
         self.exploration_id = exploration_id
         self.request = request
@@ -75,6 +83,7 @@ class Exploration:
         self._limits = limits
         self._clock = clock
         self._on_state = on_state
+        self._silence = silence
         self._stop_reason = ''
         self._finish_reason = ''
         self._slid = False
@@ -110,7 +119,7 @@ class Exploration:
         if trouble:
             self._give_up(f'{trouble}; the finger was not lifted')
             return True
-        reason = self._stop_reason or self._limits.violation(arm)
+        reason = self._stop_reason or self._limits.violation(arm) or self._silence(self._awake_ns)
         if reason:
             self._motion.abort(reason)
         if self._finish_reason:

@@ -13,7 +13,7 @@ from texture_core.catalogue import find
 from texture_core.errors import DeviceError, MotionRefused, TextureError
 from texture_core.exploration import ExplorationRequest, ExplorationState
 from texture_exploration.arms.protocol import Arm, Vector
-from texture_exploration.exploration import Exploration, cannot_move
+from texture_exploration.exploration import Exploration, cannot_move, hear_nothing
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
@@ -35,6 +35,8 @@ class Explorer:
         Called with each state of each exploration, in the thread that moves; stamps are of `clock`.
     clock
         CLOCK_MONOTONIC in ns.
+    silence
+        Watches over the sensor; see `Exploration`.
     """
 
     def __init__(
@@ -44,11 +46,14 @@ class Explorer:
         limits: SafetyLimits,
         on_state: Callable[[ExplorationState], None],
         clock: Callable[[], int] = time.monotonic_ns,
+        *,
+        silence: Callable[[int], str] = hear_nothing,
     ) -> None:
         self.arm = arm
         self.touch, self.limits = touch, limits  # may be replaced; a running exploration keeps its own
         self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, late_steps=0)
         self._on_state = on_state
+        self._silence = silence
         self._clock = clock
         self._lock = threading.Lock()
         self._home: Vector | None = None
@@ -151,6 +156,7 @@ class Explorer:
             limits=self.limits,
             clock=self._clock,
             on_state=self._on_state,
+            silence=self._silence,
         )
 
     def _ready(self) -> Vector:

@@ -118,12 +118,14 @@ class DynamixelHand:
             if bus.missing and now_s - searched_s > SEARCH_S:
                 searched_s = now_s
                 bus.look_for(min(bus.missing))
-            if not motors:
-                continue
-            if error := bus.next_hardware_error():
+            if motors and (error := bus.next_hardware_error()):
                 errors[error] = None
             missing = [f'{self.profile.owner(motor)} does not answer' for motor in sorted(bus.missing)]
             fault = '; '.join([*missing, *errors])
+            if not motors:
+                if fault and self._fresh.is_set():
+                    self._publish(fault)  # at once: before the others have been read again
+                continue
             goals = self._step(motors, min(LONGEST_STEP_S, now_s - last_s), now_s)
             last_s = now_s
             self._publish(fault)

@@ -174,7 +174,8 @@ class DynamixelBus:
 
     def _answers(self, motor: int) -> bool:
         with self._line():
-            return any(self._packets.ping(self._port, motor)[1] == SUCCESS for _ in range(TRIES))
+            # That all were asked at once was the first try.
+            return any(self._packets.ping(self._port, motor)[1] == SUCCESS for _ in range(TRIES - 1))
 
     def _measured(self, group: Any, motor: int) -> Motor:
         profile = self._profile

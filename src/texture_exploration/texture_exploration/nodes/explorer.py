@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,15 +25,16 @@ from texture_core.parameters import param
 from texture_core.ros.conversions import from_msg, request_from_msg, to_msg
 from texture_core.ros.diagnostics import Diagnostics, Report
 from texture_core.ros.parameters import declare, on_change
-from texture_core.ros.qos import ESTIMATE_QOS, STATE_QOS
+from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.estimates import CertaintyParams, Estimates
-from texture_exploration.exploration import Exploration
+from texture_exploration.exploration import Exploration, hear_nothing
 from texture_exploration.explorer import Explorer
 from texture_exploration.identity import Identities
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.signal_watch import SignalWatch, SignalWatchParams
 
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
@@ -82,15 +84,25 @@ class ExplorerNode(Node):
     def _make_explorer(self) -> Explorer:
         arm_class = find(ARMS, declare(self, ArmParams).arm, 'arm')
         arm = arm_class(declare(self, arm_class.Params))
-        explorer = Explorer(arm, declare(self, TouchParams), declare(self, SafetyLimits), self._on_state)
+        touch, limits = declare(self, TouchParams), declare(self, SafetyLimits)
+        explorer = Explorer(arm, touch, limits, self._on_state, silence=self._watch_signal())
         try:
             explorer.connect()
         except DeviceError as error:
             self.get_logger().error(f'{error}; the next request tries again')
         return explorer
 
+    def _watch_signal(self) -> Callable[[int], str]:
+        params = declare(self, SignalWatchParams)
+        if not params.watch_signal:
+            return hear_nothing
+        watch = SignalWatch(params.signal_timeout_s, time.monotonic_ns)
+        # The bytes as they come: what they say is the business of others.
+        self.create_subscription(msg.TactileSignal, 'signal', lambda _data: watch.heard(), SENSOR_QOS, raw=True)
+        return watch.silence
+
     def _follow_parameters(self) -> None:
-        """Let changed parameters hold from the next exploration on; those of the arm are fixed."""
+        """Let changed parameters hold from the next exploration on; those of arm and sensor are fixed."""
         on_change(self, CertaintyParams, partial(setattr, self, '_certainty'))
         on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
         on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))

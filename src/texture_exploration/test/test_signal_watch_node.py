@@ -1,0 +1,88 @@
+"""A sensor that falls silent in the slide, as the explorer meets it: a process of its own."""
+
+import subprocess
+import sys
+import time
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from texture_msgs import msg, srv
+
+from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
+
+pytestmark = pytest.mark.ros
+
+DEADLINE_S = 30.0
+PARAMETERS = {'watch_signal': 'true', 'start_height_m': 0.002, 'stale_s': 1.0}
+EXPLORER = [sys.executable, '-c', 'from texture_exploration.nodes.explorer import main; main()', '--ros-args']
+SLOW = {'motion': 'linear_slide', 'speed_m_s': 0.01, 'distance_m': 0.1}
+QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
+
+
+class Finger:
+    """A client that also plays the sensor, for as long as `feeling`."""
+
+    def __init__(self):
+        self.feeling, self.phases = True, []
+        self._node = rclpy.create_node('finger')
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self._node)
+        self._signal = self._node.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
+        self._node.create_timer(0.01, self._feel)
+        self._node.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
+        self._explore = self._node.create_client(srv.Explore, 'explore')
+
+    def _feel(self):
+        if self.feeling:
+            self._signal.publish(msg.TactileSignal())
+
+    def _on_state(self, state):
+        self.phases.append((state.phase, time.monotonic()))
+
+    def until(self, condition):
+        deadline = time.monotonic() + DEADLINE_S
+        while not condition():
+            assert time.monotonic() < deadline
+            self._executor.spin_once(timeout_sec=0.05)
+
+    def ready(self):
+        return self._explore.service_is_ready() and self._signal.get_subscription_count() > 0
+
+    def explore(self, **request):
+        return self._explore.call_async(srv.Explore.Request(**request))
+
+    def close(self):
+        self._executor.shutdown()
+        self._node.destroy_node()
+
+
+@pytest.fixture
+def finger(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '114')
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    rclpy.init()
+    options = [word for name, value in PARAMETERS.items() for word in ('-p', f'{name}:={value}')]
+    with subprocess.Popen([*EXPLORER, *options]) as process:
+        made = Finger()
+        yield made
+        process.terminate()
+    made.close()
+    rclpy.shutdown()
+
+
+def test_a_silent_sensor_ends_the_slide_and_the_next_exploration_works(finger, record_property):
+    finger.until(finger.ready)
+    answer = finger.explore(**SLOW)
+    finger.until(lambda: finger.phases and finger.phases[-1][0] == 'slide')
+    finger.feeling, silent_s = False, time.monotonic()
+    finger.until(lambda: finger.phases[-1][0] == 'lift')
+    record_property('detected_s', finger.phases[-1][1] - silent_s)
+    print(f'sensor silent: lifting after {1e3 * (finger.phases[-1][1] - silent_s):.0f} ms')
+    finger.until(answer.done)
+    assert not answer.result().success
+    assert answer.result().message.startswith("no samples have come on 'signal' for")
+    finger.feeling = True
+    again = finger.explore(**QUICK)
+    finger.until(again.done)
+    assert again.result().success, again.result().message
