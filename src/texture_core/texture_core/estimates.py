@@ -8,7 +8,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class TextureEstimate:
-    """What surface is being felt; label '' and no probabilities while there is no evidence."""
+    """What surface is being felt; label '' and no probabilities while there is no evidence.
+
+    A label of '' with probabilities: the evidence speaks for several surfaces alike, it is unclassified.
+    """
 
     stamp_ns: int
     exploration_id: str

@@ -5,6 +5,7 @@ import pytest
 
 from texture_core.features import FeatureVector
 from texture_estimation.evidence import Evidence
+from texture_estimation.evidence_rules import MajorityVote
 from texture_estimation.fingerprint import difference
 
 
@@ -116,3 +117,13 @@ def test_without_a_model_the_final_estimate_says_so(examples):
 def test_the_part_that_differs_is_named(came, trained, words):
     assert words in difference(came, trained)
     assert bool(difference(came, trained)) == bool(words)
+
+
+def test_a_slide_whose_windows_disagree_is_unclassified_until_enough_of_them_agree(model, examples):
+    recipe = dataclasses.replace(model.recipe, evidence=MajorityVote())
+    voting = dataclasses.replace(model, recipe=recipe)
+    estimates = judge(voting, vectors(examples, hop_s=0.5))
+    assert [(estimate.label, estimate.known) for estimate in estimates[:2]] == [('', False)] * 2
+    assert [(estimate.label, estimate.known) for estimate in estimates[2:]] == [('felt', True)] * 7
+    assert estimates[0].probabilities == pytest.approx([0.25] * 4)
+    assert estimates[-1].confidence == pytest.approx(1.0, abs=1e-3)

@@ -20,7 +20,7 @@ class Evidence:
     """Join the judgements of the windows of one slide; the same code on the robot and on recordings.
 
     A new exploration id, or a vector after the `last` one, begins anew. `known` is set whenever there is a label:
-    unknown surfaces are not rejected yet.
+    unknown surfaces are not rejected yet. Where several labels are equally probable there is none: unclassified.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Evidence:
             bad = vector.names[int((~np.isfinite(vector.values)).argmax())]
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
-        self._sum += model.predict_log_proba(vector.values)
+        self._sum += model.recipe.evidence.voice(model.predict_log_proba(vector.values))
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns
@@ -86,13 +86,15 @@ class Evidence:
         # Windows count alike, as the first of a slide is the least typical; together they are worth their sliding time.
         worth = self._evidence_ns / self._window_ns
         mean = self._sum / self._windows
-        probabilities = np.exp(model.recipe.evidence.log_posterior(mean, worth, model.growth))
-        best = int(probabilities.argmax())
+        posterior = model.recipe.evidence.log_posterior(mean, worth, model.growth)
+        best = int(posterior.argmax())
+        decided = np.count_nonzero(posterior == posterior[best]) == 1
+        probabilities = np.exp(posterior)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
-            label=model.labels[best],
-            known=True,
+            label=model.labels[best] if decided else '',
+            known=decided,
             confidence=float(probabilities[best]),
             labels=model.labels,
             probabilities=tuple(probabilities.tolist()),

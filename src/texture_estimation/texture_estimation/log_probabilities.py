@@ -15,6 +15,13 @@ def log_softmax(scores: Array) -> Array:
     return result
 
 
+def undecided(log_probabilities: Array) -> NDArray[np.bool_]:
+    """Return whether several textures share the highest log-probability to the last bit, (...): nothing is decided."""
+    best = np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)
+    shared: NDArray[np.bool_] = np.count_nonzero(log_probabilities == best, axis=-1) > 1
+    return shared
+
+
 def log_loss(log_probabilities: Array, codes: NDArray[np.intp]) -> float:
     """Return the mean negative log-probability of the true textures; (n, n_labels) and (n,) of their numbers."""
     return float(-np.take_along_axis(log_probabilities, codes[:, None], axis=-1).mean())

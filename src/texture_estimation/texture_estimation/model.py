@@ -17,6 +17,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch, TextureError
 from texture_estimation.learners.learner import LogProbabilities
+from texture_estimation.log_probabilities import undecided
 from texture_estimation.recipe import Recipe
 
 FORMAT = 1
@@ -63,6 +64,13 @@ class Model:
     def predict_log_proba(self, values: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
         return self.judge(values)
+
+    def decide(self, values: Array) -> list[str]:
+        """Return the label of each window alone, (n,) of (n, n_features); '' where several labels are equally good."""
+        log_probabilities = self.predict_log_proba(values)
+        best = log_probabilities.argmax(axis=-1).tolist()
+        none = undecided(log_probabilities).tolist()
+        return ['' if tied else self.labels[index] for index, tied in zip(best, none, strict=True)]
 
     @property
     def card(self) -> dict[str, Any]:

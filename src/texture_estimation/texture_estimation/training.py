@@ -9,7 +9,7 @@ from texture_core.errors import InvalidData
 from texture_estimation.evidence_rules import EvidenceRule
 from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.learners.learner import Codes, Fitted
-from texture_estimation.log_probabilities import log_loss
+from texture_estimation.log_probabilities import log_loss, undecided
 from texture_estimation.model import Model
 from texture_estimation.recipe import Recipe
 
@@ -82,11 +82,12 @@ def _fit_growth(fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule,
     """Return the exponent with which evidence grows that makes held-out slides most probable, whenever one looks."""
     if fitted.held_out is None:
         return DEFAULT_GROWTH
+    voices = rule.voice(fitted.held_out)
     means, worth, truth = [], [], []
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
         count = np.arange(1, len(rows) + 1)
-        means.append(np.cumsum(fitted.held_out[rows], axis=0) / count[:, None])
+        means.append(np.cumsum(voices[rows], axis=0) / count[:, None])
         worth.append(1.0 + (count - 1) * min(overlap, 1.0))
         truth.append(codes[rows])
     mean, windows, true = np.concatenate(means), np.concatenate(worth)[:, None], np.concatenate(truth)
@@ -100,4 +101,5 @@ def _fit_growth(fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule,
 def _held_out_accuracy(fitted: Fitted, codes: Codes) -> float | None:
     if fitted.held_out is None:
         return None
-    return round(float((fitted.held_out.argmax(axis=1) == codes).mean()), 4)
+    right = (fitted.held_out.argmax(axis=1) == codes) & ~undecided(fitted.held_out)
+    return round(float(right.mean()), 4)

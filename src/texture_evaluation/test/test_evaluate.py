@@ -22,6 +22,7 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     figures = evaluate(model, [simulated], '5-6').as_json()
     assert list(figures) == [
         'window_accuracy', 'accuracy_at_s', 'early', 'unknown_accepted', 'labels', 'confusion', 'latency_us',
+        'unclassified',
     ]  # fmt: skip
     table = np.array(figures['confusion'])
     assert figures['window_accuracy'] == pytest.approx(np.trace(table) / table.sum())

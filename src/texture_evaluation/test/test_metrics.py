@@ -50,6 +50,16 @@ def test_rows_of_the_confusion_table_are_the_true_surfaces() -> None:
     np.testing.assert_array_equal(metrics.confusion(RESULTS, ('a', 'b')), [[5, 1], [3, 3]])
 
 
+def test_what_is_not_classified_counts_as_not_recognised_and_stands_in_no_column() -> None:
+    silent = SlideResult('a', ['', 'a'], [TextureEstimate(0, 'e', windows=1, evidence_s=0.5)])
+    assert metrics.unclassified_windows([silent, *RESULTS]) == pytest.approx(1 / 14)
+    assert metrics.unclassified_at_times([silent, *RESULTS]) == {
+        '0.5': pytest.approx(1 / 3), '1.0': 0.0, '2.5': None, '5.0': None,
+    }  # fmt: skip
+    assert metrics.accuracy_at([silent], 0.5) == 0.0
+    np.testing.assert_array_equal(metrics.confusion([silent], ('a', 'b')), [[1, 0], [0, 0]])
+
+
 def test_the_curve_ends_where_the_shortest_slide_ends() -> None:
     seconds, accuracy = metrics.curve([*RESULTS, slide('a', 'aaa')])
     assert seconds == pytest.approx([0.5, 0.6, 0.7])

@@ -64,6 +64,10 @@ class Report:
             'labels': list(self.labels),
             'confusion': self.confusion.tolist(),
             'latency_us': {'median': float(median), 'p99': float(p99)},
+            'unclassified': {
+                'windows': metrics.unclassified_windows(self.known) if self.known else None,
+                'at_s': metrics.unclassified_at_times(self.known),
+            },
         }
 
     def write(self, path: str | Path) -> None:
@@ -144,5 +148,5 @@ def _test(model: Model, slide: Slide, pieces: Sequence[Piece]) -> tuple[SlideRes
             used.append(vector.values)
             heard.append(estimate)
         before = estimate.windows
-    alone = model.predict_log_proba(np.stack(used)).argmax(axis=1) if used else []
-    return SlideResult(slide.surface, [model.labels[index] for index in alone], heard), taken_us
+    alone = model.decide(np.stack(used)) if used else []
+    return SlideResult(slide.surface, alone, heard), taken_us

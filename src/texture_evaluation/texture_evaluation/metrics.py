@@ -25,7 +25,7 @@ class SlideResult:
     surface
         The true label.
     window_labels : (n_windows,)
-        What each window alone looks like.
+        What each window alone looks like; '' if it cannot be told.
     estimates : (n_windows,)
         The estimate after each window, from all evidence so far.
     """
@@ -65,6 +65,22 @@ def accuracy_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | No
     return {f'{seconds:.1f}': accuracy_at(results, seconds) for seconds in TIMES_S}
 
 
+def unclassified_windows(results: Sequence[SlideResult]) -> float:
+    """Return the share of windows that alone are taken for nothing."""
+    return float(np.mean([not label for result in results for label in result.window_labels]))
+
+
+def unclassified_at(results: Sequence[SlideResult], seconds: float) -> float | None:
+    """Return the share of slides without a label after so much sliding; None if no slide is long enough."""
+    estimates = [estimate for result in results if (estimate := result.after(seconds)) is not None]
+    return float(np.mean([not estimate.label for estimate in estimates])) if estimates else None
+
+
+def unclassified_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
+    """Return `unclassified_at` the usual times, keyed as `accuracy_at_times`."""
+    return {f'{seconds:.1f}': unclassified_at(results, seconds) for seconds in TIMES_S}
+
+
 def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
     """Return accuracy and mean time of decisions taken as soon as they are certain."""
     decisions = [(result.surface, result.early()) for result in results]
@@ -80,11 +96,14 @@ def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
 
 
 def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray:
-    """Return how many windows of each surface (row) were taken for each label (column), (n_labels, n_labels)."""
+    """Return how many windows of each surface (row) were taken for each label (column), (n_labels, n_labels).
+
+    Unclassified windows stand in no column.
+    """
     place = {label: index for index, label in enumerate(labels)}
     table = np.zeros((len(labels), len(labels)), dtype=int)
     for result in results:
-        for label in result.window_labels:
+        for label in filter(None, result.window_labels):
             table[place[result.surface], place[label]] += 1
     return table
 

@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from texture_estimation.evidence_rules import EVIDENCE_RULES, MajorityVote, SoftVote
+from texture_estimation.log_probabilities import log_softmax, undecided
+
+
+def joined(rule, votes, n_labels=4):
+    """Return the log-posterior of windows that each speak for one label, or for two alike (None)."""
+    scores = np.array(
+        [np.eye(n_labels)[vote] if vote is not None else [1.0, 1.0, *[0.0] * (n_labels - 2)] for vote in votes]
+    )
+    return rule.log_posterior(rule.voice(log_softmax(scores)).mean(axis=0), float(len(votes)), 0.5)
+
+
+def winner(rule, votes):
+    posterior = joined(rule, votes)
+    return None if undecided(posterior) else int(posterior.argmax())
+
+
+@pytest.mark.parametrize(
+    ('votes', 'answer'),
+    [
+        ([2, 2, 0, 2, 1], 2),
+        ([2, 2, 0, 1, 1], None),
+        ([2, 2, None, None, 1], None),
+        ([2, None, 2, None, 2], 2),
+        ([0, 0], None),
+        ([0, 0, 0], 0),
+        ([3] * 6 + [0] * 4, 3),
+        ([3] * 5 + [0] * 5, None),
+    ],
+)
+def test_of_five_parts_three_must_agree(votes, answer):
+    assert winner(MajorityVote(), votes) == answer
+
+
+def test_without_a_needed_share_the_most_votes_decide_and_a_tie_is_unclassified():
+    assert winner(MajorityVote(share=0.0), [0, 1, 2, 2]) == 2
+    assert winner(MajorityVote(share=0.0), [0, 0, 2, 2]) is None
+    assert winner(MajorityVote(share=0.0), [None, None]) is None
+
+
+def test_the_probability_of_the_majority_is_its_share_of_the_votes():
+    np.testing.assert_allclose(np.exp(joined(MajorityVote(), [1, 1, 1, 0, 0])), [0.4, 0.6, 0.0, 0.0], atol=1e-5)
+
+
+def test_windows_that_speak_for_two_labels_alike_are_unclassified_by_the_soft_vote_too():
+    assert winner(SoftVote(), [None, None]) is None
+    assert winner(SoftVote(), [None, 1]) == 1
+
+
+@pytest.mark.parametrize('name', EVIDENCE_RULES)
+def test_many_slides_at_once_are_joined_as_one_by_one(name):
+    rule = EVIDENCE_RULES[name]()
+    log_p = log_softmax(np.random.default_rng(0).normal(size=(6, 5, 4)))
+    means = rule.voice(log_p).mean(axis=1)
+    worth = np.arange(1.0, 7.0)[:, None]
+    together = rule.log_posterior(means, worth, 0.7)
+    assert np.isfinite(together).all()
+    np.testing.assert_allclose(np.exp(together).sum(axis=1), 1.0)
+    for mean, windows, expected in zip(means, worth[:, 0], together, strict=True):
+        np.testing.assert_array_equal(rule.log_posterior(mean, windows, 0.7), expected)
