@@ -43,6 +43,8 @@ COMMANDS: Mapping[str, Command] = {
     'import': Command('import_recordings', "turn other people's recordings into labelled bags"),
     'train': Command('train', 'learn a model from labelled bags'),
     'evaluate': Command('evaluate', 'say how good a model is on labelled bags'),
+    'panel': Command('panel', 'say what a panel of people grades as rough, and how far they agree'),
+    'experiment': Command('experiment', "rebuild a paper's experiment: its figures beside ours"),
     'bench': Command('bench', 'run a benchmark; writes figures and a chart'),
 }
 
@@ -74,7 +76,7 @@ def _dispatch(given: Sequence[str]) -> int:
 
 def overview() -> str:
     """Return the help of the command itself."""
-    lines = [f'  {name:<10}{command.summary}' for name, command in COMMANDS.items()]
+    lines = [f'  {name:<12}{command.summary}' for name, command in COMMANDS.items()]
     head = 'usage: texture COMMAND [...]\n\nRecognise surfaces by sliding a tactile finger over them.\n'
     return '\n'.join([head, *lines, '\nMore of each: texture COMMAND --help'])
 

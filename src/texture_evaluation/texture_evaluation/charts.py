@@ -70,7 +70,7 @@ class Tour:
 
 def picture(tour: Tour, path: str | Path) -> Path:
     """Draw one slide in four panels: signal, spectrum, evidence and confusion."""
-    with _chart(path, (11.0, 8.0)) as figure:
+    with chart(path, (11.0, 8.0)) as figure:
         figure.suptitle(
             f'How a slide over {tour.surface} is recognised ({tour.source})', x=0.02, ha='left', fontweight='bold'
         )
@@ -86,7 +86,7 @@ def picture(tour: Tour, path: str | Path) -> Path:
 def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: str | Path) -> Path:
     """Draw a confusion table; each row is a surface and adds up to 100 %."""
     side = 3.5 + 0.28 * len(labels)
-    with _chart(path, (side + 0.8, side)) as figure:
+    with chart(path, (side + 0.8, side)) as figure:
         axes = figure.subplots()
         _table(axes, labels, table)
         axes.set_title(title)
@@ -108,7 +108,7 @@ def line_chart(
     logarithmic: bool = False,
 ) -> Path:
     """Draw lines of percentages over x, on a logarithmic x axis if wanted; (x, y) by the name of each line."""
-    with _chart(path, (7.0, 4.2)) as figure:
+    with chart(path, (7.0, 4.2)) as figure:
         axes = figure.subplots()
         for (name, (x, y)), style in zip(series.items(), _styles(), strict=False):
             axes.plot(x, y, label=name, marker='.', **style)
@@ -131,7 +131,7 @@ def error_chart(
     points: int,
 ) -> Path:
     """Draw positive errors over time on a logarithmic axis: the largest of each of `points` stretches of time."""
-    with _chart(path, (7.0, 4.2)) as figure:
+    with chart(path, (7.0, 4.2)) as figure:
         axes = figure.subplots()
         for (name, (x, y)), colour in zip(series.items(), COLOURS, strict=False):
             size = max(1, len(x) // points)
@@ -151,7 +151,7 @@ def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], 
     panels
         Kind of fault → name of the line → faults per byte, share recovered and share of false ones, 0 to 1, (n,) each.
     """
-    with _chart(path, (4.0 * len(panels), 4.0)) as figure:
+    with chart(path, (4.0 * len(panels), 4.0)) as figure:
         figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
         rows = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
         for axes, (kind, series) in zip(rows, panels.items(), strict=True):
@@ -167,7 +167,7 @@ def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], 
 
 def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, path: str | Path) -> Path:
     """Draw how values are spread, each group on its own row; the line stands at 99 % of them."""
-    with _chart(path, (7.0, 1.0 + 1.3 * len(series))) as figure:
+    with chart(path, (7.0, 1.0 + 1.3 * len(series))) as figure:
         rows = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
         longest = max(float(np.max(values)) for values in series.values())
         edges = np.linspace(0.0, 1.02 * longest, 120)
@@ -183,7 +183,7 @@ def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, pa
 
 
 @contextmanager
-def _chart(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
+def chart(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
     """Give an empty figure and save it at the end; no display is needed and no global state is touched."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, layout='constrained')
