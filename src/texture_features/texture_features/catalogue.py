@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from texture_features.feature import Feature
 from texture_features.features.arc_length import ArcLength
+from texture_features.features.bursts import Bursts
 from texture_features.features.force import Force
 from texture_features.features.hjorth import Hjorth
 from texture_features.features.integral import Integral
@@ -14,8 +15,13 @@ from texture_features.features.log_bands import LogBands
 from texture_features.features.log_slope_variance import LogSlopeVariance
 from texture_features.features.log_variance import LogVariance
 from texture_features.features.low_lines import LowLines
+from texture_features.features.pacinian_power import PacinianPower
+from texture_features.features.spatial_level import SpatialLevel
+from texture_features.features.spatial_variation import SpatialVariation
+from texture_features.features.spectral_exponent import SpectralExponent
 from texture_features.features.spectral_peaks import SpectralPeaks
 from texture_features.features.speed import Speed
+from texture_features.features.temporal_variation import TemporalVariation
 from texture_features.features.typical_bands import TypicalBands
 
 FEATURES: Mapping[str, type[Feature]] = {
@@ -29,6 +35,12 @@ FEATURES: Mapping[str, type[Feature]] = {
     'level': Level,
     'log_variance': LogVariance,
     'log_slope_variance': LogSlopeVariance,
+    'pacinian_power': PacinianPower,  # Bensmaia & Hollins 2005
+    'spectral_exponent': SpectralExponent,  # Toscani & Metzger 2022
+    'temporal_variation': TemporalVariation,  # Lieber & Bensmaia 2019
+    'spatial_variation': SpatialVariation,  # Lieber & Bensmaia 2019
+    'spatial_level': SpatialLevel,
+    'bursts': Bursts,
     'speed': Speed,
     'force': Force,
 }

@@ -1,0 +1,40 @@
+"""How much the strongest moment stands out: what a skid does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows
+
+
+@dataclass(frozen=True)
+class Bursts:
+    """Logarithm of the power of the strongest piece of the window over that of the middle one.
+
+    A finger that sticks and slips is still and then jumps; over an even texture all pieces are alike.
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    pieces: int = param(10, 'Number of pieces; fewer if the window has fewer samples.', low=2, high=1000)
+    floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One value without a name of its own."""
+        return ('',)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return log(strongest / middle)."""
+        rows = windows.centred_rows
+        pieces = min(self.pieces, rows.shape[-1])
+        length = rows.shape[-1] // pieces
+        cut = rows[..., : pieces * length].reshape(*rows.shape[:-1], pieces, length)
+        logs = np.sort(np.log(np.add.reduce(cut * cut, axis=-1) / length + self.floor), axis=-1)
+        difference: Array = logs[..., -1] - logs[..., pieces // 2]
+        return difference[..., None]

@@ -1,0 +1,45 @@
+"""How much the surface, as felt, changes within a short way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows
+from texture_features.line_spectrum import line_spectrum, without_force
+
+
+@dataclass(frozen=True)
+class SpatialVariation:
+    """Logarithm of the mean square difference between places `lag_m` apart along the way of the finger.
+
+    In nerves the rougher surface makes neighbouring fibres differ more; here one channel meets the places one after
+    the other, lag_m / speed apart in time. The mean square is 2·∫ S(f)·(1 - cos(2πf·lag_m/speed)) df, so that no lag
+    has to be a whole number of samples. NaN if the speed is unknown.
+
+    Source: Lieber & Bensmaia 2019; Connor & Johnson 1992.
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    lag_m: float = param(5e-4, 'Way between what is compared.', unit='m', low=1e-6, high=1.0)
+    points: int = param(128, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
+    rate_of_change: bool = param(True, 'The signal is the rate of change of what touches.')
+    force_exponent: float = param(0.0, 'Divide the power by force to this exponent; 2/3: Hertz.', low=0.0, high=4.0)
+    floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One value without a name of its own."""
+        return ('',)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return the log mean square difference."""
+        densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
+        phase = 2.0 * np.pi * hertz * (self.lag_m / np.asarray(windows.speed_m_s)[..., None, None])
+        power = 2.0 * np.add.reduce(densities * (1.0 - np.cos(phase)), axis=-1, keepdims=True) * hertz[0]
+        return without_force(np.log(power + self.floor), windows, self.force_exponent)

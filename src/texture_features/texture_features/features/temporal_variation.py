@@ -1,0 +1,41 @@
+"""How much the signal changes within a short time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows
+
+
+@dataclass(frozen=True)
+class TemporalVariation:
+    """Logarithm of the mean absolute difference of the signal with itself `lag_s` later.
+
+    In nerves the rougher surface makes the response of each fibre vary more in time; here the channel takes the place
+    of a fibre.
+
+    Source: Lieber & Bensmaia 2019; Lieber, Xia, Weber & Bensmaia 2017.
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    lag_s: float = param(0.002, 'Time between what is compared; at least one sample.', unit='s', low=0.0, high=10.0)
+    floor: float = param(1e-20, 'Difference added before the logarithm, unit.', low=1e-300, high=1e300)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One value without a name of its own."""
+        return ('',)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return log(mean |s(t + lag) - s(t)|)."""
+        rows = windows.rows
+        lag = min(max(1, round(self.lag_s * windows.rate_hz)), rows.shape[-1] - 1)
+        steps = np.abs(rows[..., lag:] - rows[..., : rows.shape[-1] - lag])
+        mean: Array = np.add.reduce(steps, axis=-1, keepdims=True) / steps.shape[-1]
+        return np.log(mean + self.floor)
