@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,11 +13,11 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch, TextureError
+from texture_estimation import model_files
 from texture_estimation.learners.learner import LogProbabilities
 from texture_estimation.log_probabilities import undecided
 from texture_estimation.recipe import Recipe
 
-FORMAT = 1
 # What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
 TRUSTED = ('sklearn.preprocessing._data.StandardScaler', 'sklearn.svm._classes.SVC')
 
@@ -76,7 +73,7 @@ class Model:
     def card(self) -> dict[str, Any]:
         """What the card says, in the form of JSON."""
         return {
-            'format': FORMAT,
+            'format': model_files.FORMAT,
             'name': self.name,
             'labels': list(self.labels),
             'feature_set': self.feature_set,
@@ -88,19 +85,8 @@ class Model:
         }
 
     def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
-        """Write NAME.skops and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.skops.
-
-        A reader never sees half a file: both are written beside their places and then moved.
-        """
-        from skops.io import dumps  # noqa: PLC0415  # takes a second, and only who saves or loads needs it
-
-        target = _stem(path)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        content = dumps(dict(self.parts), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
-        card = {**self.card, **(facts or {}), 'sha256': hashlib.sha256(content).hexdigest()}
-        _replace(target.with_name(f'{target.name}.skops'), content)
-        _replace(target.with_name(f'{target.name}.json'), (json.dumps(card, indent=1) + '\n').encode())
-        return target.with_name(f'{target.name}.skops')
+        """Write NAME.skops and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.skops."""
+        return model_files.write(path, self.parts, {**self.card, **(facts or {})})
 
 
 def load_model(path: str | Path) -> Model:
@@ -111,9 +97,10 @@ def load_model(path: str | Path) -> Model:
     ModelMismatch
         With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
     """
-    target = _stem(path)
-    card = _read_card(target.with_name(f'{target.name}.json'))
-    content = _read_parts(target.with_name(f'{target.name}.skops'), str(card.get('sha256')))
+    target = model_files.stem(path)
+    card, content = model_files.read(target)
+    if 'head' in card.get('recipe', {}):
+        raise ModelMismatch(f"model '{target}' gives grades of roughness; the roughness_estimator takes it")
     try:
         recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
         model = Model(
@@ -122,7 +109,7 @@ def load_model(path: str | Path) -> Model:
             names=tuple(map(str, card['features'])),
             feature_set=str(card['feature_set']),
             recipe=recipe,
-            parts=_load_parts(content),
+            parts=model_files.parts_of(content, TRUSTED),
             growth=float(card['growth']),
             training=dict(card['training']),
         )
@@ -136,47 +123,3 @@ def load_model(path: str | Path) -> Model:
             f"model '{target}' answers for {answer.shape} labels but its card names {len(model.labels)}; train it again"
         )
     return model
-
-
-def _load_parts(content: bytes) -> dict[str, Any]:
-    from skops.io import get_untrusted_types, loads  # noqa: PLC0415
-
-    unexpected = sorted(set(get_untrusted_types(data=content)) - set(TRUSTED))
-    if unexpected:
-        raise ModelMismatch(f'it holds {", ".join(unexpected)}, which no model of this suite holds')
-    parts = loads(content, trusted=list(TRUSTED))
-    return dict(parts)
-
-
-def _read_card(path: Path) -> dict[str, Any]:
-    try:
-        card = json.loads(path.read_text(encoding='utf-8'))
-    except (OSError, ValueError) as error:
-        raise ModelMismatch(f"model card '{path}' cannot be read: {error}; give the path of a trained model") from error
-    if not isinstance(card, dict) or card.get('format') != FORMAT:
-        raise ModelMismatch(f"'{path}' is not the card of a model of format {FORMAT}; give the path of a trained model")
-    return card
-
-
-def _read_parts(path: Path, digest: str) -> bytes:
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ModelMismatch(f"model file '{path}' cannot be read: {error}; it belongs beside its card") from error
-    if hashlib.sha256(content).hexdigest() != digest:
-        raise ModelMismatch(f"model file '{path}' is damaged or of another card; copy both files again or train again")
-    return content
-
-
-def _stem(path: str | Path) -> Path:
-    path = Path(path).expanduser()
-    return path.with_suffix('') if path.suffix in ('.skops', '.json') else path
-
-
-def _replace(path: Path, content: bytes) -> None:
-    beside = path.with_name(f'.{path.name}.{os.getpid()}')
-    try:
-        beside.write_bytes(content)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)

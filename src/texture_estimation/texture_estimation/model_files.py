@@ -1,0 +1,90 @@
+"""The two files that hold a model, whatever it judges: NAME.skops with what was learnt, and the card NAME.json."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from texture_core.errors import ModelMismatch
+
+FORMAT = 1
+
+
+def stem(path: str | Path) -> Path:
+    """Return the path without the ending of either file."""
+    path = Path(path).expanduser()
+    return path.with_suffix('') if path.suffix in ('.skops', '.json') else path
+
+
+def write(path: str | Path, parts: Mapping[str, Any], card: Mapping[str, Any]) -> Path:
+    """Write NAME.skops and NAME.json, and return NAME.skops.
+
+    A reader never sees half a file: both are written beside their places and then moved.
+    """
+    from skops.io import dumps  # noqa: PLC0415  # takes a second, and only who saves or loads needs it
+
+    target = stem(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    content = dumps(dict(parts), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
+    card = {**card, 'sha256': hashlib.sha256(content).hexdigest()}
+    _replace(target.with_name(f'{target.name}.skops'), content)
+    _replace(target.with_name(f'{target.name}.json'), (json.dumps(card, indent=1) + '\n').encode())
+    return target.with_name(f'{target.name}.skops')
+
+
+def read(path: str | Path) -> tuple[dict[str, Any], bytes]:
+    """Return the card, and the bytes that belong to it; `path` is that of either file, or of both without the ending.
+
+    Raises
+    ------
+    ModelMismatch
+        If a file is missing, damaged, or does not belong to the other.
+    """
+    target = stem(path)
+    card = _read_card(target.with_name(f'{target.name}.json'))
+    return card, _read_parts(target.with_name(f'{target.name}.skops'), str(card.get('sha256')))
+
+
+def parts_of(content: bytes, trusted: Sequence[str]) -> dict[str, Any]:
+    """Return what was learnt; nothing is built of types that are not `trusted`, and no code of the file is run."""
+    from skops.io import get_untrusted_types, loads  # noqa: PLC0415
+
+    unexpected = sorted(set(get_untrusted_types(data=content)) - set(trusted))
+    if unexpected:
+        raise ModelMismatch(f'it holds {", ".join(unexpected)}, which no model of this suite holds')
+    parts = loads(content, trusted=list(trusted))
+    return dict(parts)
+
+
+def _read_card(path: Path) -> dict[str, Any]:
+    try:
+        card = json.loads(path.read_text(encoding='utf-8'))
+    except (OSError, ValueError) as error:
+        raise ModelMismatch(f"model card '{path}' cannot be read: {error}; give the path of a trained model") from error
+    if not isinstance(card, dict) or card.get('format') != FORMAT:
+        raise ModelMismatch(f"'{path}' is not the card of a model of format {FORMAT}; give the path of a trained model")
+    return card
+
+
+def _read_parts(path: Path, digest: str) -> bytes:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ModelMismatch(f"model file '{path}' cannot be read: {error}; it belongs beside its card") from error
+    if hashlib.sha256(content).hexdigest() != digest:
+        raise ModelMismatch(f"model file '{path}' is damaged or of another card; copy both files again or train again")
+    return content
+
+
+def _replace(path: Path, content: bytes) -> None:
+    beside = path.with_name(f'.{path.name}.{os.getpid()}')
+    try:
+        beside.write_bytes(content)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
