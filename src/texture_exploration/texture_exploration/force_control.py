@@ -13,7 +13,10 @@ k is estimated while the finger comes into contact, and g follows from it: see `
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
+
+import numpy as np
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
@@ -21,11 +24,15 @@ from texture_exploration.stability import Loop, border_gain
 
 SOFTEST_N_M = 50.0
 MIN_POINTS = 3
+RECENT_SHARE = 0.5  # of the force, from which on points count
 MIN_RISE_N = 0.1  # of the force, before a stiffness can be told from noise
 TOUCHING_N = 0.03
-OBSERVER_S = 0.006  # time constant of the feed-forward
+OBSERVED = 8  # heights that tell the slope: fewer follow a bump better, but shake with a finger that sticks and slips
+SHORTEST_M = 1e-6  # way over which a slope is told
+LIKELY_SLOPE = 0.2
+LIKELY_BEND_1_M = 0.5  # half of the second derivative; higher bends are followed the better k is known
+NOISE_N = 0.005  # of the force
 SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
-MOST_AHEAD = 3.0  # the feed-forward trusts a slope for a speed at most so many times that at which it was seen
 SETTLED = 0.3  # from an error of this share of the wanted force on, the slope is observed
 REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
 NEAR_M = 0.001  # above a surface whose height is known, the finger slows down to closing speed
@@ -101,6 +108,8 @@ class StiffnessEstimate:
         if self.fixed or force_n < TOUCHING_N or (self._points and force_n <= self._points[-1][1]):
             return
         self._points.append((height_m, force_n))
+        # A finger is the stiffer the harder it is pressed: what counts is how stiff it is now.
+        self._points = [point for point in self._points if point[1] >= RECENT_SHARE * force_n]
         if len(self._points) >= MIN_POINTS and force_n - self._points[0][1] > MIN_RISE_N:
             self.value_n_m = max(SOFTEST_N_M, self._slope())
 
@@ -146,42 +155,66 @@ class ForceController:
 
 
 class SlopeObserver:
-    """How fast the surface under the finger rises, freed from what the controller does itself.
+    """How fast the surface will rise under the finger, freed from what the controller does itself.
 
-    Rise and way are smoothed alike: a change of the slope is seen late, a change of speed on the same slope at once.
+    A parabola through the last heights over the way tells the slope where the finger will be when the answer comes
+    into effect; times the speed that is commanded now, it is the rise then.
+
+    Parameters
+    ----------
+    ahead_s
+        From a height to the middle of the time in which the answer to it is in effect.
     """
 
-    def __init__(self) -> None:
-        self.restart()
+    def __init__(self, ahead_s: float) -> None:
+        self._ahead_s = ahead_s
+        self._seen: deque[tuple[float, float]] = deque(maxlen=OBSERVED)
 
     @property
     def running(self) -> bool:
         """Whether it has seen a height."""
-        return not math.isnan(self._height_m)
+        return bool(self._seen)
 
     def restart(self) -> None:
         """The finger left the surface."""
-        self._rise_m_s = 0.0
-        self._speed_m_s = 0.0
-        self._height_m = math.nan
+        self._seen.clear()
 
-    def update(self, surface_m: float, speed_m_s: float, dt_s: float) -> float:
-        """Return how fast the surface rises, m/s.
+    def update(self, way_m: float, surface_m: float, speed_m_s: float, noise_m: float) -> float:
+        """Return how fast the surface will rise, m/s.
 
         Parameters
         ----------
+        way_m
+            That the finger has gone along the surface.
         surface_m
             Height of the untouched surface, z + F/k.
         speed_m_s
-            Along the surface.
+            Along the surface, as commanded.
+        noise_m
+            Of the height.
         """
-        if self.running and dt_s > 0:
-            share = -math.expm1(-dt_s / OBSERVER_S)
-            self._rise_m_s += share * ((surface_m - self._height_m) / dt_s - self._rise_m_s)
-            self._speed_m_s += share * (speed_m_s - self._speed_m_s)
-        self._height_m = surface_m
-        faster = speed_m_s / self._speed_m_s if self._speed_m_s > SLOWEST_M_S else 1.0
-        return self._rise_m_s * min(MOST_AHEAD, faster)
+        self._seen.append((way_m, surface_m))
+        if len(self._seen) < MIN_POINTS:
+            return 0.0
+        way, height = np.array(self._seen).T
+        unit = max(float(way[-1] - way[0]), SHORTEST_M)
+        way = (way - way_m) / unit
+        shapes = np.stack([way, way**2], axis=1)
+        shapes = shapes - shapes.mean(axis=0)
+        # Likely slopes and bends, as if they had been seen once beside the heights.
+        likely = np.diag([noise_m / (LIKELY_SLOPE * unit), noise_m / (LIKELY_BEND_1_M * unit**2)]) ** 2
+        slope, bend = np.linalg.solve(shapes.T @ shapes + likely, shapes.T @ (height - height.mean()))
+        ahead = min(1.0, speed_m_s * self._ahead_s / unit)
+        return float((slope + 2 * bend * ahead) / unit * speed_m_s)
+
+
+@dataclass(frozen=True)
+class Feeling:
+    """What the force loop is told: height of the finger, its way along the surface so far, the force on it."""
+
+    height_m: float
+    way_m: float
+    force_n: float
 
 
 class ForceLoop:
@@ -205,7 +238,7 @@ class ForceLoop:
         self._params = params
         self._period_s = period_s
         self.stiffness = StiffnessEstimate()
-        self._observer = SlopeObserver()
+        self._observer = SlopeObserver(params.loop_delay_s + 0.5 * period_s)
         self._surface_m: float | None = None  # where the finger met it last
         self._chosen_for = math.nan
         self.controller = ForceController(
@@ -219,20 +252,21 @@ class ForceLoop:
         self.controller.restart()
         self._observer.restart()
 
-    def feel(self, height_m: float, force_n: float, speed_m_s: float = 0.0) -> None:
+    def feel(self, feeling: Feeling, speed_m_s: float = 0.0) -> None:
         """Take note of a contact, whatever is commanded; call it once a period. Sliding tells nothing of stiffness."""
-        if force_n < TOUCHING_N:
+        if feeling.force_n < TOUCHING_N:
             self.stiffness.restart()
             return
         if self.stiffness.empty:
-            self._surface_m = height_m
+            self._surface_m = feeling.height_m
         if speed_m_s > SLOWEST_M_S or self._observer.running:
             self.stiffness.fixed = True
-        self.stiffness.update(height_m, force_n)
+        self.stiffness.update(feeling.height_m, feeling.force_n)
         self._choose_gain()
 
-    def velocity_m_s(self, wanted_n: float, height_m: float, force_n: float, speed_m_s: float, dt_s: float) -> float:
-        """Return the normal velocity that leads to a wanted force, at a speed along the surface."""
+    def velocity_m_s(self, wanted_n: float, feeling: Feeling, speed_m_s: float, dt_s: float) -> float:
+        """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface."""
+        height_m, force_n = feeling.height_m, feeling.force_n
         if force_n < TOUCHING_N:
             self.restart()
             return -self.closing_m_s(height_m)
@@ -240,7 +274,7 @@ class ForceLoop:
         settled = abs(wanted_n - force_n) < SETTLED * wanted_n
         rising = 0.0
         if not math.isnan(felt) and (settled or self._observer.running):
-            rising = self._observer.update(height_m + force_n / felt, speed_m_s, dt_s)
+            rising = self._observer.update(feeling.way_m, height_m + force_n / felt, speed_m_s, NOISE_N / felt)
         return self.controller.update(wanted_n - force_n, dt_s, rising)
 
     def closing_m_s(self, height_m: float) -> float:

@@ -9,33 +9,42 @@ from typing import Any
 
 import numpy as np
 
+from texture_core.arrays import Array
 from texture_core.exploration import ExplorationRequest, Phase
 from texture_exploration.arms.protocol import ArmState
-from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.exploration import Exploration
+from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
+from texture_exploration.exploration import Exploration, Outcome
 from texture_exploration.explorer import PERIOD_S
-from texture_exploration.motions.linear_slide import linear_slide
+from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
-ARM_PERIOD_NS = 5_000_000
+ARM_PERIOD_NS = round(1e9 / RATE_HZ)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
-ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002)
+CIRCLE = ExplorationRequest('circular', speed_m_s=0.1, force_n=1.0, radius_m=0.02, turns=2.0)
+# One configuration for all stiffnesses: the stiffest contact is expected throughout.
+ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, stiffest_n_m=20000.0)
+LIMITS = SafetyLimits()
 
 
 @dataclass(frozen=True)
 class Trial:
-    """How a slide went; shares of the wanted force and speed.
+    """How an exploration went; shares of the wanted force and speed.
 
     `overshoot` is the highest force from the approach to the beginning of the slide, above the wanted; `force_rms` and
-    `speed_error` (the largest) are those of the slide. All are NaN if it did not come to a slide; `message` says why.
+    `speed_error` (the largest) are those of the slide, as is `radius_error_m`, the largest distance from the circle,
+    NaN if there was none. All are NaN if it did not come to a slide; `message` says why.
     """
 
     success: bool
     message: str
-    overshoot: float
-    force_rms: float
-    speed_error: float
+    overshoot: float = math.nan
+    force_rms: float = math.nan
+    speed_error: float = math.nan
+    radius_error_m: float = math.nan
+
+
+Log = Sequence[tuple[Phase, ArmState]]
 
 
 def slide_trial(
@@ -43,43 +52,63 @@ def slide_trial(
     request: ExplorationRequest = SLIDE,
     touch: TouchParams = TouchParams(),  # noqa: B008
 ) -> Trial:
-    """Slide once on a simulated arm, under the real exploration loop."""
+    """Explore once with a simulated arm, under the real exploration loop."""
     log: list[tuple[Phase, ArmState]] = []
-    limits = SafetyLimits()
-    now_ns = 0
+    now_ns = due_ns = 0
 
     def clock() -> int:
         return now_ns
 
     moving = SimulatedArm(arm, clock, own_thread=False)
     moving.connect()
-    motion = linear_slide(request, moving.state().position, touch, limits)
+    motion = MOTIONS[request.motion](request, moving.state().position, touch, LIMITS)
     exploration = Exploration(
-        'trial', request, arm=moving, motion=motion, limits=limits, clock=clock, on_state=lambda state: None
+        'trial', request, arm=moving, motion=motion, limits=LIMITS, clock=clock, on_state=lambda state: None
     )
 
     def pace() -> None:
-        nonlocal now_ns
-        for _ in range(round(PERIOD_S * 1e9) // ARM_PERIOD_NS):
+        nonlocal now_ns, due_ns
+        due_ns += round(PERIOD_S * 1e9)
+        while now_ns + ARM_PERIOD_NS <= due_ns:
             now_ns += ARM_PERIOD_NS
             moving.step(ARM_PERIOD_NS * 1e-9)
         log.append((exploration.state.phase, moving.state()))
 
     outcome = exploration.run(pace)
     moving.close()
+    return judge(log, request, outcome)
+
+
+def judge(log: Log, request: ExplorationRequest, outcome: Outcome) -> Trial:
+    """Return how an exploration went, from the states of the arm in each phase."""
     before = [state.force_n for phase, state in log if phase in (Phase.APPROACH, Phase.CONTACT)]
     sliding = [state for phase, state in log if phase is Phase.SLIDE]
     if not sliding:
-        return Trial(outcome.success, outcome.message, math.nan, math.nan, math.nan)
+        return Trial(outcome.success, outcome.message)
     force = np.array([state.force_n for state in sliding]) / request.force_n
     speed = np.array([math.hypot(*state.velocity[:2]) for state in sliding]) / request.speed_m_s
+    places = np.array([state.position[:2] for state in sliding])
     return Trial(
         success=outcome.success,
         message=outcome.message,
         overshoot=max(before) / request.force_n - 1,
         force_rms=float(np.sqrt(np.mean((force - 1) ** 2))),
         speed_error=float(np.abs(speed - 1).max()),
+        radius_error_m=radius_error_m(places, request.radius_m),
     )
+
+
+def radius_error_m(places: Array, radius_m: float) -> float:
+    """Return the largest distance of places, (n, 2), from a circle of that radius around their own middle, m.
+
+    NaN if the radius is 0, for another path. The middle is that of the circle that fits best, by least squares
+    (Kåsa 1976).
+    """
+    if not radius_m:
+        return math.nan
+    terms = np.column_stack([2 * places, np.ones(len(places))])
+    middle = np.linalg.lstsq(terms, (places**2).sum(axis=1), rcond=None)[0][:2]
+    return float(np.abs(np.hypot(*(places - middle).T) - radius_m).max())
 
 
 # Surfaces to try force control on, each as changes of the arm's parameters.
@@ -93,16 +122,10 @@ SURFACES: Mapping[str, Mapping[str, Any]] = {
 
 
 def surface_trials(
-    stiffness_n_m: Sequence[float] = (200.0, 2000.0, 20000.0), acceleration_m_s2: float = 1.0
+    stiffness_n_m: Sequence[float] = (200.0, 2000.0, 20000.0), arm: SimulatedArmParams = ARM
 ) -> dict[str, dict[float, Trial]]:
-    """Return the trials on all `SURFACES` by name and stiffness; the stiffest expected contact is the actual one."""
-    touch = TouchParams(acceleration_m_s2=acceleration_m_s2)
+    """Return the trials on all `SURFACES` by name and stiffness."""
     return {
-        name: {
-            stiffness: slide_trial(
-                replace(ARM, stiffness_n_m=stiffness, stiffest_n_m=max(1000.0, stiffness), **changes), touch=touch
-            )
-            for stiffness in stiffness_n_m
-        }
+        name: {stiffness: slide_trial(replace(arm, stiffness_n_m=stiffness, **changes)) for stiffness in stiffness_n_m}
         for name, changes in SURFACES.items()
     }

@@ -6,7 +6,6 @@ import math
 import socket
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -15,7 +14,8 @@ from texture_core.finger import FingerState
 from texture_core.parameters import param
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
 from texture_exploration.arms.simulated_surface import SimulatedSurface, SimulatedSurfaceParams
-from texture_exploration.force_control import ForceLoop, ForceLoopParams
+from texture_exploration.arms.velocity_only import VelocityOnly
+from texture_exploration.force_control import ForceLoopParams
 
 RATE_HZ = 250.0
 RESTING_PERIOD_S = 0.05  # a finger at rest is still reported, but costs next to nothing
@@ -42,7 +42,7 @@ class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams):
 class SimulatedArm:
     """A finger that follows velocities exactly and, if it has a force mode, approaches a wanted force exponentially.
 
-    Without a force mode the normal velocity comes into effect after `loop_delay_s`.
+    Without a force mode velocities come into effect after `loop_delay_s`.
 
     Parameters
     ----------
@@ -80,8 +80,7 @@ class SimulatedArm:
         self._thread: threading.Thread | None = None
         self._report = FingerReport(params.finger_port)
         self._surface = SimulatedSurface(params, params.stiffness_n_m)
-        self._loop = None if params.force_mode else ForceLoop(params, 1 / RATE_HZ)
-        self._late = DelayedVelocity(params.loop_delay_s, clock())
+        self._slow = None if params.force_mode else VelocityOnly(params, 1 / RATE_HZ, clock())
 
     def connect(self) -> None:
         """Start to move in time; clears what was injected."""
@@ -143,33 +142,26 @@ class SimulatedArm:
         left_s = self._params.command_timeout_s + (given_ns - now_ns) * 1e-9
         # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
         moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
-        (vx, vy), (x, y, z) = command.tangential_m_s, self._state.position
-        dz = self._late.way_m(now_ns) if self._loop else self._normal_step(command, moving_s)
-        position = (x + vx * moving_s, y + vy * moving_s, z + dz)
-        velocity: Vector = (vx, vy, dz / moving_s if moving_s > 0 else 0.0)
+        moved = self._slow.moved_m(now_ns) if self._slow else self._moved_m(command, moving_s)
+        x, y, z = (at + way for at, way in zip(self._state.position, moved, strict=True))
+        velocity = _speed(moved, moving_s)
         if left_s < 0:
             velocity = (0.0, 0.0, 0.0)
             command = STANDSTILL
             self._order = (STANDSTILL, now_ns)
-        force_n = self._surface.force_n(position[0], position[2]) + self._push_n
-        self._state = ArmState(now_ns, position, velocity, force_n, self._fault)
-        if self._loop:
-            self._late.set(now_ns, self._normal_speed(self._loop, command, dt_s))
+        force_n = self._surface.force_n(x, z) + self._push_n
+        self._state = ArmState(now_ns, (x, y, z), velocity, force_n, self._fault)
+        if self._slow:
+            self._slow.ask(command, self._state, dt_s)
         self._report.send(self._state)
 
     @property
     def _resting(self) -> bool:
         return self._order[0] == STANDSTILL
 
-    def _normal_speed(self, loop: ForceLoop, command: ArmCommand, dt_s: float) -> float:
-        """Return the velocity to ask for, of an arm without a force mode."""
-        height_m, force_n = self._state.position[2], self._state.force_n
-        speed_m_s = math.hypot(*command.tangential_m_s)
-        loop.feel(height_m, force_n, speed_m_s)
-        if command.force_n is None:
-            loop.restart()
-            return max(command.normal_m_s, -loop.closing_m_s(height_m))
-        return loop.velocity_m_s(command.force_n, height_m, force_n, speed_m_s, dt_s)
+    def _moved_m(self, command: ArmCommand, dt_s: float) -> Vector:
+        vx, vy = command.tangential_m_s
+        return vx * dt_s, vy * dt_s, self._normal_step(command, dt_s)
 
     def _normal_step(self, command: ArmCommand, dt_s: float) -> float:
         """Return the change of height in one step, m.
@@ -199,29 +191,11 @@ class SimulatedArm:
             last_ns = now_ns
 
 
-class DelayedVelocity:
-    """A velocity that comes into effect late."""
-
-    def __init__(self, delay_s: float, now_ns: int) -> None:
-        self._delay_ns = round(delay_s * 1e9)
-        self._coming: deque[tuple[int, float]] = deque()
-        self._now = 0.0
-        self._done_ns = now_ns
-
-    def set(self, now_ns: int, velocity_m_s: float) -> None:
-        """Ask for a velocity."""
-        self._coming.append((now_ns + self._delay_ns, velocity_m_s))
-
-    def way_m(self, until_ns: int) -> float:
-        """Return how far it goes from the last time asked until now."""
-        way = 0.0
-        while self._coming and self._coming[0][0] <= until_ns:
-            begin_ns, velocity = self._coming.popleft()
-            way += self._now * max(0, begin_ns - self._done_ns) * 1e-9
-            self._done_ns, self._now = max(self._done_ns, begin_ns), velocity
-        way += self._now * (until_ns - self._done_ns) * 1e-9
-        self._done_ns = until_ns
-        return way
+def _speed(moved_m: Vector, dt_s: float) -> Vector:
+    if dt_s <= 0:
+        return 0.0, 0.0, 0.0
+    x, y, z = (way / dt_s for way in moved_m)
+    return x, y, z
 
 
 class FingerReport:

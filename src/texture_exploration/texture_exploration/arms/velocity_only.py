@@ -1,0 +1,79 @@
+"""An arm that knows velocities alone and follows them late, with a force loop of ours around it."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+from texture_exploration.force_control import Feeling, ForceLoop, ForceLoopParams
+
+HOLDS_S = 0.02  # so long an arm keeps a velocity when nobody asks for another
+
+
+class VelocityOnly:
+    """Ask for velocities that press as wanted, and move by what was asked a delay ago.
+
+    Parameters
+    ----------
+    params
+        The force loop, and its delay.
+    period_s
+        How often it asks.
+    now_ns
+        The time.
+    """
+
+    def __init__(self, params: ForceLoopParams, period_s: float, now_ns: int) -> None:
+        self._loop = ForceLoop(params, period_s)
+        self._late = DelayedVelocity(params.loop_delay_s, now_ns)
+        self._way_m = 0.0
+
+    def moved_m(self, now_ns: int) -> Vector:
+        """Return how far the finger has gone since this was asked last."""
+        moved = self._late.moved_m(now_ns)
+        self._way_m += math.hypot(*moved[:2])
+        return moved
+
+    def ask(self, command: ArmCommand, state: ArmState, dt_s: float) -> None:
+        """Ask for the velocity that a command needs, `dt_s` after the last time."""
+        normal = self._normal_m_s(command, state, min(dt_s, HOLDS_S))
+        self._late.ask(state.time_ns, (*command.tangential_m_s, normal))
+
+    def _normal_m_s(self, command: ArmCommand, state: ArmState, dt_s: float) -> float:
+        feeling = Feeling(state.position[2], self._way_m, state.force_n)
+        speed_m_s = math.hypot(*command.tangential_m_s)
+        self._loop.feel(feeling, speed_m_s)
+        if command.force_n is None:
+            self._loop.restart()
+            return max(command.normal_m_s, -self._loop.closing_m_s(feeling.height_m))
+        return self._loop.velocity_m_s(command.force_n, feeling, speed_m_s, dt_s)
+
+
+class DelayedVelocity:
+    """A velocity that comes into effect late, and holds for a short time only."""
+
+    def __init__(self, delay_s: float, now_ns: int) -> None:
+        self._delay_ns = round(delay_s * 1e9)
+        self._coming: deque[tuple[int, Vector]] = deque()
+        self._now: Vector = (0.0, 0.0, 0.0)
+        self._since_ns = self._done_ns = now_ns
+
+    def ask(self, now_ns: int, velocity: Vector) -> None:
+        """Ask for a velocity, m/s."""
+        self._coming.append((now_ns + self._delay_ns, velocity))
+
+    def moved_m(self, until_ns: int) -> Vector:
+        """Return how far it goes from the last time asked until now."""
+        way: Vector = (0.0, 0.0, 0.0)
+        while self._coming and self._coming[0][0] <= until_ns:
+            begin_ns, velocity = self._coming.popleft()
+            way = self._go(way, begin_ns)
+            self._now, self._since_ns = velocity, begin_ns
+        return self._go(way, until_ns)
+
+    def _go(self, way: Vector, until_ns: int) -> Vector:
+        held_s = max(0, min(until_ns, self._since_ns + round(HOLDS_S * 1e9)) - self._done_ns) * 1e-9
+        self._done_ns = max(self._done_ns, until_ns)
+        x, y, z = (at + speed * held_s for at, speed in zip(way, self._now, strict=True))
+        return x, y, z
