@@ -1,0 +1,314 @@
+"""What every learner must do, and what each of the papers' must do as scikit-learn does it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from sklearn.mixture import GaussianMixture
+from sklearn.naive_bayes import GaussianNB
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVC
+
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_estimation.learners.ann_pairs import AnnPairs
+from texture_estimation.learners.catalogue import LEARNERS
+from texture_estimation.learners.em_mixture import EmMixture
+from texture_estimation.learners.levenberg_marquardt import Network, fit_network
+from texture_estimation.learners.naive_bayes import NaiveBayes
+from texture_estimation.learners.pair_votes import PairVotes
+from texture_estimation.learners.passive_aggressive import OnlinePlanes, PassiveAggressive
+from texture_estimation.learners.svm_linear import SvmLinear
+from texture_estimation.learners.svm_max_wins import SvmMaxWins, principal_components
+from texture_estimation.learners.svm_pairs import SvmPairs
+from texture_estimation.log_probabilities import undecided
+from texture_estimation.model import load_model
+from texture_estimation.recipe import Recipe
+from texture_estimation.training import train
+
+# Less of what takes time only.
+FASTER = {'svm_linear': {'repeats': 2, 'candidates': 5}}
+
+
+def learn(name, examples):
+    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': {name: FASTER.get(name, {})}}
+    return train(Recipe.from_mapping(recipe, name), examples)
+
+
+def codes_of(examples):
+    return tuple(np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+
+
+def accuracy(model, examples):
+    return np.mean(np.array(model.decide(examples.values)) == examples.labels)
+
+
+@pytest.fixture(scope='module', params=LEARNERS)
+def name(request):
+    return request.param
+
+
+@pytest.fixture(scope='module')
+def learnt(name, examples):
+    return learn(name, examples)
+
+
+def test_distinct_surfaces_are_recognised(learnt, make_examples):
+    assert accuracy(learnt, make_examples(seed=1)) > 0.85
+
+
+def test_answers_are_log_probabilities_of_finite_size_even_far_from_all_examples(learnt, examples):
+    for values in (examples.values, np.full((1, 6), 1e6), np.zeros((1, 6)), -examples.values):
+        answers = learnt.predict_log_proba(values)
+        assert np.isfinite(answers).all()
+        np.testing.assert_allclose(np.exp(answers).sum(axis=1), 1.0)
+
+
+def test_a_window_alone_gets_the_same_decision_as_in_a_batch(learnt, examples):
+    together = learnt.predict_log_proba(examples.values)
+    alone = np.stack([learnt.predict_log_proba(values) for values in examples.values])
+    np.testing.assert_allclose(alone, together, atol=1e-9)
+    assert [learnt.decide(values[None])[0] for values in examples.values] == learnt.decide(examples.values)
+
+
+def test_the_same_examples_make_the_same_model(learnt, name, examples):
+    again = learn(name, examples)
+    np.testing.assert_array_equal(again.predict_log_proba(examples.values), learnt.predict_log_proba(examples.values))
+
+
+def test_a_model_judges_the_same_after_it_was_saved(learnt, examples, tmp_path):
+    loaded = load_model(learnt.save(tmp_path / 'm'))
+    np.testing.assert_array_equal(loaded.predict_log_proba(examples.values), learnt.predict_log_proba(examples.values))
+
+
+@pytest.mark.parametrize('factor', [1e-6, 1e6])
+def test_the_unit_of_the_features_does_not_matter(learnt, name, examples, factor):
+    scaled = dataclasses.replace(examples, values=examples.values * factor)
+    agree = np.array(learn(name, scaled).decide(scaled.values)) == np.array(learnt.decide(examples.values))
+    assert agree.mean() > 0.97  # what is iterated may stop a hair elsewhere
+
+
+@pytest.mark.parametrize(
+    'more',
+    [lambda values: values, lambda values: np.full_like(values, 0.1), lambda values: 1e6 + 1e-9 * values],
+    ids=['duplicated', 'constant', 'almost constant'],
+)
+def test_features_that_tell_nothing_new_do_no_harm(name, make_examples, more):
+    def widened(examples):
+        values = np.concatenate((examples.values, more(examples.values)), axis=1)
+        return dataclasses.replace(examples, values=values, names=tuple(map(str, range(values.shape[1]))))
+
+    model, fresh = learn(name, widened(make_examples())), widened(make_examples(seed=1))
+    assert np.isfinite(model.predict_log_proba(fresh.values)).all()
+    assert accuracy(model, fresh) > (0.5 if name == 'em_mixture' else 0.85)  # clusters are found without labels
+
+
+def test_features_that_tell_nothing_at_all_give_finite_answers(name, examples):
+    model = learn(name, dataclasses.replace(examples, values=np.ones_like(examples.values)))
+    assert np.isfinite(model.predict_log_proba(np.ones((3, 6)))).all()
+
+
+@pytest.mark.parametrize(('slides', 'windows'), [(1, 1), (2, 1), (1, 2)])
+def test_one_or_two_windows_of_a_label_are_enough_to_answer(name, make_examples, slides, windows):
+    examples = make_examples(slides=slides, windows=windows)
+    model = learn(name, examples)
+    assert np.isfinite(model.predict_log_proba(examples.values)).all()
+    assert model.labels == ('cork', 'felt', 'slate', 'wood')
+
+
+@pytest.mark.parametrize('n_labels', [2, 3])
+def test_few_labels_are_told_apart_in_the_right_direction(name, make_examples, n_labels):
+    labels = ('cork', 'felt', 'wood')[:n_labels]
+    assert accuracy(learn(name, make_examples(labels=labels)), make_examples(seed=1, labels=labels)) > 0.85
+
+
+def test_labels_of_unequal_numbers_are_all_learnt(name, make_examples):
+    many, few = make_examples(), make_examples(seed=4, slides=1, windows=3)
+    rows = np.concatenate(
+        [np.flatnonzero(many.labels != 'felt'), len(many.labels) + np.flatnonzero(few.labels == 'felt')]
+    )
+    both = dataclasses.replace(
+        many,
+        values=np.concatenate((many.values, few.values))[rows],
+        labels=np.concatenate((many.labels, few.labels))[rows],
+        groups=np.concatenate((many.groups, few.groups))[rows],
+    )
+    assert np.isfinite(learn(name, both).predict_log_proba(many.values)).all()
+
+
+def test_a_single_label_is_refused_with_a_sentence(name, make_examples):
+    with pytest.raises(InvalidData, match="all windows are of 'cork'"):
+        learn(name, make_examples(labels=('cork',)))
+
+
+# Each against scikit-learn, on other examples than those learnt from
+
+
+@pytest.fixture(scope='module', params=[2, 5])
+def task(request, make_examples):
+    labels = tuple(f'm{number}' for number in range(request.param))
+    examples = make_examples(labels=labels, spread=2.0)
+    return examples, *codes_of(examples), make_examples(seed=5, labels=labels, spread=3.0).values
+
+
+def judged(learner, examples, codes, groups, fresh):
+    parts = learner.fit(examples.values, codes, groups).parts
+    return learner.array_form(parts), learner.array_form(parts)(fresh)
+
+
+def test_pairwise_machines_decide_as_scikit_learn_with_the_kernel_of_matlab(task):
+    examples, codes, _, fresh = task
+    _, answers = judged(SvmPairs(box_constraint=2.0, kernel_scale=4.0), *task)
+    scaler = StandardScaler().fit(examples.values)
+    svc = SVC(C=2.0, gamma=1.0 / 16.0).fit(scaler.transform(examples.values), codes)
+    clear = ~undecided(answers)
+    assert clear.mean() > 0.9
+    np.testing.assert_array_equal(answers.argmax(axis=1)[clear], svc.predict(scaler.transform(fresh))[clear])
+
+
+def test_pairwise_machines_without_standardising_use_the_values_as_they_are(task):
+    examples, codes, _, fresh = task
+    _, answers = judged(SvmPairs(standardise=False), *task)
+    svc = SVC(C=10.0, gamma=1.0 / 9.0).fit(examples.values, codes)
+    clear = ~undecided(answers)
+    np.testing.assert_array_equal(answers.argmax(axis=1)[clear], svc.predict(fresh)[clear])
+
+
+@pytest.mark.parametrize('learner', [SvmPairs(kernel_scale=1e-5), SvmPairs(kernel_scale=1e5, box_constraint=0.01)])
+def test_the_ends_of_the_kernel_scale_give_finite_answers(task, learner):
+    assert np.isfinite(judged(learner, *task)[1]).all()
+
+
+def test_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
+    examples, codes, _, fresh = task
+    _, answers = judged(NaiveBayes(), *task)
+    scaler = StandardScaler().fit(examples.values)
+    expected = GaussianNB(var_smoothing=1e-9).fit(scaler.transform(examples.values), codes)
+    np.testing.assert_allclose(answers, expected.predict_log_proba(scaler.transform(fresh)), atol=1e-6)
+
+
+def test_linear_machines_decide_every_window_as_scikit_learn(task):
+    examples, codes, _, fresh = task
+    learner = SvmLinear(least_c=0.5, most_c=0.5, candidates=1, repeats=1)
+    _, answers = judged(learner, *task)
+    scaler = StandardScaler().fit(examples.values)
+    svc = SVC(C=0.5, kernel='linear', break_ties=True).fit(scaler.transform(examples.values), codes)
+    np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(scaler.transform(fresh)))
+
+
+def test_the_penalty_is_the_smallest_of_those_that_do_best(examples):
+    codes, groups = codes_of(examples)
+    fitted = SvmLinear(repeats=2, candidates=3, least_c=1e-9, most_c=1e3).fit(examples.values, codes, groups)
+    assert 'C = 1e-09' not in fitted.note
+
+
+def test_max_wins_on_principal_components_decides_every_window_as_scikit_learn(task):
+    examples, codes, _, fresh = task
+    judge, answers = judged(SvmMaxWins(variance=0.9, gamma=0.02, c=3.0), *task)
+    project = lambda values: (values - examples.values.mean(axis=0)) @ judge.components  # noqa: E731
+    svc = SVC(C=3.0, gamma=0.02, break_ties=True).fit(project(examples.values), codes)
+    np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(project(fresh)))
+
+
+def test_the_mixture_finds_the_clusters_of_scikit_learn(task):
+    examples, codes, _, fresh = task
+    judge, _ = judged(EmMixture(starts=1), *task)
+    scaler = StandardScaler().fit(examples.values)
+    mixture = GaussianMixture(len(np.unique(codes)), reg_covar=1e-3, random_state=0).fit(
+        scaler.transform(examples.values)
+    )
+    np.testing.assert_array_equal(judge.cluster_scores(fresh).argmax(axis=1), mixture.predict(scaler.transform(fresh)))
+
+
+def test_a_label_without_a_cluster_is_never_recognised():
+    values = np.concatenate((np.zeros((8, 1)), np.ones((8, 1)))) + 0.01 * np.arange(16)[:, None]
+    codes = np.array([0] * 8 + [1] * 7 + [2])
+    parts = EmMixture(seed=1).fit(np.repeat(values, 2, axis=1), codes, np.arange(16)).parts
+    assert set(EmMixture.array_form(parts)(np.repeat(values, 2, axis=1)).argmax(axis=1)) == {0, 1}
+
+
+# The parts that learners are made of
+
+
+def test_votes_are_counted_and_a_tie_of_three_is_undecided():
+    votes = PairVotes(3)
+    first_wins = np.array([[True, True, True], [True, False, True], [False, True, False]])
+    assert votes.won(first_wins).tolist() == [[2, 1, 0], [1, 1, 1], [1, 1, 1]]
+    assert undecided(votes.won(first_wins)).tolist() == [False, True, True]
+    assert votes.won_clearly(np.array([3.0, -1.0, 1.0])).argmax() == 0
+
+
+def test_the_jacobian_of_a_network_is_its_slope():
+    rng = np.random.default_rng(0)
+    network = Network.random(4, 3, rng)
+    values = rng.normal(size=(5, 3))
+    output, jacobian = network.jacobian(values)
+    step = 1e-6 * rng.normal(size=jacobian.shape[1])
+    np.testing.assert_allclose(network.moved(step)(values) - output, jacobian @ step, atol=1e-10)
+
+
+def test_a_network_learns_exclusive_or():
+    values = np.array([[0, 0], [0, 1], [1, 0], [1, 1]], dtype=float) * 2 - 1
+    targets = np.array([0.0, 1.0, 1.0, 0.0])
+    start = Network.random(6, 2, np.random.default_rng(1))
+    network = fit_network(start, values, targets, np.zeros(4, dtype=bool), 100)
+    np.testing.assert_allclose(network(values), targets, atol=0.01)
+
+
+def test_a_network_with_noise_stops_before_it_learns_the_noise():
+    rng = np.random.default_rng(2)
+    values, targets = rng.normal(size=(140, 5)), rng.integers(0, 2, 140).astype(float)
+    held = np.arange(140) % 7 == 6
+    network = fit_network(Network.random(20, 5, rng), values, targets, held, 200)
+    assert np.mean((network(values[~held]) > 0.5) == targets[~held]) < 0.9
+
+
+def test_outputs_of_all_networks_together_are_those_of_each(task):
+    examples, codes, groups, fresh = task
+    parts = AnnPairs().fit(examples.values, codes, groups).parts
+    outputs = AnnPairs.array_form(parts).outputs(fresh)
+    standard = (fresh - parts['mean']) / parts['scale']
+    for pair in range(len(parts['out_bias'])):
+        network = Network(*(parts[part][pair] for part in ('hidden', 'hidden_bias', 'out')), parts['out_bias'][pair])
+        np.testing.assert_allclose(outputs[:, pair], network(standard), atol=1e-9)
+
+
+def test_an_example_that_is_far_enough_moves_no_plane_and_another_just_so_far_as_needed():
+    online = OnlinePlanes(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]))
+    online.update(np.array([2.0, 0.0]), 0)
+    assert online.planes.tolist() == [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
+    online.update(np.array([0.0, 1.0]), 0)
+    np.testing.assert_allclose(online.planes @ [0.0, 1.0, 1.0], [1.0, -1.0])
+
+
+def test_no_example_moves_a_plane_further_than_c():
+    online = OnlinePlanes(np.zeros((2, 2)), c=0.1)
+    online.update(np.array([0.1]), 0)
+    np.testing.assert_allclose(online.planes, [[0.01, 0.1], [-0.01, -0.1]])
+
+
+def test_online_learning_may_stop_after_some_examples_of_each_label(make_examples):
+    examples = make_examples(spread=0.5)
+    codes, groups = codes_of(examples)
+    after_three = PassiveAggressive(rounds=3).fit(examples.values, codes, groups).parts
+    first = np.sort(np.concatenate([np.flatnonzero(codes == code)[:3] for code in range(4)]))
+    alone = PassiveAggressive().fit(examples.values[first], codes[first], groups[first]).parts
+    np.testing.assert_allclose(after_three['planes'], alone['planes'], atol=1e-9)
+    assert np.mean(PassiveAggressive.array_form(after_three)(examples.values).argmax(axis=1) == codes) > 0.9
+
+
+@pytest.mark.parametrize('shape', [(50, 6), (5, 40)])
+def test_principal_components_are_orthonormal_and_explain_what_they_should(shape):
+    values = np.random.default_rng(0).normal(size=shape) * np.geomspace(1.0, 0.01, shape[1])
+    centred = values - values.mean(axis=0)
+    kept = principal_components(centred, 0.95)
+    np.testing.assert_allclose(kept.T @ kept, np.eye(kept.shape[1]), atol=1e-9)
+    explained = (centred @ kept).var(axis=0) / centred.var(axis=0).sum()
+    assert explained.sum() >= 0.95 > explained[:-1].sum()
+
+
+def test_two_directions_have_components_of_their_own_and_odd_features_are_refused(examples):
+    codes, groups = codes_of(examples)
+    components = SvmMaxWins(blocks=2).fit(examples.values, codes, groups).parts['components']
+    assert not ((components[:3] != 0).any(axis=0) & (components[3:] != 0).any(axis=0)).any()
+    with pytest.raises(InvalidParameter, match="'blocks' of svm_max_wins is 4"):
+        SvmMaxWins(blocks=4).fit(examples.values, codes, groups)

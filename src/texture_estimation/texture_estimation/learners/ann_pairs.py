@@ -1,0 +1,118 @@
+"""One neural network for each pair of textures; the texture that wins most pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.levenberg_marquardt import Network, fit_network
+from texture_estimation.learners.pair_votes import PairVotes
+from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.log_probabilities import log_softmax
+
+NOTE = 'not calibrated: the pairs won are counted'
+# One of so many is held out of each network's training to stop it: MATLAB holds out 15 %.
+HELD_OUT = 7
+
+
+@dataclass(frozen=True)
+class AnnPairs:
+    """A network with a sigmoid hidden layer and a linear, rounded output for each pair; most pairs won, or a tie.
+
+    Trained by the Levenberg-Marquardt method with early stopping on every seventh slide, as MATLAB does by default.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.C.
+    """
+
+    hidden: int = param(10, 'Neurons in the hidden layer.', low=1, high=200)
+    iterations: int = param(30, 'Steps of the training at most.', low=1, high=10_000)
+    seed: int = param(0, 'Of the weights before the training.', low=0)
+
+    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
+        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
+        mean, scale = standardisation(values)
+        standard = (values - mean) / scale
+        held = _held_out(codes, groups)
+        rng = np.random.default_rng(self.seed)
+        n_labels = int(codes.max()) + 1
+        networks = []
+        for first, second in combinations(range(n_labels), 2):
+            rows = np.flatnonzero((codes == first) | (codes == second))
+            start = Network.random(self.hidden, values.shape[1], rng)
+            targets = (codes[rows] == first).astype(np.float64)
+            networks.append(fit_network(start, standard[rows], targets, held[rows], self.iterations))
+        parts = {
+            'mean': mean,
+            'scale': scale,
+            'hidden': np.stack([network.hidden for network in networks]),
+            'hidden_bias': np.stack([network.hidden_bias for network in networks]),
+            'out': np.stack([network.out for network in networks]),
+            'out_bias': np.array([network.out_bias for network in networks]),
+        }
+        return Fitted(parts, None, NOTE)
+
+    @staticmethod
+    def array_form(parts: Mapping[str, Any]) -> PairNetworks:
+        """Return what judges, from the stored parts."""
+        return PairNetworks(**parts)
+
+
+@dataclass(frozen=True, eq=False)
+class PairNetworks:
+    """The networks of all pairs, evaluated together.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    hidden : (n_pairs, n_hidden, n_features)
+    hidden_bias, out : (n_pairs, n_hidden)
+    out_bias : (n_pairs,)
+    """
+
+    mean: Array
+    scale: Array
+    hidden: Array
+    hidden_bias: Array
+    out: Array
+    out_bias: Array
+
+    def __post_init__(self) -> None:
+        n_pairs = len(self.out_bias)
+        weights = self.hidden.reshape(-1, len(self.mean)) / self.scale
+        object.__setattr__(self, '_weights', weights.T.copy())
+        object.__setattr__(self, '_votes', PairVotes(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0)))
+
+    def __call__(self, values: Array) -> Array:
+        """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
+        wins: Array = self._votes.won(self.outputs(values) > 0.5)  # type: ignore[attr-defined]  # rounded to 1
+        return log_softmax(wins)
+
+    def outputs(self, values: Array) -> Array:
+        """Return the output of each pair's network, (..., n_pairs): about 1 for its first label, 0 for its second."""
+        active = (values - self.mean) @ self._weights  # type: ignore[attr-defined]
+        active += self.hidden_bias.reshape(-1)
+        np.tanh(active, out=active)
+        layers = active.reshape(*values.shape[:-1], *self.out.shape)
+        layers *= self.out
+        outputs: Array = np.add.reduce(layers, axis=-1)
+        return outputs + self.out_bias
+
+
+def _held_out(codes: Codes, groups: Codes) -> NDArray[np.bool_]:
+    """Return which examples tell when to stop: every seventh slide of a label, or example if there are few slides."""
+    held = np.zeros(len(codes), dtype=bool)
+    for code in np.unique(codes):
+        rows = np.flatnonzero(codes == code)
+        slides = np.unique(groups[rows], return_inverse=True)[1].reshape(-1)
+        number = slides if slides.max() + 1 >= HELD_OUT else np.arange(len(rows))
+        held[rows] = number % HELD_OUT == HELD_OUT - 1
+    return held

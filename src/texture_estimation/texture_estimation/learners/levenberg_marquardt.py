@@ -1,0 +1,120 @@
+"""Fit a small neural network of one output by the Levenberg-Marquardt method, stopped early."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+
+# As MATLAB's trainlm: damping at the start, its steps and its end, and failures on what is held out.
+FIRST_DAMPING, MORE, LESS, MOST_DAMPING = 1e-3, 10.0, 0.1, 1e10
+PATIENCE = 6
+SOLVED = 1e-7  # mean square error of targets of 0 and 1
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """One layer of sigmoid neurons and one linear output: out · tanh(hidden · x + hidden_bias) + out_bias.
+
+    Parameters
+    ----------
+    hidden : (n_hidden, n_features)
+    hidden_bias, out : (n_hidden,)
+    out_bias
+    """
+
+    hidden: Array
+    hidden_bias: Array
+    out: Array
+    out_bias: float
+
+    @classmethod
+    def random(cls, n_hidden: int, n_features: int, rng: np.random.Generator) -> Network:
+        """Return a network before its training, for inputs of unit variance."""
+        hidden = rng.normal(size=(n_hidden, n_features)) / np.sqrt(n_features)
+        return cls(hidden, rng.uniform(-1.0, 1.0, n_hidden), rng.normal(size=n_hidden) / np.sqrt(n_hidden), 0.5)
+
+    def __call__(self, values: Array) -> Array:
+        """Return the output, (n,) of (n, n_features)."""
+        output: Array = np.tanh(values @ self.hidden.T + self.hidden_bias) @ self.out + self.out_bias
+        return output
+
+    def jacobian(self, values: Array) -> tuple[Array, Array]:
+        """Return the output, (n,), and its derivative by each weight, (n, n_weights), in the order of `moved`."""
+        active = np.tanh(values @ self.hidden.T + self.hidden_bias)
+        by_bias = (1.0 - active * active) * self.out
+        by_hidden = by_bias[:, :, None] * values[:, None, :]
+        columns = (by_hidden.reshape(len(values), -1), by_bias, active, np.ones((len(values), 1)))
+        return active @ self.out + self.out_bias, np.concatenate(columns, axis=1)
+
+    def moved(self, step: Array) -> Network:
+        """Return the network with a step, (n_weights,), added to its weights."""
+        n_hidden = len(self.out)
+        hidden, bias, out, out_bias = np.split(step, np.cumsum([self.hidden.size, n_hidden, n_hidden]))
+        return Network(
+            self.hidden + hidden.reshape(self.hidden.shape),
+            self.hidden_bias + bias,
+            self.out + out,
+            self.out_bias + float(out_bias[0]),
+        )
+
+
+def fit_network(network: Network, values: Array, targets: Array, held: NDArray[np.bool_], iterations: int) -> Network:
+    """Return the network after its training; of its states, the one with the least error on what is held out.
+
+    Parameters
+    ----------
+    network
+        Where to start.
+    values, targets : (n, n_features), (n,)
+        Examples.
+    held : (n,) bool
+        Examples not learnt from, which tell when to stop; none to stop by `iterations` alone.
+    iterations
+        At most so many.
+
+    Source: Hagan & Menhaj 1994; early stopping as in MATLAB's trainlm.
+    """
+    learnt, wanted = values[~held], targets[~held]
+    judge = held if held.any() else ~held
+    best, best_error = network, _error(network, values[judge], targets[judge])
+    failures, damping = 0, FIRST_DAMPING
+    for _ in range(iterations):
+        stepped, damping = _step(network, learnt, wanted, damping)
+        if stepped is None:
+            break
+        network = stepped
+        error = _error(network, values[judge], targets[judge])
+        if error < best_error:
+            best, best_error, failures = network, error, 0
+        else:
+            failures += 1
+        if failures >= PATIENCE or error < SOLVED:
+            break
+    return best
+
+
+def _step(network: Network, values: Array, targets: Array, damping: float) -> tuple[Network | None, float]:
+    """Return the network after one step that lessens the error, and the next damping; None if there is no such step."""
+    output, jacobian = network.jacobian(values)
+    residual = targets - output
+    error = float(residual @ residual) / len(residual)
+    curvature = jacobian.T @ jacobian
+    slope = jacobian.T @ residual
+    diagonal = np.diag_indices_from(curvature)
+    own = curvature[diagonal]
+    while damping <= MOST_DAMPING:
+        curvature[diagonal] = own + damping
+        stepped = network.moved(np.asarray(np.linalg.solve(curvature, slope), dtype=np.float64))
+        if _error(stepped, values, targets) < error:
+            return stepped, max(damping * LESS, 1e-12)
+        damping *= MORE
+    return None, damping
+
+
+def _error(network: Network, values: Array, targets: Array) -> float:
+    residual = targets - network(values)
+    return float(residual @ residual) / len(residual)

@@ -1,0 +1,107 @@
+"""Passive-aggressive online learning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.log_probabilities import log_softmax
+
+
+@dataclass(frozen=True)
+class PassiveAggressive:
+    """A separating plane of each label against the others, moved by each example that it does not keep at a distance.
+
+    The examples are taken in rounds: the first of each label, then the second of each, and so on. Their order matters.
+
+    Source: Crammer et al. 2006, PA-I; Kaboli et al. 2015, section V.B.
+    """
+
+    c: float = param(1.0, 'How far one example may move a plane.', low=1e-9, high=1e9)
+    rounds: int = param(0, 'Examples of each label to learn from; 0 for all.', low=0)
+
+    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
+        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,), in the order given."""
+        order = _in_rounds(codes, self.rounds)
+        # Only what was seen may be known: the scale, too, is that of the examples learnt from.
+        mean, scale = standardisation(values[order])
+        online = OnlinePlanes(np.zeros((int(codes.max()) + 1, values.shape[1] + 1)), self.c)
+        for row in order:
+            online.update((values[row] - mean) / scale, int(codes[row]))
+        return Fitted(
+            {'mean': mean, 'scale': scale, 'planes': online.planes}, None, 'not calibrated: distances from the planes'
+        )
+
+    @staticmethod
+    def array_form(parts: Mapping[str, Any]) -> Planes:
+        """Return what judges, from the stored parts."""
+        return Planes(**parts)
+
+
+@dataclass
+class OnlinePlanes:
+    """Planes that learn example by example.
+
+    Parameters
+    ----------
+    planes : (n_labels, n_features + 1)
+        Weights, and the bias last.
+    c
+        How far one example may move a plane.
+    """
+
+    planes: Array
+    c: float = 1.0
+
+    def update(self, standard: Array, code: int) -> None:
+        """Learn from one example, (n_features,), of label number `code`."""
+        extended = np.append(standard, 1.0)
+        side = np.full(len(self.planes), -1.0)
+        side[code] = 1.0
+        loss = np.maximum(0.0, 1.0 - side * (self.planes @ extended))
+        step = np.minimum(self.c, loss / (extended @ extended))
+        self.planes += (step * side)[:, None] * extended
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """Signed distances from planes.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    planes : (n_labels, n_features + 1)
+        Weights, and the bias last.
+    """
+
+    mean: Array
+    scale: Array
+    planes: Array
+
+    def __post_init__(self) -> None:
+        weights = self.planes[:, :-1] / self.scale
+        object.__setattr__(self, '_weights', weights.T.copy())
+        object.__setattr__(self, '_bias', self.planes[:, -1].copy())
+
+    def __call__(self, values: Array) -> Array:
+        """Return log softmax of the distances, (..., n_labels) of (..., n_features)."""
+        scores: Array = (values - self.mean) @ self._weights + self._bias  # type: ignore[attr-defined]
+        return log_softmax(scores)
+
+
+def _in_rounds(codes: Codes, rounds: int) -> Codes:
+    """Return the rows in rounds: the first example of each label, then the second of each, and so on."""
+    number = np.empty(len(codes), dtype=np.intp)
+    for code in np.unique(codes):
+        rows = np.flatnonzero(codes == code)
+        number[rows] = np.arange(len(rows))
+    order = np.argsort(number, kind='stable')
+    return order[number[order] < rounds] if rounds else order

@@ -1,0 +1,136 @@
+"""Principal components, then an RBF support vector machine, one against one, by the Max Wins rule."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.errors import InvalidParameter
+from texture_core.parameters import param
+from texture_estimation.learners.array_svm import ArraySvm, export
+from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.pair_coupling import uncalibrated
+from texture_estimation.learners.pair_votes import PairVotes
+from texture_estimation.log_probabilities import log_softmax
+
+CACHE_MB = 500
+TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class SvmMaxWins:
+    """The first principal components that explain most of the variance, and RBF machines for all pairs of labels.
+
+    The label that wins most pairs is taken; ties are broken by the clearer decisions.
+
+    Source: Hu et al. 2014, section 4: 99 % of the variance, for each of two directions, joined.
+    """
+
+    variance: float = param(0.99, 'Share of the variance that the components kept explain.', low=0.01, high=1.0)
+    blocks: int = param(
+        1, 'Equal stretches of features with components of their own, such as the directions x and y.', low=1, high=64
+    )
+    c: float = param(10.0, 'Penalty of a training error (box constraint).', low=1e-6, high=1e9)
+    gamma: float = param(
+        0.0, 'Width of the kernel exp(-gamma d²); 0 means 1 / (n_components · variance).', low=0.0, high=1e9
+    )
+
+    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
+        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,).
+
+        Raises
+        ------
+        InvalidParameter
+            If the features cannot be cut into the blocks.
+        """
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415  # scikit-learn takes a second to import
+        from sklearn.svm import SVC  # noqa: PLC0415
+
+        mean, components = self._components(values)
+        projected = (values - mean) @ components
+        # The machine expects a scaler: one that changes the unit of all components alike, or not at all.
+        unit = float(projected.std()) or 1.0
+        scaler = StandardScaler().fit(projected)
+        scaler.mean_, scaler.scale_ = np.zeros(projected.shape[1]), np.full(projected.shape[1], unit)
+        gamma = self.gamma * unit**2 or 1.0 / projected.shape[1]
+        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(projected / unit, codes)
+        parts = {'mean': mean, 'components': components, 'scaler': scaler, 'svc': svc}
+        return Fitted(parts, None, f'not calibrated: pairs won; {components.shape[1]} principal components')
+
+    @staticmethod
+    def array_form(parts: Mapping[str, Any]) -> ProjectedMachines:
+        """Return what judges, from the stored parts."""
+        n_labels = len(parts['svc'].n_support_)
+        svm = export(parts['scaler'], parts['svc'], uncalibrated(n_labels))
+        return ProjectedMachines(parts['mean'], parts['components'], svm, PairVotes(n_labels))
+
+    def _components(self, values: Array) -> tuple[Array, Array]:
+        """Return the mean, (n_features,), and the components of all blocks, (n_features, n_components)."""
+        n_features = values.shape[1]
+        if n_features % self.blocks:
+            raise InvalidParameter(
+                f"parameter 'blocks' of svm_max_wins is {self.blocks}, which does not divide {n_features} features; "
+                'give as many blocks as directions are joined'
+            )
+        mean = values.mean(axis=0)
+        size = n_features // self.blocks
+        found = [
+            principal_components(part - part.mean(axis=0), self.variance)
+            for part in np.split(values, self.blocks, axis=1)
+        ]
+        components = np.zeros((n_features, sum(part.shape[1] for part in found)))
+        column = 0
+        for block, part in enumerate(found):
+            components[block * size : (block + 1) * size, column : column + part.shape[1]] = part
+            column += part.shape[1]
+        return mean, components
+
+
+@dataclass(frozen=True, eq=False)
+class ProjectedMachines:
+    """Machines of all pairs on principal components.
+
+    Parameters
+    ----------
+    mean : (n_features,)
+    components : (n_features, n_components)
+    svm, votes
+        What decides between pairs, and counts them.
+    """
+
+    mean: Array
+    components: Array
+    svm: ArraySvm
+    votes: PairVotes
+
+    def __call__(self, values: Array) -> Array:
+        """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""
+        return log_softmax(self.votes.won_clearly(self.svm.decisions((values - self.mean) @ self.components)))
+
+
+def principal_components(centred: Array, share: float) -> Array:
+    """Return the fewest components, (n_features, n_components), that explain a share of the variance; at least one.
+
+    Parameters
+    ----------
+    centred : (n, n_features)
+        Zero mean.
+
+    Source: Hu et al. 2014, eq. 7 to 12.
+    """
+    n, n_features = centred.shape
+    # The smaller of the two products has the same variances; its vectors lead to those of the other.
+    wide = n < n_features
+    variances, vectors = np.linalg.eigh(centred @ centred.T if wide else centred.T @ centred)
+    variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1]
+    total = float(variances.sum())
+    if total <= 0.0:
+        return np.eye(n_features, 1)
+    explained = np.cumsum(variances) / total
+    count = int(np.searchsorted(explained, share - TINY)) + 1
+    kept = vectors[:, : min(count, int((variances > TINY * variances[0]).sum()))]
+    return np.asarray(centred.T @ kept / np.sqrt(variances[: kept.shape[1]]) if wide else kept)

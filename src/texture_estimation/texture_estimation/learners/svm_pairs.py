@@ -1,0 +1,64 @@
+"""One RBF support vector machine for each pair of textures; the texture that wins most pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_estimation.learners.array_svm import ArraySvm, export
+from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.pair_coupling import uncalibrated
+from texture_estimation.learners.pair_votes import PairVotes
+from texture_estimation.log_probabilities import log_softmax
+
+NOTE = 'not calibrated: the pairs won are counted'
+CACHE_MB = 500
+
+
+@dataclass(frozen=True)
+class SvmPairs:
+    """RBF machines for all pairs with one box constraint and kernel scale; most pairs won, or a tie.
+
+    The kernel is exp(-|x - s|² / kernel_scale²), MATLAB's sense of the scale: gamma = 1 / kernel_scale².
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", sections III.C and IV.
+    """
+
+    box_constraint: float = param(10.0, 'Penalty of a training error.', low=1e-6, high=1e9)
+    kernel_scale: float = param(3.0, "Width of the kernel, MATLAB's KernelScale.", low=1e-9, high=1e9)
+    standardise: bool = param(True, 'Bring the features to zero mean and unit variance first.')
+
+    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
+        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
+        # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
+        from sklearn.svm import SVC  # noqa: PLC0415
+
+        scaler = StandardScaler().fit(values)
+        if not self.standardise:
+            scaler.mean_, scaler.scale_ = np.zeros(values.shape[1]), np.ones(values.shape[1])
+        svc = SVC(C=self.box_constraint, kernel='rbf', gamma=self.kernel_scale**-2, cache_size=CACHE_MB)
+        return Fitted({'scaler': scaler, 'svc': svc.fit(scaler.transform(values), codes)}, None, NOTE)
+
+    @staticmethod
+    def array_form(parts: Mapping[str, Any]) -> PairMachines:
+        """Return what judges, from the stored parts."""
+        n_labels = len(parts['svc'].n_support_)
+        return PairMachines(export(parts['scaler'], parts['svc'], uncalibrated(n_labels)), PairVotes(n_labels))
+
+
+@dataclass(frozen=True, eq=False)
+class PairMachines:
+    """The machines of all pairs, evaluated together."""
+
+    svm: ArraySvm
+    votes: PairVotes
+
+    def __call__(self, values: Array) -> Array:
+        """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
+        return log_softmax(self.votes.won(self.svm.decisions(values) > 0))
