@@ -7,15 +7,22 @@ from collections.abc import Mapping
 from texture_features.feature import Feature
 from texture_features.features.arc_length import ArcLength
 from texture_features.features.bursts import Bursts
+from texture_features.features.correlation import Correlation
 from texture_features.features.force import Force
 from texture_features.features.hjorth import Hjorth
 from texture_features.features.integral import Integral
 from texture_features.features.level import Level
 from texture_features.features.log_bands import LogBands
 from texture_features.features.log_slope_variance import LogSlopeVariance
+from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.log_variance import LogVariance
 from texture_features.features.low_lines import LowLines
+from texture_features.features.mean_amplitude import MeanAmplitude
+from texture_features.features.mean_hjorth import MeanHjorth
+from texture_features.features.ordinal_patterns import OrdinalPatterns
 from texture_features.features.pacinian_power import PacinianPower
+from texture_features.features.region_peaks import RegionPeaks
+from texture_features.features.short_time_fourier import ShortTimeFourier
 from texture_features.features.spatial_level import SpatialLevel
 from texture_features.features.spatial_variation import SpatialVariation
 from texture_features.features.spectral_exponent import SpectralExponent
@@ -23,6 +30,7 @@ from texture_features.features.spectral_peaks import SpectralPeaks
 from texture_features.features.speed import Speed
 from texture_features.features.temporal_variation import TemporalVariation
 from texture_features.features.typical_bands import TypicalBands
+from texture_features.features.wavelet_energy import WaveletEnergy
 
 FEATURES: Mapping[str, type[Feature]] = {
     'log_bands': LogBands,  # Welch 1967
@@ -32,6 +40,14 @@ FEATURES: Mapping[str, type[Feature]] = {
     'spectral_peaks': SpectralPeaks,  # Roberge et al.
     'integral': Integral,  # Roberge et al.
     'arc_length': ArcLength,  # Roberge et al.
+    'region_peaks': RegionPeaks,  # Jamali & Sammut 2010
+    'mean_amplitude': MeanAmplitude,  # Jamali & Sammut 2010
+    'mean_hjorth': MeanHjorth,  # Kaboli et al. 2015
+    'correlation': Correlation,  # Kaboli et al. 2015
+    'log_spectrum': LogSpectrum,  # Hu et al. 2014
+    'short_time_fourier': ShortTimeFourier,
+    'wavelet_energy': WaveletEnergy,  # Daubechies 1992
+    'ordinal_patterns': OrdinalPatterns,  # Bandt & Pompe 2002
     'level': Level,
     'log_variance': LogVariance,
     'log_slope_variance': LogSlopeVariance,

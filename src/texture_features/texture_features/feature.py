@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from texture_core.arrays import Array, Samples
 from texture_core.errors import InvalidData
+
+T = TypeVar('T')
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,13 +26,16 @@ class Windows:
         Sampling rate, > 0.
     speed_m_s, force_n : (...)
         Mean speed and normal force in each window; NaN if unknown.
+    joined
+        The same stretches of time of other inputs, for features that join several; of the same leading axes.
     """
 
     samples: Samples
     rate_hz: float
     speed_m_s: Array = field(default_factory=lambda: np.array(np.nan))
     force_n: Array = field(default_factory=lambda: np.array(np.nan))
-    _memo: dict[Hashable, Array] = field(default_factory=dict, repr=False)
+    joined: tuple[Windows, ...] = ()
+    _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         if self.samples.ndim < 2 or 0 in self.samples.shape[-2:]:
@@ -52,21 +57,25 @@ class Windows:
         """The rows less their mean."""
         return self.shared('centred_rows', lambda: centred(self.rows))
 
-    def shared(self, key: Hashable, compute: Callable[[], Array]) -> Array:
+    def shared(self, key: Hashable, compute: Callable[[], T]) -> T:
         """Return an intermediate result that several features need; it is computed once."""
         if key not in self._memo:
             self._memo[key] = compute()
-        return self._memo[key]
+        result: T = self._memo[key]
+        return result
 
 
 class Feature(Protocol):
     """Frozen parameters of a feature; called with windows it gives its values.
 
     A feature of the signal gives (..., n_channels, n_names); one of the motion, such as the speed, (..., 1, n_names)
-    and has `of_signal` False.
+    and has `of_signal` False. One that can join several inputs, found in `windows.joined`, says so by a class variable
+    `joins` that is True; it has `of_signal` False.
     """
 
-    of_signal: ClassVar[bool]
+    @property
+    def of_signal(self) -> bool:
+        """Whether there are values for each channel."""
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -14,15 +14,17 @@ import numpy as np
 import yaml
 
 from texture_core.arrays import Array
-from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter
 from texture_core.features import FeatureVector
-from texture_core.parameters import from_mapping
+from texture_core.parameters import from_mapping, param
 from texture_core.resources import find_file
 from texture_core.window import Window
 from texture_features.catalogue import FEATURES
 from texture_features.choice import choose
 from texture_features.feature import Feature, Windows
+from texture_features.features.force import Force
+from texture_features.features.speed import Speed
+from texture_features.stretch import Stretched
 from texture_features.windows import CutWindow, Piece, SlideEnd, WindowParams
 
 # Windows described in one go: enough for speed, few enough for the memory cache.
@@ -30,12 +32,36 @@ CHUNK = 64
 Layout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of each input
 
 
+OF_MOTION = (Speed, Force)
+JOINT = '+'  # between the topics of a joint input
+
+
 @dataclass(frozen=True)
 class InputFeatures:
-    """The features of one input: (name, feature) in their order."""
+    """The features of one input, or of several joined ('signal+signal_static'): (name, feature) in their order."""
 
     topic: str
     features: tuple[tuple[str, Feature], ...]
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """What is subscribed to."""
+        return tuple(self.topic.split(JOINT))
+
+    def as_mapping(self) -> dict[str, Any]:
+        """Return the section of a recipe."""
+        stretches = [feature.to_m_s for _, feature in self.features if isinstance(feature, Stretched)]
+        options = {'stretch_to_m_s': stretches[0]} if stretches else {}
+        return {**options, 'features': [{name: _parameters(feature)} for name, feature in self.features]}
+
+
+@dataclass(frozen=True)
+class InputOptions:
+    """What an input of a recipe may say besides its features."""
+
+    stretch_to_m_s: float = param(
+        0.0, 'Speed to which windows are stretched in time before they are described; 0 for none.', unit='m/s', low=0.0
+    )
 
 
 @dataclass(frozen=True)
@@ -78,16 +104,13 @@ class FeatureSet:
         """Return the feature set as a recipe writes it, every parameter spelt out."""
         return {
             'windows': dataclasses.asdict(self.windows),
-            'inputs': {
-                item.topic: {'features': [{name: _parameters(feature)} for name, feature in item.features]}
-                for item in self.inputs
-            },
+            'inputs': {item.topic: item.as_mapping() for item in self.inputs},
         }
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """The inputs, in order."""
-        return tuple(item.topic for item in self.inputs)
+        """What the inputs need, in order, each once."""
+        return tuple(dict.fromkeys(chain.from_iterable(item.topics for item in self.inputs)))
 
     def describe(self, piece: Piece) -> FeatureVector:
         """Return the features of a window; for the end of a slide, the empty vector that is `last`."""
@@ -100,7 +123,7 @@ class FeatureSet:
                 last=True,
                 skipped=piece.skipped,
             )
-        inputs = [piece.windows[item.topic] for item in self.inputs]
+        inputs = [piece.windows[topic] for topic in self.topics]
         speed, force = np.array(piece.speed_m_s), np.array(piece.force_n)
         values = self._values([Windows(item.samples, item.rate_hz, speed, force) for item in inputs])
         return self._vector(piece, _layout(inputs), values)
@@ -151,9 +174,11 @@ class FeatureSet:
     def _values(self, inputs: Sequence[Windows]) -> Array:
         """Return the values of windows, (..., n_values)."""
         flat = (*inputs[0].samples.shape[:-2], -1)
+        by_topic = dict(zip(self.topics, inputs, strict=True))
         blocks = [
             feature(windows).reshape(flat)
-            for item, windows in zip(self.inputs, inputs, strict=True)
+            for item in self.inputs
+            for windows in [_joined([by_topic[topic] for topic in item.topics])]
             for _, feature in item.features
         ]
         return np.concatenate(blocks, axis=-1)
@@ -175,9 +200,8 @@ class FeatureSet:
 
     def _names_and_fingerprint(self, layout: Layout) -> tuple[tuple[str, ...], str]:
         if layout not in self._layouts:
-            names = chain.from_iterable(
-                _names(item, channels) for item, (_, channels) in zip(self.inputs, layout, strict=True)
-            )
+            channels = dict(zip(self.topics, (channels for _, channels in layout), strict=True))
+            names = chain.from_iterable(_names(item, channels[item.topics[0]]) for item in self.inputs)
             self._layouts[layout] = (tuple(names), self._fingerprint(layout))
         return self._layouts[layout]
 
@@ -216,15 +240,31 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
     place = f"{where}, input '{topic}'"
     if not isinstance(section, Mapping) or not isinstance(section.get('features'), list) or not section['features']:
         raise InvalidParameter(f"{place}: came {section!r}; a list under 'features' is needed, such as [hjorth]")
-    for key in section:
-        if key != 'features':
-            raise InvalidParameter(f'{place}: {unknown(str(key), ["features"], "key")}')
-    features = tuple(choose(FEATURES, entry, 'feature', place) for entry in section['features'])
-    names = [name for name, _ in features]
-    for name in names:
+    topics = topic.split(JOINT)
+    if not all(topics) or len(set(topics)) < len(topics):
+        raise InvalidParameter(f"{place}: inputs are joined by their names, as in 'signal+signal_static', each once")
+    chosen = [choose(FEATURES, entry, 'feature', place) for entry in section['features']]
+    names = [name for name, _ in chosen]
+    for name, feature in chosen:
         if names.count(name) > 1:
             raise InvalidParameter(f"{place}: feature '{name}' is named twice; name it once")
-    return InputFeatures(topic, features)
+        if len(topics) > 1 and not getattr(feature, 'joins', False):
+            raise InvalidParameter(f"{place}: feature '{name}' describes one input; list it under '{topics[0]}'")
+    options = from_mapping(InputOptions, {key: value for key, value in section.items() if key != 'features'}, place)
+    if options.stretch_to_m_s and len(topics) > 1:
+        raise InvalidParameter(f'{place}: joined inputs cannot be stretched; leave stretch_to_m_s out')
+    return InputFeatures(topic, tuple((name, _prepared(feature, options)) for name, feature in chosen))
+
+
+def _prepared(feature: Feature, options: InputOptions) -> Feature:
+    """Return the feature of the input as the options change it; what tells of the motion itself stays as it is."""
+    if not options.stretch_to_m_s or isinstance(feature, OF_MOTION):
+        return feature
+    return Stretched(feature, options.stretch_to_m_s)
+
+
+def _joined(windows: Sequence[Windows]) -> Windows:
+    return windows[0] if len(windows) == 1 else dataclasses.replace(windows[0], joined=tuple(windows[1:]))
 
 
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:
@@ -240,4 +280,6 @@ def _layout(inputs: Sequence[Window]) -> Layout:
 
 
 def _parameters(feature: Feature) -> dict[str, Any]:
+    if isinstance(feature, Stretched):
+        feature = feature.feature
     return dataclasses.asdict(feature)  # type: ignore[call-overload, no-any-return]

@@ -57,6 +57,57 @@ def mean_over_segments(densities: Array) -> Array:
     return mean
 
 
+def long_densities(rows: Array, rate_hz: float, bins: int) -> Array:
+    """Return the mean one-sided power spectral density at `bins` frequencies above 0 Hz, by fast Fourier transform.
+
+    What `segment_densities` and the mean over half-overlapping segments give, for long segments and all their bins.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+    rate_hz
+        Sampling rate.
+    bins
+        Half the length of a segment.
+
+    Returns
+    -------
+    (..., bins)
+    """
+    n_samples, segment = rows.shape[-1], 2 * bins
+    cut = rows[..., None, :] if n_samples <= segment else np.take(rows, _indices(n_samples, segment, bins), axis=-1)
+    taper = hann(cut.shape[-1])
+    means = np.add.reduce(cut, axis=-1, keepdims=True) / cut.shape[-1]
+    waves = np.fft.rfft((cut - means) * taper, segment)[..., 1:]
+    densities = waves.real * waves.real + waves.imag * waves.imag
+    densities *= 2.0 / (rate_hz * float(taper @ taper))
+    densities[..., -1] /= 2.0
+    return mean_over_segments(densities)
+
+
+def amplitudes_of(windows: Windows, points: int) -> tuple[Array, float]:
+    """Return the amplitudes of the Fourier transform of the zero-mean windows, and the step between its bins.
+
+    Parameters
+    ----------
+    points
+        Samples of the transform: a shorter window is padded with zeros, for a longer one there are as many as it has.
+
+    Returns
+    -------
+    (..., n_channels, n_bins)
+        From 0 Hz on, in the unit of the signal: a tone of amplitude 1 in the middle of a bin has 1.
+    float
+        Distance of the bins, Hz.
+    """
+    n_samples = windows.samples.shape[-2]
+    points = max(points, n_samples)
+    amplitudes = windows.shared(
+        ('amplitudes', points), lambda: np.abs(np.fft.rfft(windows.centred_rows, points)) * (2.0 / n_samples)
+    )
+    return amplitudes, windows.rate_hz / points
+
+
 @lru_cache(maxsize=64)
 def hann(length: int) -> Array:
     """Return a Hann window that is nowhere 0: taken in the middle of each sample."""

@@ -10,11 +10,18 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
+from texture_features.spectrum import amplitudes_of
 
 
 @dataclass(frozen=True)
 class SpectralPeaks:
-    """Frequency (Hz) and amplitude of the highest peaks of the Fourier transform."""
+    """Frequency (Hz) and amplitude of the highest peaks of the Fourier transform.
+
+    With 2048 points there are 1024 steps from 0 Hz to half the sampling rate, as in the paper (500 Hz there). Peaks
+    that the spectrum lacks come last in either order; of equally high ones the lowest comes first.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.B.
+    """
 
     of_signal: ClassVar[bool] = True
 
@@ -32,15 +39,19 @@ class SpectralPeaks:
 
     def __call__(self, windows: Windows) -> Array:
         """Return frequency and amplitude of each peak in turn."""
-        rows = windows.centred_rows
-        points = max(self.points, rows.shape[-1])
-        amplitudes = np.abs(np.fft.rfft(rows, points)) * (2.0 / rows.shape[-1])
-        step_hz = windows.rate_hz / points
+        amplitudes, step_hz = amplitudes_of(windows, self.points)
         bins, heights = highest_peaks(amplitudes, self.peaks, self.gap_hz / step_hz)
         values = np.stack((bins * step_hz, heights), axis=-1)
         if self.order == 'frequency':
-            values = np.take_along_axis(values, np.argsort(values[..., :1], axis=-2, kind='stable'), axis=-2)
+            values = by_frequency(values)
         return values.reshape(*values.shape[:-2], -1)
+
+
+def by_frequency(peaks: Array) -> Array:
+    """Return peaks, (..., n_peaks, 2) of frequency and amplitude, the lowest first and those that are lacking last."""
+    found = np.where(peaks[..., 1:] > 0, peaks[..., :1], np.inf)
+    ordered: Array = np.take_along_axis(peaks, np.argsort(found, axis=-2, kind='stable'), axis=-2)
+    return ordered
 
 
 def highest_peaks(spectrum: Array, count: int, gap: float) -> tuple[Array, Array]:

@@ -1,0 +1,218 @@
+"""Known answers of the features that the papers add: region peaks, correlation, whole spectra, symbols, wavelets."""
+
+import numpy as np
+import pytest
+import pywt
+from scipy import signal as scipy_signal
+from scipy import stats
+
+from texture_features.catalogue import FEATURES
+from texture_features.feature import Windows
+from texture_features.features.correlation import Correlation, cell_means, ranks
+from texture_features.features.log_spectrum import LogSpectrum
+from texture_features.features.ordinal_patterns import OrdinalPatterns
+from texture_features.features.region_peaks import RegionPeaks, region_peaks
+from texture_features.features.short_time_fourier import ShortTimeFourier
+from texture_features.features.spectral_peaks import SpectralPeaks
+from texture_features.features.wavelet_energy import DB4, WaveletEnergy, wavelet_energies
+from texture_features.spectrum import hann, long_densities
+
+RATE_HZ = 1000.0
+
+
+def noise(*shape, seed=0):
+    return np.random.default_rng(seed).normal(size=shape)
+
+
+def tone(frequency_hz, n_samples=1000, amplitude=1.0):
+    return amplitude * np.sin(2 * np.pi * frequency_hz * np.arange(n_samples) / RATE_HZ)[:, None]
+
+
+def windows(samples, rate_hz=RATE_HZ):
+    return Windows(np.asarray(samples), rate_hz, np.full(samples.shape[:-2], 0.1), np.full(samples.shape[:-2], 2.0))
+
+
+def spectrum_of(energies, width=4):
+    """Return a spectrum of regions of given energies, each in the second of its bins; bin 0 is extra."""
+    amplitudes = np.zeros((len(energies), width))
+    amplitudes[:, 1] = np.sqrt(energies)
+    return np.concatenate(([9.0], amplitudes.ravel()))
+
+
+def grown_one_by_one(energies, count):
+    """Return the regions of each peak as Jamali & Sammut's loop finds them, in the order in which peaks open."""
+    peaks = []
+    for region in np.argsort(-np.asarray(energies), kind='stable'):
+        near = [peak for peak in peaks if region - 1 in peak or region + 1 in peak]
+        if near:
+            near[0] |= {region}.union(*near[1:])
+            peaks = [peak for peak in peaks if peak not in near[1:]]
+        else:
+            peaks.append({region})
+        if len(peaks) == count:
+            return peaks
+    return None
+
+
+def test_regions_that_touch_become_one_peak():
+    # By energy: region 2, then 3 (widens), then 6 (opens), then 0 (opens).
+    bins = region_peaks(spectrum_of([4.0, 0, 9.0, 8.0, 0, 0, 7.0, 1.0]), 3, 8)
+    np.testing.assert_array_equal(bins, [2 * 4 + 2, 6 * 4 + 2, 0 * 4 + 2])
+
+
+def test_a_region_between_two_peaks_joins_them():
+    # 1 and 3 open peaks, 2 joins them, 5 opens the second.
+    bins = region_peaks(spectrum_of([0.0, 9.0, 7.0, 8.0, 0, 6.0]), 2, 6)
+    assert bins[0] in {1 * 4 + 2, 3 * 4 + 2}
+
+
+@pytest.mark.parametrize('count', [2, 3, 5])
+def test_peaks_are_those_of_the_loop_in_the_paper(count):
+    rng = np.random.default_rng(count)
+    for _ in range(200):
+        energies = rng.permutation(24) + 1.0
+        peaks = grown_one_by_one(energies, count)
+        if peaks is not None:
+            best = [max(peak, key=lambda region: energies[region]) * 4 + 2 for peak in peaks]
+            np.testing.assert_array_equal(region_peaks(spectrum_of(energies), count, 24), best)
+
+
+def test_peaks_that_never_come_are_zero_and_the_growing_ends_where_there_were_most():
+    np.testing.assert_array_equal(region_peaks(spectrum_of([1.0, 0, 2.0, 0]), 3, 4), [2 * 4 + 2, 2, 0])
+    np.testing.assert_array_equal(region_peaks(np.zeros(9), 3, 4), [0, 0, 0])
+
+
+def test_region_peaks_find_the_tones_by_strength_or_by_frequency():
+    samples = tone(310.0) + tone(120.0, amplitude=0.5) + tone(200.0, amplitude=0.25)
+    for order, expected in (('intensity', [310.0, 120.0, 200.0]), ('frequency', [120.0, 200.0, 310.0])):
+        values = RegionPeaks(order=order)(windows(samples))[0]
+        np.testing.assert_allclose(values, expected, atol=1.0)
+
+
+def test_spectral_peaks_have_the_transform_of_2048_points():
+    values = SpectralPeaks(peaks=1)(windows(tone(125.3, 500)))[0]
+    step_hz = RATE_HZ / 2048
+    assert values[0] == pytest.approx(round(125.3 / step_hz) * step_hz)
+    assert values[1] == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.parametrize('order', ['intensity', 'frequency'])
+def test_spectral_peaks_that_are_lacking_come_last(order):
+    values = SpectralPeaks(peaks=15, gap_hz=50.0, order=order)(windows(noise(500, 1)))[0].reshape(15, 2)
+    there = values[:, 1] > 0
+    assert 2 <= there.sum() <= 10  # 500 Hz hold no more at this distance
+    assert not there[there.sum() :].any()
+    assert (np.diff(np.sort(values[there, 0])) >= 50.0 - 1e-9).all()
+
+
+def test_mean_amplitude_of_a_tone_is_two_over_pi():
+    assert FEATURES['mean_amplitude']()(windows(tone(51.0) + 7.0))[0, 0] == pytest.approx(2 / np.pi, rel=1e-3)
+
+
+def test_mean_hjorth_is_the_mean_of_hjorth():
+    samples = noise(200, 5)
+    each, mean = (FEATURES[name]()(windows(samples)) for name in ('hjorth', 'mean_hjorth'))
+    np.testing.assert_allclose(mean[0], each.mean(axis=0))
+
+
+def test_log_spectrum_is_scipys_periodogram():
+    samples = noise(500, 2)
+    _, expected = scipy_signal.periodogram(samples, RATE_HZ, window=hann(500), nfft=2048, axis=0)
+    np.testing.assert_allclose(np.exp(LogSpectrum(points=1024)(windows(samples))), expected[1:].T, rtol=1e-8)
+
+
+def test_long_windows_are_averaged_over_half_overlapping_segments():
+    rows = noise(2, 1000)
+    _, expected = scipy_signal.welch(rows, RATE_HZ, window=hann(256), nperseg=256)
+    np.testing.assert_allclose(long_densities(rows, RATE_HZ, 128), expected[:, 1:], rtol=1e-8)
+
+
+def test_the_part_in_which_a_tone_sounds_has_the_power():
+    feature = ShortTimeFourier(parts=4, bands=16)
+    late = tone(203.0) * (np.arange(1000) >= 760)[:, None]
+    values = feature(windows(late))[0]
+    assert feature.names[int(values.argmax())] == '4/6'  # band k reaches around k · 500 Hz / 16
+    assert values.reshape(4, 16)[3, 5] - values.reshape(4, 16)[0].max() > 10.0
+
+
+@pytest.mark.parametrize('length', [512, 500, 130])
+def test_wavelet_energies_are_those_of_pywavelets(length):
+    rows = noise(3, length)
+    rest, *details = pywt.wavedec(rows, 'db4', mode='periodization', level=4, axis=-1)
+    expected = [np.square(part).sum(axis=-1) for part in (*reversed(details), rest)]
+    np.testing.assert_allclose(wavelet_energies(rows, 4), np.stack(expected, axis=-1), rtol=1e-6)
+    np.testing.assert_allclose(DB4, pywt.Wavelet('db4').rec_lo, rtol=1e-9)
+
+
+def test_wavelet_energies_add_up_to_the_power():
+    rows = noise(1, 512)
+    assert wavelet_energies(rows, 6).sum() == pytest.approx(np.square(rows).sum())
+    feature = WaveletEnergy()
+    assert feature.names[int(feature(windows(tone(180.0)))[0].argmax())] == '2'  # 125 to 250 Hz
+
+
+def test_ordinal_patterns_know_rising_from_falling():
+    feature = OrdinalPatterns(length=3, delay=1)
+    for samples, pattern in ((np.arange(9.0), '012'), (-np.arange(9.0), '210'), (np.zeros(9), '012')):
+        values = feature(windows(samples[:, None]))[0]
+        assert dict(zip(feature.names, values, strict=True))[pattern] == 1.0
+    values = feature(windows(np.array([0.0, 2.0, 1.0])[:, None]))[0]
+    assert feature.names[int(values.argmax())] == '021'
+
+
+def test_ordinal_patterns_of_noise_are_equally_frequent():
+    np.testing.assert_allclose(OrdinalPatterns()(windows(noise(50_000, 1)))[0], 1 / 24, atol=0.004)
+    assert (OrdinalPatterns(length=4, delay=2)(windows(noise(6, 1))) == 0).all()
+
+
+def joined(fast, slow, fast_hz=2200.0, slow_hz=100.0):
+    return Windows(fast, fast_hz, joined=(Windows(slow, slow_hz),))
+
+
+def test_correlations_are_scipys_on_the_grid_of_the_slow_input():
+    fast, slow = noise(1100, 1), noise(50, 3, seed=1)
+    averaged = fast[:, 0].reshape(50, 22).mean(axis=1)
+    pearson = np.mean([stats.pearsonr(averaged, column)[0] for column in slow.T])
+    spearman = np.mean([stats.spearmanr(averaged, column)[0] for column in slow.T])
+    np.testing.assert_allclose(Correlation()(joined(fast, slow)), [[pearson, spearman]], atol=1e-12)
+
+
+def test_monotonic_dependence_has_spearman_one_and_pearson_less():
+    x = np.linspace(-1, 1, 50)[:, None]
+    pearson, spearman = Correlation()(joined(np.repeat(x, 22, axis=0), np.exp(5 * x)))[0]
+    assert spearman == pytest.approx(1.0)
+    assert 0.5 < pearson < 0.95
+
+
+def test_equal_samples_share_the_mean_of_their_ranks():
+    rows = np.array([[3.0, 1.0, 3.0, 2.0, 3.0], [5.0, 5.0, 5.0, 5.0, 5.0]])
+    np.testing.assert_array_equal(ranks(rows), stats.rankdata(rows, axis=1) - 1)
+
+
+@pytest.mark.parametrize(
+    ('fast', 'slow'),
+    [(np.full((1100, 1), 0.1), noise(50, 3)), (noise(1100, 1), np.full((50, 3), 0.3)), (noise(22, 1), noise(1, 3))],
+    ids=['constant fast', 'constant slow', 'one sample'],
+)
+def test_what_does_not_vary_correlates_with_nothing(fast, slow):
+    np.testing.assert_array_equal(Correlation()(joined(fast, slow)), [[0.0, 0.0]])
+
+
+def test_cells_share_all_samples_though_rates_are_no_multiples():
+    rows = np.arange(500.0)[None]
+    cells = cell_means(rows, 30)
+    np.testing.assert_allclose(cells[0], np.arange(30) * 500 / 30 + 8.0, atol=1.01)
+
+
+def test_one_input_alone_is_correlated_within_itself():
+    samples = noise(100, 3)
+    expected = np.corrcoef(samples.T)[np.triu_indices(3, 1)].mean()
+    assert Correlation()(windows(samples))[0, 0] == pytest.approx(expected)
+    np.testing.assert_array_equal(Correlation()(windows(samples[:, :1])), [[0.0, 0.0]])
+
+
+def test_many_joined_windows_give_the_very_values_of_each():
+    fast, slow = noise(4, 1100, 1), noise(4, 50, 5, seed=1)
+    together = Correlation()(joined(fast, slow))
+    for index in range(4):
+        np.testing.assert_array_equal(Correlation()(joined(fast[index], slow[index])), together[index])

@@ -1,0 +1,38 @@
+"""The whole power spectrum, point by point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows
+from texture_features.spectrum import long_densities
+
+
+@dataclass(frozen=True)
+class LogSpectrum:
+    """Logarithm of the power spectral density at equal steps up to half the sampling rate.
+
+    Meant for a learner that begins with principal components. A window shorter than 2 · `points` is padded with zeros;
+    of a longer one the mean over segments of that length, half overlapping, is taken.
+
+    Source: Hu et al. 2014, section 4.1 (12 288 points there).
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    points: int = param(12288, 'Number of frequencies: k · rate / (2 · points), k from 1.', low=2, high=1 << 19)
+    floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the frequency, from 1."""
+        return tuple(str(point + 1) for point in range(self.points))
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return log(density + floor)."""
+        return np.log(long_densities(windows.rows, windows.rate_hz, self.points) + self.floor)

@@ -1,0 +1,41 @@
+"""Hjorth's parameters, averaged over the channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows
+from texture_features.features.hjorth import Hjorth
+
+
+@dataclass(frozen=True)
+class MeanHjorth:
+    """Means over the channels of activity (or its logarithm), mobility and complexity: what `hjorth` gives for each.
+
+    Source: Kaboli et al. 2015, eq. 6 (the electrodes, with `log_activity` off).
+    """
+
+    of_signal: ClassVar[bool] = False
+
+    log_activity: bool = param(True, 'Take the logarithm of each activity.')
+    floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Activity, mobility, complexity."""
+        return self._of_channel.names
+
+    @property
+    def _of_channel(self) -> Hjorth:
+        return Hjorth(self.log_activity, self.floor)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return the means."""
+        values = self._of_channel(windows)
+        means: Array = np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
+        return means
