@@ -1,0 +1,1 @@
+"""Roughness as people grade it: heads, recipes, models and evidence."""

@@ -1,0 +1,121 @@
+"""The grade of a surface, and how sure it is, growing window by window while the finger slides."""
+
+from __future__ import annotations
+
+import math
+
+from texture_core.estimates import RoughnessEstimate
+from texture_core.features import FeatureVector
+from texture_core.signal import NANOSECONDS
+from texture_estimation.fingerprint import difference
+from texture_estimation.roughness.head import ROUGH, SMOOTH
+from texture_estimation.roughness.model import NORMAL_90, RoughnessModel
+
+NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estimator to the path of a trained one"
+NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
+SILENT = 'no grade: the surface resembles none of those learnt'
+# The scatter of the windows of a texture, known from the training, counts as so many windows.
+PRIOR_WINDOWS = 4.0
+
+
+class RoughnessEvidence:
+    """Join the grades of the windows of one slide; the same code on the robot and on recordings.
+
+    A new exploration id, or a vector after the `last` one, begins anew.
+
+    Parameters
+    ----------
+    model
+        What grades each window; None answers the end of every slide with a sentence that no model is loaded.
+    """
+
+    def __init__(self, model: RoughnessModel | None) -> None:
+        self.model = model
+        self.refused = 0  # vectors of another fingerprint
+        self.unusable = 0  # windows without contact, with skids or with values that are not finite
+        self.silent = 0  # windows to which the head gave no grade
+        self._over = True
+        self._final = False
+        self._exploration_id = ''
+
+    def update(self, vector: FeatureVector) -> RoughnessEstimate | None:
+        """Return the estimate after one more window, or the final one; None after that."""
+        if self._over or vector.exploration_id != self._exploration_id:
+            self._start(vector.exploration_id)
+        self._over = vector.last
+        if self._final:
+            return None
+        if self.model is not None and not vector.last:
+            self._take(vector, self.model)
+        estimate = self._estimate(vector)
+        self._final = estimate.final
+        return estimate
+
+    def _start(self, exploration_id: str) -> None:
+        self._exploration_id = exploration_id
+        self._final = False
+        self._windows = 0
+        self._sum = self._sum_squares = self._sum_variances = 0.0
+        self._evidence_ns = self._window_ns = self._end_ns = 0
+        self._message = '' if self.model else NO_MODEL
+
+    def _take(self, vector: FeatureVector, model: RoughnessModel) -> None:
+        if vector.feature_set != model.feature_set:
+            self.refused += 1
+            self._message = f"model '{model.name}' does not fit: {difference(vector.feature_set, model.feature_set)}"
+            return
+        refusal = model.checks.refusal(vector)
+        if refusal:
+            self.unusable += 1
+            self._message = f'a window was left out: {refusal}'
+            return
+        grade, std = (float(number) for number in model.grade(vector.values))
+        if math.isnan(grade):
+            self.silent += 1
+            self._message = SILENT
+            return
+        self._windows += 1
+        self._sum += grade
+        self._sum_squares += grade * grade
+        self._sum_variances += float(model.calibration.shared_variance(std))
+        self._window_ns = round(vector.window_s * NANOSECONDS)
+        end = vector.start_ns + self._window_ns
+        self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
+        self._end_ns = max(end, self._end_ns)
+
+    def _estimate(self, vector: FeatureVector) -> RoughnessEstimate:
+        model = self.model
+        if model is None or not self._windows:
+            return RoughnessEstimate(
+                stamp_ns=vector.start_ns,
+                exploration_id=vector.exploration_id,
+                final=vector.last,
+                model=model.name if model else '',
+                message=self._message or (NO_WINDOW if vector.last else ''),
+            )
+        shared, scatter = self._variances(model)
+        std = math.sqrt(shared + scatter)
+        to_gain = NORMAL_90 * (std - math.sqrt(shared))
+        params = model.recipe.evidence
+        narrow = self._windows >= params.least_windows and to_gain < params.narrow_grades
+        return RoughnessEstimate(
+            stamp_ns=self._end_ns,
+            exploration_id=vector.exploration_id,
+            valid=True,
+            grade=min(max(self._sum / self._windows, SMOOTH), ROUGH),
+            grade_std=std,
+            windows=self._windows,
+            evidence_s=self._evidence_ns / NANOSECONDS,
+            final=vector.last or narrow,
+            model=model.name,
+            message=self._message,
+        )
+
+    def _variances(self, model: RoughnessModel) -> tuple[float, float]:
+        """Return the variance that more sliding does not lessen, and that of the mean of the windows so far."""
+        count = self._windows
+        around = max(0.0, self._sum_squares - self._sum * self._sum / count)
+        known = PRIOR_WINDOWS * model.calibration.within_std**2
+        scatter = (known + around) / (PRIOR_WINDOWS + count - 1.0)
+        # Windows that overlap are worth the sliding time that they cover together.
+        return self._sum_variances / count, scatter * self._window_ns / self._evidence_ns

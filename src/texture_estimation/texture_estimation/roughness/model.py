@@ -1,0 +1,158 @@
+"""A trained roughness model: NAME.skops, which holds plain arrays only, and its card NAME.json."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+from texture_core.errors import ModelMismatch, TextureError
+from texture_estimation import model_files
+from texture_estimation.roughness.checks import Checks, graded_columns
+from texture_estimation.roughness.head import Grader
+from texture_estimation.roughness.recipe import RoughnessRecipe
+
+NORMAL_90 = 1.6449  # a normal value lies so many standard deviations around its mean in 90 of 100 cases
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What makes an honest standard deviation of the one that a head claims.
+
+    Parameters
+    ----------
+    scale
+        Factor on what is common to all windows of a texture.
+    base_std
+        Standard deviation, in grades, of what the head does not know of.
+    within_std
+        Standard deviation of the windows of one texture around their mean, in grades.
+    """
+
+    scale: float = 1.0
+    base_std: float = 0.0
+    within_std: float = 0.0
+
+    def shared_variance(self, head_std: Array | float) -> Array:
+        """Return the variance that more sliding over the texture does not lessen."""
+        variance: Array = self.scale**2 * (np.square(head_std) + self.base_std**2)
+        return variance
+
+    def window_std(self, head_std: Array) -> Array:
+        """Return the standard deviation of the grade of a single window."""
+        return np.sqrt(self.shared_variance(head_std) + self.within_std**2)
+
+
+@dataclass(frozen=True, eq=False)
+class RoughnessModel:
+    """What was learnt, with all that is needed to grade a feature vector and to refuse a foreign one.
+
+    Parameters
+    ----------
+    name
+        Of the model.
+    names, feature_set
+        Features it expects, and their fingerprint.
+    recipe
+        By which it was made.
+    parts
+        What the head has learnt: plain arrays.
+    calibration
+        Of the standard deviation.
+    limits
+        Of the checks.
+    grades
+        Of the textures learnt.
+    training
+        Facts about the training, for the card.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    feature_set: str
+    recipe: RoughnessRecipe
+    parts: Mapping[str, Any]
+    calibration: Calibration
+    limits: Mapping[str, float]
+    grades: Mapping[str, float]
+    training: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def grader(self) -> Grader:
+        """The head as plain arrays; it sees the features that are no checks."""
+        return self.recipe.head.array_form(self.parts)
+
+    @cached_property
+    def checks(self) -> Checks:
+        """What tells whether a window can be graded."""
+        return Checks(self.recipe.checks, self.names, self.limits)
+
+    @cached_property
+    def _columns(self) -> NDArray[np.intp]:
+        return graded_columns(self.names)
+
+    def grade(self, values: Array) -> tuple[Array, Array]:
+        """Return grade and the head's own standard deviation, (...) each, of (..., n_features)."""
+        return self.grader(values.take(self._columns, axis=-1))
+
+    @property
+    def card(self) -> dict[str, Any]:
+        """What the card says, in the form of JSON."""
+        return {
+            'format': model_files.FORMAT,
+            'name': self.name,
+            'target': 'roughness grade, 1 (smooth) to 5 (rough), as people give it',
+            'feature_set': self.feature_set,
+            'features': list(self.names),
+            'grades': dict(self.grades),
+            'calibration': asdict(self.calibration),
+            'limits': dict(self.limits),
+            'training': dict(self.training),
+            'recipe': self.recipe.as_mapping(),
+            'recipe_name': self.recipe.name,
+        }
+
+    def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
+        """Write NAME.skops and NAME.json; `facts` are added to the card. Return NAME.skops."""
+        return model_files.write(path, self.parts, {**self.card, **(facts or {})})
+
+
+def load_roughness_model(path: str | Path) -> RoughnessModel:
+    """Read a model; `path` is that of either file, or of both without the ending. No code in the file is run.
+
+    Raises
+    ------
+    ModelMismatch
+        With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
+    """
+    target = model_files.stem(path)
+    card, content = model_files.read(target)
+    if 'head' not in card.get('recipe', {}):
+        raise ModelMismatch(f"model '{target}' names textures and gives no grades; the classifier takes it")
+    try:
+        model = RoughnessModel(
+            name=str(card['name']),
+            names=tuple(map(str, card['features'])),
+            feature_set=str(card['feature_set']),
+            recipe=RoughnessRecipe.from_mapping(card['recipe'], str(card['recipe_name'])),
+            parts=model_files.parts_of(content, ()),
+            calibration=Calibration(**card['calibration']),
+            limits=dict(card['limits']),
+            grades=dict(card['grades']),
+            training=dict(card['training']),
+        )
+        grade, std = model.grade(np.zeros(len(model.names)))
+    except (KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile, TextureError) as error:
+        raise ModelMismatch(
+            f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
+        ) from error
+    if np.shape(grade) or np.shape(std):
+        raise ModelMismatch(f"model '{target}' answers with more than one grade; train it again")
+    return model

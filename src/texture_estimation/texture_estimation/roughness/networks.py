@@ -1,0 +1,75 @@
+"""Small neural networks of one output each, evaluated together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_estimation.learners.learner import Codes
+from texture_estimation.learners.levenberg_marquardt import Network, fit_network
+from texture_estimation.learners.standardisation import standardisation
+
+# One of so many windows of each texture tells when to stop: MATLAB holds out 15 %.
+HELD_OUT = 7
+
+
+@dataclass(frozen=True, eq=False)
+class Networks:
+    """Sigmoid hidden layers with one linear output each, over the same standardised features.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+    hidden : (n_networks · n_hidden, n_features)
+    hidden_bias : (n_networks · n_hidden,)
+    out : (n_networks, n_hidden)
+    out_bias : (n_networks,)
+    """
+
+    mean: Array
+    scale: Array
+    hidden: Array
+    hidden_bias: Array
+    out: Array
+    out_bias: Array
+
+    def __call__(self, values: Array) -> Array:
+        """Return the outputs, (..., n_networks) of (..., n_features)."""
+        active = np.tanh((values - self.mean) / self.scale @ self.hidden.T + self.hidden_bias)
+        by_network = active.reshape(*active.shape[:-1], *self.out.shape)
+        outputs: Array = (by_network * self.out).sum(axis=-1) + self.out_bias
+        return outputs
+
+
+def fit_networks(
+    values: Array, targets: Sequence[Array], textures: Codes, *, hidden: int, iterations: int, seed: int
+) -> Mapping[str, Any]:
+    """Return the fields of `Networks`, one network for each target, (n,), of values (n, n_features)."""
+    mean, scale = standardisation(values)
+    standard = (values - mean) / scale
+    rng = np.random.default_rng(seed)
+    held = _held_out(textures)
+    fitted = [
+        fit_network(Network.random(hidden, values.shape[1], rng), standard, target, held, iterations)
+        for target in targets
+    ]
+    return {
+        'mean': mean,
+        'scale': scale,
+        'hidden': np.concatenate([network.hidden for network in fitted]),
+        'hidden_bias': np.concatenate([network.hidden_bias for network in fitted]),
+        'out': np.stack([network.out for network in fitted]),
+        'out_bias': np.array([network.out_bias for network in fitted]),
+    }
+
+
+def _held_out(textures: Codes) -> Any:
+    """Return every seventh window of each texture, (n,) bool."""
+    held = np.zeros(len(textures), dtype=bool)
+    for code in np.unique(textures):
+        held[np.flatnonzero(textures == code)[HELD_OUT - 1 :: HELD_OUT]] = True
+    return held

@@ -1,0 +1,89 @@
+"""Five support vector machines, one for each grade."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_estimation.learners.learner import Codes
+from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.roughness.fired import belongs, mean_of_fired
+from texture_estimation.roughness.head import GRADES
+
+
+@dataclass(frozen=True)
+class Svm5:
+    """An RBF machine for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
+
+    Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
+    """
+
+    c: float = param(10.0, 'Box constraint.', low=1e-6, high=1e9)
+    kernel_scale: float = param(3.0, 'Kernel exp(-(d / scale)²), d between standardised features.', low=1e-9, high=1e9)
+
+    def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
+        """Learn from values (n, n_features) and grades (n,)."""
+        from sklearn.svm import SVC  # noqa: PLC0415  # takes a second, and a node that only grades has no need of it
+
+        mean, scale = standardisation(values)
+        standard = (values - mean) / scale
+        weights = np.zeros((len(values), len(GRADES)))
+        # A grade that no texture has never fires.
+        offsets = np.full(len(GRADES), -1.0)
+        for number, member in enumerate(belongs(grades).T):
+            if member.all():
+                offsets[number] = 1.0
+            elif member.any():
+                svc = SVC(C=self.c, kernel='rbf', gamma=self.kernel_scale**-2.0).fit(standard, member)
+                weights[svc.support_, number] = svc.dual_coef_[0]
+                offsets[number] = svc.intercept_[0]
+        used = weights.any(axis=1)
+        return {
+            'mean': mean,
+            'scale': scale,
+            'vectors': standard[used],
+            'weights': weights[used],
+            'offsets': offsets,
+            'gamma': self.kernel_scale**-2.0,
+        }
+
+    @staticmethod
+    def array_form(parts: Mapping[str, Any]) -> FiringMachines:
+        """Return what grades, from the stored parts."""
+        return FiringMachines(**parts)
+
+
+@dataclass(frozen=True, eq=False)
+class FiringMachines:
+    """The mean of the grades whose machine fires.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+    vectors : (n_vectors, n_features)
+        Support vectors of all machines.
+    weights : (n_vectors, 5)
+    offsets : (5,)
+    gamma
+        Of the kernel exp(-gamma d²).
+    """
+
+    mean: Array
+    scale: Array
+    vectors: Array
+    weights: Array
+    offsets: Array
+    gamma: float
+
+    def __call__(self, values: Array) -> tuple[Array, Array]:
+        """Return grade and standard deviation, the latter not known."""
+        standard = (values - self.mean) / self.scale
+        squares = (standard**2).sum(axis=-1)[..., None] + (self.vectors**2).sum(axis=1)
+        distances = squares - 2.0 * standard @ self.vectors.T
+        grade = mean_of_fired(np.exp(-self.gamma * distances) @ self.weights + self.offsets > 0.0)
+        return grade, np.zeros_like(grade)
