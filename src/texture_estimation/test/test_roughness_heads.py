@@ -100,7 +100,7 @@ def test_more_windows_of_the_same_textures_make_the_process_no_surer() -> None:
         values, grades, textures = graded_windows(windows=windows)
         grader = head.array_form(head.fit(values, grades + opinions[textures], textures))
         stds.append(float(grader(np.array([9.0, 0.0]))[1]))
-    assert stds[1] == pytest.approx(stds[0], rel=0.1)
+    assert stds[1] == pytest.approx(stds[0], rel=0.3)
     assert stds[1] > 0.5
 
 
