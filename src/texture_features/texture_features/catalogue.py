@@ -12,6 +12,7 @@ from texture_features.features.force import Force
 from texture_features.features.hjorth import Hjorth
 from texture_features.features.integral import Integral
 from texture_features.features.level import Level
+from texture_features.features.level_share import LevelShare
 from texture_features.features.log_bands import LogBands
 from texture_features.features.log_slope_variance import LogSlopeVariance
 from texture_features.features.log_spectrum import LogSpectrum
@@ -19,10 +20,13 @@ from texture_features.features.log_variance import LogVariance
 from texture_features.features.low_lines import LowLines
 from texture_features.features.mean_amplitude import MeanAmplitude
 from texture_features.features.mean_hjorth import MeanHjorth
+from texture_features.features.mean_shape import MeanShape
+from texture_features.features.mean_spatial_bands import MeanSpatialBands
 from texture_features.features.ordinal_patterns import OrdinalPatterns
 from texture_features.features.pacinian_power import PacinianPower
 from texture_features.features.region_peaks import RegionPeaks
 from texture_features.features.short_time_fourier import ShortTimeFourier
+from texture_features.features.spatial_bands import SpatialBands
 from texture_features.features.spatial_level import SpatialLevel
 from texture_features.features.spatial_variation import SpatialVariation
 from texture_features.features.spectral_exponent import SpectralExponent
@@ -57,6 +61,10 @@ FEATURES: Mapping[str, type[Feature]] = {
     'spatial_variation': SpatialVariation,  # Lieber & Bensmaia 2019
     'spatial_level': SpatialLevel,
     'bursts': Bursts,
+    'spatial_bands': SpatialBands,
+    'mean_spatial_bands': MeanSpatialBands,
+    'mean_shape': MeanShape,
+    'level_share': LevelShare,
     'speed': Speed,
     'force': Force,
 }

@@ -1,0 +1,36 @@
+"""How the load is shared among the channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import Windows
+
+
+@dataclass(frozen=True)
+class LevelShare:
+    """Logarithm of each channel's mean level less the mean of these logarithms; for levels above 0.
+
+    A force that presses all taxels harder by the same factor changes nothing; friction and mounting do.
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    floor: float = param(1e-3, 'Least level, in the unit of the signal.', low=1e-300, high=1e300)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One value without a name of its own."""
+        return ('',)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return the log shares."""
+        rows = windows.rows
+        levels = np.log(np.maximum(np.add.reduce(rows, axis=-1) / rows.shape[-1], self.floor))
+        shares: Array = levels - np.add.reduce(levels, axis=-1, keepdims=True) / levels.shape[-1]
+        return shares[..., None]
