@@ -132,9 +132,9 @@ def test_a_wrong_recipe_gets_one_sentence_that_says_where(more, sentence) -> Non
     assert "roughness recipe 'mine'" in str(caught.value)
 
 
-def test_grades_are_read_with_their_use(tmp_path) -> None:
+def test_grades_are_read_with_their_split(tmp_path) -> None:
     path = tmp_path / 'g.csv'
-    path.write_text('# by people\ntexture,grade,use,std\ncork,2.5,train,0.3\nglass,1,test,\nfelt,3,,\n')
+    path.write_text('# by people\ntexture,grade,split,std\ncork,2.5,train,0.3\nglass,1,test,\nfelt,3,,\n')
     grades = read_grades(path)
     assert grades.grades == {'cork': 2.5, 'glass': 1.0, 'felt': 3.0}
     assert (grades.used_for('train'), grades.used_for('test')) == (('cork',), ('glass',))
@@ -149,7 +149,7 @@ def test_grades_are_read_with_their_use(tmp_path) -> None:
         ('texture,grade\ncork,0\n', "line 2: the grade is '0'"),
         ('texture,grade\ncork,1\ncork,2\n', 'name each once'),
         ('texture,grade\n', 'holds no grade'),
-        ('texture,grade,use\ncork,1,both\n', "the use is 'both'"),
+        ('texture,grade,split\ncork,1,both\n', "the split is 'both'"),
     ],
 )
 def test_a_table_that_cannot_be_used_gets_a_sentence(text, sentence, tmp_path) -> None:

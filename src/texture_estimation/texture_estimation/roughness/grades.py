@@ -26,12 +26,12 @@ class Grades:
     ----------
     grades
         From 1 (smooth) to 5 (rough), by texture.
-    uses
+    splits
         'train' or 'test', by texture; empty if the table does not say.
     """
 
     grades: Mapping[str, float]
-    uses: Mapping[str, str] = field(default_factory=dict)
+    splits: Mapping[str, str] = field(default_factory=dict)
 
     def of(self, texture: str) -> float:
         """Return a texture's grade; UnknownName with the nearest if it has none."""
@@ -39,13 +39,13 @@ class Grades:
             raise unknown(texture, self.grades, 'grade for the texture')
         return self.grades[texture]
 
-    def used_for(self, use: str) -> tuple[str, ...]:
+    def used_for(self, split: str) -> tuple[str, ...]:
         """Return the textures meant to 'train' or to 'test', in their order."""
-        return tuple(texture for texture in self.grades if self.uses.get(texture) == use)
+        return tuple(texture for texture in self.grades if self.splits.get(texture) == split)
 
 
 def read_grades(path: str | Path) -> Grades:
-    """Read a CSV file with the columns `texture` and `grade`, and if wanted `use`; others are left alone.
+    """Read a CSV file with the columns `texture` and `grade`, and if wanted `split`; others are left alone.
 
     Parameters
     ----------
@@ -68,17 +68,17 @@ def read_grades(path: str | Path) -> Grades:
     if not {'texture', 'grade'} <= set(columns):
         raise InvalidData(f"'{place}' has the columns {', '.join(columns) or 'none'}; texture and grade are needed")
     grades: dict[str, float] = {}
-    uses: dict[str, str] = {}
+    splits: dict[str, str] = {}
     for line, row in rows:
         texture, where = row['texture'], f"'{place}', line {line}"
         if not texture or texture in grades:
             raise InvalidData(f"{where}: the texture is '{texture}'; name each once")
         grades[texture] = _grade(row['grade'], where)
-        if row.get('use'):
-            uses[texture] = _use(row['use'], where)
+        if row.get('split'):
+            splits[texture] = _split(row['split'], where)
     if not grades:
         raise InvalidData(f"'{place}' holds no grade; write one a line under texture,grade")
-    return Grades(grades, uses)
+    return Grades(grades, splits)
 
 
 def _grade(text: str | None, where: str) -> float:
@@ -91,7 +91,7 @@ def _grade(text: str | None, where: str) -> float:
     return grade
 
 
-def _use(text: str, where: str) -> str:
+def _split(text: str, where: str) -> str:
     if text not in (TRAIN, TEST):
-        raise InvalidData(f"{where}: the use is '{text}'; '{TRAIN}' or '{TEST}' is needed")
+        raise InvalidData(f"{where}: the split is '{text}'; '{TRAIN}' or '{TEST}' is needed")
     return text
