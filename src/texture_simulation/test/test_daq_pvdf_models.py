@@ -49,7 +49,7 @@ def test_films_forget_a_constant_force_and_gauges_do_not(scene: Scene) -> None:
 def test_what_lies_deeper_feels_fine_ridges_less(scene: Scene) -> None:
     model = daq.DaqModel(scene, scene.surface('ridges'), np.random.default_rng(0))
     counts = model.advance(slide(daq.PATH_RATE_HZ, 2.0))[2500:]
-    felt = counts.std(axis=0) / np.abs(model._volt_per_n)
+    felt = counts.std(axis=0) / np.abs(model.volt_per_n)
     assert felt[[0, 1, 4, 5]].min() > felt[[2, 3, 6, 7]].max()
 
 

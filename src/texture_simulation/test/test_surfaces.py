@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_simulation.surfaces import BLURS_M, Grating, SelfAffine, Surface
+from texture_simulation.surfaces.grating import Grating
+from texture_simulation.surfaces.self_affine import SelfAffine
+from texture_simulation.surfaces.surface import LEAST_BLUR_M, Surface
 
-SHARP = BLURS_M[0]
+SHARP = LEAST_BLUR_M
 PLACES = np.linspace(0.0, 0.2, 20_000)
 
 

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
+from texture_core.catalogue import find
 from texture_core.parameters import param
 from texture_simulation.devices.device import Device
 from texture_simulation.finger_link import FingerLink
 from texture_simulation.live_sensor import LIVE_SENSORS, MakeLive, live_tsf85
 from texture_simulation.scene import Scene, load_scene
-from texture_simulation.surfaces import Surface
+from texture_simulation.surfaces.surface import Surface
 
 BURST_S = 0.005
 
@@ -28,7 +29,9 @@ class BenchParams:
     scene: str = param('bench', 'Scene that the package ships, or path of a scene file.')
     surface: str = param('glass', 'Surface under the finger; may be set while running: the sample is swapped.')
     seed: int = param(0, 'Seed of all randomness.', low=0)
-    sensor: str = param('tsf85', 'Sensor on the bench, reached at `tsf85_link`.', choices=tuple(LIVE_SENSORS))
+    sensor: str = param(
+        '', 'Sensor on the bench, reached at `tsf85_link`; empty: that of the scene.', choices=('', *LIVE_SENSORS)
+    )
     tsf85_link: str = param('/tmp/texture/tsf85', 'Symbolic link to create; the device path for the sensor node.')
     finger: int = param(0, 'Finger of a TSF-85 that touches.', low=0, high=1)
     long_stamps: bool = param(True, 'TSF-85 with 64-bit stamps (firmware from 1.1.7 on); false: older, with 16 bits.')
@@ -58,11 +61,14 @@ class Bench:
         self.scene: Scene = load_scene(params.scene)
         self._now_ns = now_ns
         surface = self._prepared(params.surface)
-        makers: dict[str, MakeLive] = {
-            **LIVE_SENSORS,
-            'tsf85': partial(live_tsf85, finger=params.finger, long_stamps=params.long_stamps),
+        tsf85 = {
+            name: partial(live_tsf85, layout=name, finger=params.finger, long_stamps=params.long_stamps)
+            for name in ('tsf85', 'tsf85_3x4')
         }
-        links = [(params.sensor, params.tsf85_link), ('daq', params.daq_link), ('pvdf', params.pvdf_link)]
+        makers: dict[str, MakeLive] = {**LIVE_SENSORS, **tsf85}
+        sensor = params.sensor or self.scene.sensor
+        find(makers, sensor, 'sensor')
+        links = [(sensor, params.tsf85_link), ('daq', params.daq_link), ('pvdf', params.pvdf_link)]
         self._sensors = [
             makers[name](self.scene, surface, Path(link).expanduser(), rng) for name, link in links if link
         ]
@@ -96,13 +102,13 @@ class Bench:
     @property
     def surface(self) -> str:
         """Name of the surface under the finger."""
-        return self._sensors[0].model.surface.name
+        return self._sensors[0].model.touch.surface.name
 
     def set_surface(self, name: str) -> None:
         """Swap the sample; UnknownName, with the nearest name, if there is none such."""
         surface = self._prepared(name)
         for sensor in self._sensors:
-            sensor.model.surface = surface
+            sensor.model.touch.surface = surface
 
     def start(self) -> None:
         """Plug the devices in and let time run."""

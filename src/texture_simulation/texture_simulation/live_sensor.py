@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Protocol
 
@@ -11,6 +12,7 @@ import numpy as np
 from texture_core.finger import FingerState
 from texture_core.signal import NANOSECONDS
 from texture_drivers.biotac.tables import LAYOUTS
+from texture_drivers.tsf85.tables import LAYOUTS as TSF85S
 from texture_drivers.tsf85.tables import RATE_HZ
 from texture_simulation.devices.biotac import EmulatedBioTac
 from texture_simulation.devices.daq import EmulatedDaq
@@ -21,7 +23,8 @@ from texture_simulation.live import FingerTrack
 from texture_simulation.path import Path
 from texture_simulation.scene import Scene
 from texture_simulation.sensors import biotac, daq, pvdf, tsf85
-from texture_simulation.surfaces import Surface
+from texture_simulation.surfaces.surface import Surface
+from texture_simulation.touch import Touch
 
 # After a longer stall of the machine the rest is skipped, and the driver sees a loss: the line's buffer takes no more.
 LONGEST_BURST_S = 0.25
@@ -30,10 +33,7 @@ LONGEST_BURST_S = 0.25
 class Model(Protocol):
     """What a sensor model lets the bench change."""
 
-    surface: Surface
-
-    def touch_elsewhere(self) -> None:
-        """Let the sample lie otherwise from now on."""
+    touch: Touch
 
 
 class LiveSensor:
@@ -94,7 +94,7 @@ class LiveSensor:
         was_touching = self._track.touching
         path = self._track.advance(until_ns, self._points * steps, self._points * self._rate_hz)
         if not was_touching and self._track.touching:
-            self.model.touch_elsewhere()
+            self.model.touch.elsewhere()
         self._feel(path)
 
 
@@ -104,11 +104,12 @@ def live_tsf85(
     link: FilePath,
     rng: np.random.Generator,
     *,
+    layout: str = 'tsf85',
     finger: int = 0,
     long_stamps: bool = True,
 ) -> LiveSensor:
     """Return a TSF-85 of which one finger touches."""
-    model = tsf85.Tsf85Model(scene, surface, rng)
+    model = tsf85.Tsf85Model(scene, surface, rng, TSF85S[layout])
     device = EmulatedTsf85(link, rng, finger, long_stamps)
     return LiveSensor(
         model,
@@ -164,6 +165,7 @@ def live_pvdf(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Gen
 MakeLive = Callable[[Scene, Surface, FilePath, np.random.Generator], LiveSensor]
 LIVE_SENSORS: Mapping[str, MakeLive] = {
     'tsf85': live_tsf85,
+    'tsf85_3x4': partial(live_tsf85, layout='tsf85_3x4'),
     'biotac': live_biotac,
     'daq': live_daq,
     'pvdf': live_pvdf,

@@ -6,16 +6,19 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from texture_core.arrays import Array
+from texture_core.arrays import Array, Samples
+from texture_core.catalogue import find
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_drivers.tsf85 import tables
-from texture_simulation.path import Path
+from texture_simulation.effects.stages import SlideEffect
+from texture_simulation.scans import scan_streams, scans
 from texture_simulation.scene import Scene
-from texture_simulation.sensors.tsf85 import OVERSAMPLING, PATH_RATE_HZ, Tsf85Model
-from texture_simulation.surfaces import Surface
+from texture_simulation.sensors.catalogue import SENSORS
+from texture_simulation.sensors.model import SensorKind, Stream
+from texture_simulation.sliding import Sliding, along
+
+__all__ = ['Recording', 'Sliding', 'record', 'scan_streams', 'scans', 'simulate_exploration']
 
 Recording = dict[str, list[TactileSignal]]
 BATCH_S = 0.05
@@ -24,8 +27,6 @@ PRESS_S = 0.1  # of the contact phase, from no force to all of it
 SPEED_UP_S = 0.2  # the end of the contact phase
 SLIDE_FROM_S = APPROACH_S + CONTACT_S
 STATE_PERIOD_S = 0.1
-DYNAMIC = (tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, tables.RATE_HZ)
-STATIC = (tables.STATIC_SENSOR, tables.STATIC_CHANNELS, tables.STATIC_RATE_HZ)
 
 
 def record(
@@ -39,11 +40,13 @@ def record(
     direction_rad: float = 0.0,
     radius_m: float = 0.0,
     start_ns: int = 0,
+    finger: int = 0,
 ) -> Recording:
     """Return steady sliding alone, by topic; see `simulate_exploration` for the arguments."""
-    speed = np.full(_points(duration_s), speed_m_s)
-    path = _path(speed, np.full_like(speed, force_n), direction_rad, radius_m)
-    return _measure(scene, scene.surface(surface), path, start_ns, rng)
+    sliding = Sliding(speed_m_s, force_n, duration_s, direction_rad, radius_m)
+    kind = find(SENSORS, scene.sensor, 'sensor model')
+    streams = scan_streams(scene, surface, 1, sliding, rng, finger=finger)
+    return {stream.topic: _batches(streams[stream.topic][0], stream, start_ns) for stream in kind.streams}
 
 
 def simulate_exploration(
@@ -58,6 +61,7 @@ def simulate_exploration(
     rng: np.random.Generator,
     direction_rad: float = 0.0,
     radius_m: float = 0.0,
+    finger: int = 0,
 ) -> tuple[list[ExplorationState], Recording]:
     """Return the states and the signals, by topic, of one exploration: approach, contact, slide, lift, done.
 
@@ -66,7 +70,7 @@ def simulate_exploration(
     scene, surface
         What is touched; `surface` is the name, and becomes the label in the states.
     speed_m_s, force_n
-        As wanted. The finger's own differ from slide to slide by the scene's `speed_error` and `force_error`.
+        As wanted. The finger's own differ from slide to slide if the scene has a `slide_error`.
     slide_s
         Length of the steady part.
     start_ns
@@ -77,37 +81,29 @@ def simulate_exploration(
         Direction of travel, from +x towards +y; at the start, for a circle.
     radius_m
         Of a circle, travelled anticlockwise; 0 for a straight line.
+    finger
+        Which individual of the sensor: each has traits of its own.
     """
-    effects = scene.effects
-    true_speed = speed_m_s * float(1 + effects.speed_error * rng.standard_normal())
-    true_force = max(0.05 * force_n, force_n * float(1 + effects.force_error * rng.standard_normal()))
-    path = _path(*_profile(true_speed, true_force, slide_s), direction_rad, radius_m)
+    kind = find(SENSORS, scene.sensor, 'sensor model')
+    speed, force = np.array([speed_m_s]), np.array([force_n])
+    for effect in scene.effects_of(SlideEffect):
+        speed, force = effect.slide(speed, force, rng)
+    way_m, pressed_n = _profile(float(speed[0]), float(force[0]), slide_s, kind)
+    path = along(way_m, pressed_n, Sliding(speed_m_s, force_n, slide_s, direction_rad, radius_m))
+    streams = kind.make(scene, scene.surface(surface), rng, finger=finger).streams(path)
     story = _Story(exploration_id, surface, speed_m_s, force_n, slide_s, start_ns, direction_rad, radius_m)
-    return story.states(), _measure(scene, scene.surface(surface), path, start_ns, rng)
+    return story.states(), {stream.topic: _batches(streams[stream.topic], stream, start_ns) for stream in kind.streams}
 
 
-def _points(duration_s: float) -> int:
-    return OVERSAMPLING * round(duration_s * tables.RATE_HZ)
-
-
-def _profile(speed_m_s: float, force_n: float, slide_s: float) -> tuple[Array, Array]:
-    """Return speed and force at each point of an exploration."""
-    approach, contact, slide, lift = (_points(s) for s in (APPROACH_S, CONTACT_S, slide_s, LIFT_S))
-    press, speed_up = np.linspace(0, 1, _points(PRESS_S)), np.linspace(0, 1, _points(SPEED_UP_S))
-    force = [np.zeros(approach), press, np.ones(contact - len(press) + slide), press[::-1], np.zeros(lift - len(press))]
-    speed = [np.zeros(approach + contact - len(speed_up)), speed_up, np.ones(slide), speed_up[::-1][:lift]]
-    return speed_m_s * np.concatenate(speed), force_n * np.concatenate(force)
-
-
-def _path(speed_m_s: Array, force_n: Array, direction_rad: float, radius_m: float) -> Path:
-    """Return the path along a line or a circle at given speeds, (n,)."""
-    way_m = np.cumsum(speed_m_s) / PATH_RATE_HZ
-    heading = direction_rad + (way_m / radius_m if radius_m else np.zeros_like(way_m))
-    if not radius_m:
-        return Path(way_m * math.cos(direction_rad), way_m * math.sin(direction_rad), force_n)
-    x_m = radius_m * (np.sin(heading) - math.sin(direction_rad))
-    y_m = radius_m * (math.cos(direction_rad) - np.cos(heading))
-    return Path(x_m, y_m, force_n)
+def _profile(speed_m_s: float, force_n: float, slide_s: float, kind: SensorKind) -> tuple[Array, Array]:
+    """Return the way and the force at each point of an exploration, whole steps of the sensor."""
+    contact_s, lift_s = APPROACH_S + CONTACT_S, APPROACH_S + CONTACT_S + slide_s
+    end_s = lift_s + LIFT_S
+    n_points = kind.step_points * math.ceil(end_s * kind.path_rate_hz / kind.step_points - 1e-6)
+    time_s = np.arange(1, n_points + 1) / kind.path_rate_hz
+    pressed = np.interp(time_s, [APPROACH_S, APPROACH_S + PRESS_S, lift_s, lift_s + PRESS_S], [0.0, 1.0, 1.0, 0.0])
+    moving = np.interp(time_s, [contact_s - SPEED_UP_S, contact_s, lift_s, lift_s + LIFT_S], [0.0, 1.0, 1.0, 0.0])
+    return np.cumsum(speed_m_s * moving) / kind.path_rate_hz, force_n * pressed
 
 
 @dataclass(frozen=True)
@@ -156,30 +152,19 @@ class _Story:
         )
 
 
-def _measure(scene: Scene, surface: Surface, path: Path, start_ns: int, rng: np.random.Generator) -> Recording:
-    dynamic, images = Tsf85Model(scene, surface, rng).advance(path)
-    return {
-        'signal': _batches(dynamic[:, None], DYNAMIC, start_ns),
-        'signal_static': _batches(images, STATIC, start_ns),
-    }
-
-
-def _batches(
-    counts: NDArray[np.int16] | NDArray[np.uint16], stream: tuple[str, tuple[str, ...], float], start_ns: int
-) -> list[TactileSignal]:
+def _batches(samples: Samples, stream: Stream, start_ns: int) -> list[TactileSignal]:
     """Cut (n_samples, n_channels) into batches."""
-    sensor, channels, rate_hz = stream
-    samples = counts.astype(np.float32)
-    per_batch = round(BATCH_S * rate_hz)
+    values = samples.astype(np.float32)
+    per_batch = max(1, round(BATCH_S * stream.rate_hz))
     return [
         TactileSignal(
-            stamp_ns=start_ns + round(first / rate_hz * NANOSECONDS),
-            sensor=sensor,
-            channels=channels,
-            unit=tables.UNIT,
-            sampling_rate_hz=rate_hz,
+            stamp_ns=start_ns + round((stream.delay_s + first / stream.rate_hz) * NANOSECONDS),
+            sensor=stream.sensor,
+            channels=stream.channels,
+            unit=stream.unit,
+            sampling_rate_hz=stream.rate_hz,
             first_sample=first,
-            samples=samples[first : first + per_batch],
+            samples=values[first : first + per_batch],
         )
-        for first in range(0, len(samples), per_batch)
+        for first in range(0, len(values), per_batch)
     ]

@@ -12,13 +12,13 @@ from texture_core.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Places and forces at consecutive times of a constant rate.
+    """Places and forces at consecutive times of a constant rate; of one slide, or of many at once.
 
     Parameters
     ----------
-    x_m, y_m : (n,)
+    x_m, y_m : (..., n)
         In the frame of the surface.
-    force_n : (n,)
+    force_n : (..., n)
         Normal force, 0 in the air.
     """
 
@@ -27,15 +27,15 @@ class Path:
     force_n: Array
 
     def __len__(self) -> int:
-        return len(self.x_m)
+        return int(self.x_m.shape[-1])
 
-    def moved(self, x_m: float, y_m: float) -> Path:
-        """Return the same path starting elsewhere."""
+    def moved(self, x_m: float | Array, y_m: float | Array) -> Path:
+        """Return the same path starting elsewhere; (..., 1) for many."""
         return Path(self.x_m + x_m, self.y_m + y_m, self.force_n)
 
-    def at(self, indices: NDArray[np.intp]) -> Path:
+    def at(self, indices: NDArray[np.intp] | slice) -> Path:
         """Return some of its points."""
-        return Path(self.x_m[indices], self.y_m[indices], self.force_n[indices])
+        return Path(self.x_m[..., indices], self.y_m[..., indices], self.force_n[..., indices])
 
 
 def straight(start: tuple[float, float, float], end: tuple[float, float, float], n_points: int) -> Path:

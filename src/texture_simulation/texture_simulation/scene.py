@@ -1,9 +1,9 @@
-"""A scene: the surfaces on the table, the finger's contact, and what disturbs it. Read from YAML."""
+"""A scene: the surfaces on the table, the sensor that feels them, its contact, and what disturbs it. Read from YAML."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import yaml
@@ -13,22 +13,51 @@ from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping
 from texture_core.resources import find_file
 from texture_simulation.contact import Contact
-from texture_simulation.effects import Effects
-from texture_simulation.surfaces import KINDS, Surface
+from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.surfaces.catalogue import KINDS
+from texture_simulation.surfaces.surface import Surface
+
+DEFAULT_SENSOR = 'tsf85'
+SECTIONS = ('about', 'sensor', 'contact', 'effects', 'surfaces')
 
 
 @dataclass(frozen=True)
 class Scene:
-    """What there is to touch, and how it is felt."""
+    """What there is to touch, and how it is felt.
+
+    Parameters
+    ----------
+    name, about
+        Its file's name, and what it stands for.
+    sensor
+        Name of the sensor model (`sensors/catalogue.py`).
+    surfaces
+        By name.
+    contact
+        Of the finger at 1 N.
+    effects
+        What is not ideal, by name (`effects/catalogue.py`); what is not named is off.
+    """
 
     name: str
     surfaces: Mapping[str, Surface]
     contact: Contact
-    effects: Effects
+    effects: Mapping[str, Any]
+    sensor: str = DEFAULT_SENSOR
+    about: str = ''
 
     def surface(self, name: str) -> Surface:
         """Return a surface by name; UnknownName with the nearest one if there is none."""
         return find(self.surfaces, name, 'surface')
+
+    def effects_of(self, stage: Any) -> list[Any]:
+        """Return the effects that act at a stage (`effects/stages.py`), in the order of the catalogue."""
+        return [self.effects[name] for name in EFFECTS if isinstance(self.effects.get(name), stage)]
+
+    def without(self, effect: str) -> Scene:
+        """Return the same scene with one of its effects off."""
+        find(self.effects, effect, 'effect of this scene')
+        return replace(self, effects={name: kept for name, kept in self.effects.items() if name != effect})
 
 
 def load_scene(name_or_path: str) -> Scene:
@@ -41,26 +70,39 @@ def load_scene(name_or_path: str) -> Scene:
     """
     path = find_file(name_or_path, 'texture_simulation', 'config/scenes', 'scene')
     try:
-        content = yaml.safe_load(path.read_text())
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
     except yaml.YAMLError as error:
         raise InvalidParameter(f'scene {path} is no YAML: {error}') from error
     return scene_from(path.stem, content)
 
 
 def scene_from(name: str, content: Any) -> Scene:
-    """Return the scene that a mapping with `surfaces`, and if wanted `contact` and `effects`, describes."""
+    """Return the scene that a mapping with `surfaces`, and if wanted `sensor`, `contact` and `effects`, describes."""
     where = f"scene '{name}'"
     if not isinstance(content, Mapping) or not isinstance(content.get('surfaces'), Mapping):
         raise InvalidParameter(f'{where} has no mapping `surfaces` of names to lists of terms; add one')
-    strange = set(content) - {'surfaces', 'contact', 'effects'}
+    strange = set(content) - set(SECTIONS)
     if strange:
-        raise InvalidParameter(f'{where} has the sections {sorted(strange)}; allowed are surfaces, contact, effects')
+        raise InvalidParameter(f'{where} has the sections {sorted(strange)}; allowed are {", ".join(SECTIONS)}')
     return Scene(
         name=name,
         surfaces={str(key): _surface(str(key), terms, where) for key, terms in content['surfaces'].items()},
         contact=from_mapping(Contact, content.get('contact') or {}, f'{where}, contact'),
-        effects=from_mapping(Effects, content.get('effects') or {}, f'{where}, effects'),
+        effects=_effects(content.get('effects') or {}, where),
+        sensor=str(content.get('sensor', DEFAULT_SENSOR)),
+        about=str(content.get('about', '')).strip(),
     )
+
+
+def _effects(effects: Any, where: str) -> dict[str, Any]:
+    if not isinstance(effects, Mapping):
+        raise InvalidParameter(
+            f'{where}, effects: came {effects!r}; a mapping of effects to their parameters is needed'
+        )
+    return {
+        name: from_mapping(find(EFFECTS, str(name), 'effect'), values or {}, f"{where}, effect '{name}'")
+        for name, values in effects.items()
+    }
 
 
 def _surface(name: str, terms: Any, where: str) -> Surface:

@@ -7,16 +7,22 @@ of the manual; the sensitivities are ours, in the order of magnitude of public r
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal as filters
 
-from texture_core.arrays import Array
+from texture_core.arrays import Array, Samples
+from texture_drivers.biotac import tables
 from texture_drivers.biotac.tables import FULL_SCALE, PAC, SLOT_RATE_HZ, Layout
-from texture_simulation.effects import uneven_gain
+from texture_simulation.filters import Filter
 from texture_simulation.path import Path
 from texture_simulation.scene import Scene
-from texture_simulation.surfaces import Surface
+from texture_simulation.sensors.converter import Converter
+from texture_simulation.sensors.model import SensorKind, Stream, traits
+from texture_simulation.surfaces.surface import Surface
+from texture_simulation.touch import Touch
 
 OVERSAMPLING = 2  # points of the path in a slot
 PATH_RATE_HZ = OVERSAMPLING * SLOT_RATE_HZ
@@ -29,59 +35,67 @@ PAC_BAND = np.concatenate(
         filters.butter(2, 1040.0, 'lowpass', fs=PATH_RATE_HZ, output='sos'),
     ]
 )
+PAC_POINTS = slice(2 * OVERSAMPLING - 1, None, 2 * OVERSAMPLING)  # PAC is sampled in every second slot, at its end
 ELECTRODE_REST = (2800.0, 3400.0)  # range of the electrodes without load
 ELECTRODE_COUNTS_PER_N = 400.0  # of the electrode under the load; falls off with the distance
 ELECTRODE_PITCH_M = 3e-3
+COLUMNS = 4
 CONTACT_RADIUS_M = 5e-3
 ELECTRODE_BLUR_M = 1.5e-3
 TDC_REST, TAC_REST = 2400.0, 2100.0
 TDC_FALL = 30.0  # counts, after a long touch
 TAC_PER_TDC_S = 20.0
 TOUCH_S = 4.0  # time constant of cooling and warming
-SAMPLE_SIZE_M = 0.1
-NOISE_SHARE = 0.1  # the scene's noise is that of a TSF-85; an idle PAC stays within a few counts (QuickStart Guide)
+EFFECT_SCALE = 0.1  # counts of 12 bits; an idle PAC stays within a few (QuickStart Guide), a TSF-85 within some tens
+LIMITS = (0, FULL_SCALE)
 
 
 class BioTacModel:
-    """Turn a path, frame by frame, into the sensor's counts; what lies between the blocks is continuous.
+    """Turn a path, frame by frame, into the sensor's counts; see `sensors.model.MakeModel` for the arguments.
 
     Parameters
     ----------
-    scene
-        How the finger feels.
-    surface
-        What it feels; may be changed between blocks.
-    rng
-        All randomness: electrodes at rest, where a sample is touched, noise.
     layout
         Kind of BioTac.
     """
 
-    def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator, layout: Layout) -> None:
-        self.surface = surface
-        self._scene = scene
-        self._rng = rng
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        layout: Layout,
+        *,
+        finger: int = 0,
+        scans: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = Touch(scene, surface, rng, PATH_RATE_HZ, finger=finger, scans=scans)
         self._layout = layout
-        self._filter = np.zeros((len(PAC_BAND), 2))
-        self._cooled = 0.0  # share of the fall of temperature
-        self._pac_slots = np.array([channel == PAC for channel in layout.slots])
-        columns = 4
-        places = np.arange(layout.electrodes)
-        self._x_m = (places % columns - (columns - 1) / 2) * ELECTRODE_PITCH_M
-        self._y_m = (places // columns - (layout.electrodes // columns) / 2) * ELECTRODE_PITCH_M
-        self._rest = rng.uniform(*ELECTRODE_REST, layout.electrodes)
-        self._origin_m = (0.0, 0.0)
-        self.touch_elsewhere()
+        self._band = Filter(PAC_BAND, settled=settled)
+        step = 1 - np.exp(-layout.frame_s / TOUCH_S)
+        self._cool = Filter(np.array([[step, 0.0, 0.0, 1.0, step - 1, 0.0]]))
+        self._cooled: Array | None = None  # share of the fall of temperature, (..., 1)
+        row, column = np.divmod(np.arange(layout.electrodes)[:, None], COLUMNS)
+        self._x_m = (column - (COLUMNS - 1) / 2) * ELECTRODE_PITCH_M
+        self._y_m = (row - (layout.electrodes // COLUMNS) / 2) * ELECTRODE_PITCH_M
+        self._rest = traits(finger).uniform(*ELECTRODE_REST, (layout.electrodes, 1))
+        slow = len(layout.slow_slots)
+        self._fast = Converter(scene, rng, layout.pac_rate_hz, 1, LIMITS, scans=scans, scale=EFFECT_SCALE)
+        self._slow = Converter(
+            scene, rng, layout.frame_rate_hz, slow, LIMITS, scans=scans, slow=True, scale=EFFECT_SCALE
+        )
 
     @property
     def points_per_frame(self) -> int:
         """Points of the path, at 8.8 kHz, that one frame takes."""
-        return OVERSAMPLING * len(self._layout.slots)
+        return points_per_frame(self._layout)
 
-    def touch_elsewhere(self) -> None:
-        """Let the sample lie otherwise from now on: no two touches meet the same place."""
-        x_m, y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, 2)
-        self._origin_m = (float(x_m), float(y_m))
+    def streams(self, path: Path, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return PAC, and the slow channels if wanted, in counts."""
+        placed, pressure_pa = self._pressure_pa(path)
+        fast = {'signal': self._fast.exact(self._pac(pressure_pa))}
+        return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast
 
     def advance(self, path: Path) -> NDArray[np.uint16]:
         """Return what is measured along the next piece of path.
@@ -95,54 +109,79 @@ class BioTacModel:
         -------
         (n_frames, n_slots) counts
         """
-        placed = path.moved(*self._origin_m)
-        texture_n = self._texture_n(placed, self._scene.contact.blur_at_m(placed.force_n))
-        pressure_pa = PA_PER_N * (placed.force_n + texture_n)
-        band_pa, self._filter = filters.sosfilt(PAC_BAND, pressure_pa, zi=self._filter)
-        sampled = slice(OVERSAMPLING - 1, None, OVERSAMPLING)
-        counts = (PAC_REST + band_pa[sampled] / PAC_PA).reshape(-1, len(self._layout.slots))
-        starts = np.arange(0, len(path), self.points_per_frame)
-        counts[:, list(self._layout.slow_slots)] = self._slow(placed.at(starts), pressure_pa[starts])
-        effects = self._scene.effects
-        noise = NOISE_SHARE * np.where(self._pac_slots, effects.noise_count, effects.static_noise_count)
-        noisy: Array = counts + noise * self._rng.standard_normal(counts.shape)
-        return np.clip(np.rint(noisy), 0, FULL_SCALE).astype(np.uint16)
+        streams = self.streams(path)
+        frames = streams['signal_static']
+        counts = np.empty((*frames.shape[:-1], len(self._layout.slots)), dtype=np.uint16)
+        pac = [channel == PAC for channel in self._layout.slots]
+        counts[..., pac] = streams['signal'].reshape(*frames.shape[:-1], self._layout.pac_per_frame)
+        counts[..., list(self._layout.slow_slots)] = frames
+        return counts
 
-    def _texture_n(self, path: Path, blur_m: Array) -> Array:
-        """Return how the texture changes the force, (n,)."""
-        gain = uneven_gain(path.x_m, path.y_m, self._scene.effects.unevenness)
-        return gain * self._scene.contact.force_variation_n(self.surface, path, blur_m)
+    def _pressure_pa(self, path: Path) -> tuple[Path, Array]:
+        """Return where the skin goes, and the pressure in the finger there, (..., n)."""
+        placed = self.touch.placed(path)
+        return placed, PA_PER_N * (placed.force_n + self.touch.variation_n(placed))
 
-    def _slow(self, path: Path, pressure_pa: Array) -> Array:
-        """Return the slow channels at the start of each frame, (n_frames, n_slow_channels)."""
-        cooled = self._cool(path.force_n > 0)
-        rate_1_s = np.diff(cooled, prepend=self._cooled) / self._layout.frame_s
-        self._cooled = float(cooled[-1]) if len(cooled) else self._cooled
-        tdc = TDC_REST - TDC_FALL * cooled
-        tac = TAC_REST - TAC_PER_TDC_S * TDC_FALL * rate_1_s
-        pdc = PDC_REST + pressure_pa / PDC_PA
-        return np.column_stack([tdc, tac, pdc, self._electrodes(path)])
+    def _pac(self, pressure_pa: Array) -> Samples:
+        """Return PAC, (..., n_samples, 1) counts."""
+        return PAC_REST + self._band(pressure_pa)[..., PAC_POINTS, None] / PAC_PA
 
-    def _cool(self, touching: NDArray[np.bool_]) -> Array:
-        """Return how far the finger has cooled at each frame, (n_frames,): a lag of first order."""
-        step = 1 - np.exp(-self._layout.frame_s / TOUCH_S)
-        start = [(1 - step) * self._cooled]
-        cooled, _ = filters.lfilter([step], [1, step - 1], touching.astype(np.float64), zi=start)
-        return np.asarray(cooled, dtype=np.float64)
+    def _frames(self, placed: Path, pressure_pa: Array) -> Samples:
+        """Return the slow channels at the start of each frame, (..., n_frames, n_slow_channels) counts."""
+        starts = slice(0, None, self.points_per_frame)
+        at = placed.at(starts)
+        pdc = PDC_REST + pressure_pa[..., starts, None] / PDC_PA
+        electrodes = np.swapaxes(self._electrodes(at), -1, -2)
+        return np.concatenate([*self._temperatures(at.force_n > 0), pdc, electrodes], axis=-1)
 
-    def _electrodes(self, path: Path) -> Array:
-        """Return the electrodes at each frame, (n_frames, n_electrodes): low where the load is."""
-        force_n = path.force_n[:, None]
+    def _temperatures(self, touching: NDArray[np.bool_]) -> tuple[Samples, Samples]:
+        """Return the temperature and its flow at each frame, (..., n_frames, 1) counts each: a lag of first order."""
+        cooled = self._cool(touching.astype(np.float64))
+        before = np.zeros_like(cooled[..., :1]) if self._cooled is None else self._cooled
+        rate_1_s = np.diff(cooled, prepend=before) / self._layout.frame_s
+        self._cooled = cooled[..., -1:] if cooled.shape[-1] else self._cooled
+        return (
+            (TDC_REST - TDC_FALL * cooled)[..., None],
+            (TAC_REST - TAC_PER_TDC_S * TDC_FALL * rate_1_s)[..., None],
+        )
+
+    def _electrodes(self, at: Path) -> Array:
+        """Return the electrodes at each frame, (..., n_electrodes, n_frames) counts: low where the load is."""
+        force_n = at.force_n[..., None, :]
         radius_m = CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))
         nearness = np.maximum(0.0, 1 - (self._x_m**2 + self._y_m**2) / radius_m**2)
-        n = len(self._rest)
-        over = Path(
-            (path.x_m[:, None] + self._x_m).ravel(),
-            (path.y_m[:, None] + self._y_m).ravel(),
-            np.repeat(path.force_n, n),
-        )
-        texture_n = self._texture_n(over, np.full(len(over), ELECTRODE_BLUR_M)).reshape(-1, n)
+        texture_n = self.touch.still_n(at, ELECTRODE_BLUR_M, (self._x_m, self._y_m))
         # Squeezing stiffens: the fluid over an electrode thins out, and never vanishes.
         load = np.maximum(ELECTRODE_COUNTS_PER_N * nearness * (force_n + texture_n), 0.0)
         counts: Array = self._rest / (1 + load / self._rest)
         return counts
+
+
+def points_per_frame(layout: Layout) -> int:
+    """Return how many points of the path, at 8.8 kHz, one frame takes."""
+    return OVERSAMPLING * len(layout.slots)
+
+
+def kind(layout: Layout) -> SensorKind:
+    """Return a kind of BioTac."""
+
+    def make(
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        scans: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> BioTacModel:
+        return BioTacModel(scene, surface, rng, layout, finger=finger, scans=scans, settled=settled)
+
+    return SensorKind(
+        make=make,
+        path_rate_hz=PATH_RATE_HZ,
+        step_points=points_per_frame(layout),
+        streams=(
+            Stream('signal', tables.PAC_SENSOR, (PAC,), tables.UNIT, layout.pac_rate_hz, 1 / SLOT_RATE_HZ),
+            Stream('signal_static', tables.SLOW_SENSOR, layout.slow_channels, tables.UNIT, layout.frame_rate_hz),
+        ),
+    )

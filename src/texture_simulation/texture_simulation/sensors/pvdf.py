@@ -6,55 +6,64 @@ slow part. The gains are ours: the paper tells none.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal as filters
 
-from texture_core.arrays import Array
+from texture_core.arrays import Array, Samples
 from texture_drivers.pvdf import tables
-from texture_drivers.pvdf.charge_leak import ChargeLeak, LeakingFilm
-from texture_simulation.effects import uneven_gain
+from texture_drivers.pvdf.charge_leak import ChargeLeak
+from texture_simulation.filters import Filter
 from texture_simulation.path import Path
 from texture_simulation.scene import Scene
-from texture_simulation.surfaces import Surface
+from texture_simulation.sensors.converter import Converter
+from texture_simulation.sensors.model import SensorKind, Stream
+from texture_simulation.surfaces.surface import Surface
+from texture_simulation.touch import Touch
 
 OVERSAMPLING = 2  # so that what lies above the band is filtered and not folded into it
 PATH_RATE_HZ = OVERSAMPLING * tables.FILM_RATE_HZ
 PC_PER_C = 1e12
-FILM_BAND = filters.butter(4, 1500.0, 'lowpass', fs=PATH_RATE_HZ, output='sos')
+LEAK = ChargeLeak(tables.RESISTANCE_OHM, tables.CAPACITANCE_F, tables.D33_PC_N / PC_PER_C)
+# Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant share.
+KEPT = math.exp(-1 / (LEAK.time_constant_s * PATH_RATE_HZ))
+LEAK_SECTIONS = np.array([[1.0, -1.0, 0.0, 1.0, -KEPT, 0.0]])
+FILM_BAND = np.concatenate([filters.butter(4, 1500.0, 'lowpass', fs=PATH_RATE_HZ, output='sos'), LEAK_SECTIONS])
 FORCE_BAND = filters.butter(2, 20.0, 'lowpass', fs=PATH_RATE_HZ, output='sos')
 POINTS_PER_FORCE = round(PATH_RATE_HZ / tables.FORCE_RATE_HZ)
-SAMPLE_SIZE_M = 0.1  # where on the sample a slide begins is drawn from so much
+LIMITS = (-(2**15), 2**15 - 1)
 
 
 class PvdfModel:
-    """Turn a path, block by block, into the microcontroller's counts; what lies between the blocks is continuous.
+    """Turn a path, block by block, into the controller's counts; see `sensors.model.MakeModel` for the arguments."""
 
-    Parameters
-    ----------
-    scene
-        How the finger feels.
-    surface
-        What it feels; may be changed between blocks.
-    rng
-        All randomness: where a sample is touched, noise.
-    """
-
-    def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator) -> None:
-        self.surface = surface
-        self._scene = scene
-        self._rng = rng
-        leak = ChargeLeak(tables.RESISTANCE_OHM, tables.CAPACITANCE_F, tables.D33_PC_N / PC_PER_C)
-        self._film = LeakingFilm(leak, PATH_RATE_HZ)
-        self._film_band = np.zeros((len(FILM_BAND), 2))
-        self._force_band = np.zeros((len(FORCE_BAND), 2))
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        scans: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = Touch(scene, surface, rng, PATH_RATE_HZ, finger=finger, scans=scans)
+        self._film = Filter(FILM_BAND, settled=settled)
+        self._force_band = Filter(FORCE_BAND, settled=settled)
         self._points = 0
-        self.touch_elsewhere()
+        self._fast = Converter(scene, rng, tables.FILM_RATE_HZ, 1, LIMITS, scans=scans)
+        self._slow = Converter(scene, rng, tables.FORCE_RATE_HZ, 1, LIMITS, scans=scans, slow=True)
 
-    def touch_elsewhere(self) -> None:
-        """Let the sample lie otherwise from now on: no two touches meet the same place."""
-        x_m, y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, 2)
-        self._origin_m = (float(x_m), float(y_m))
+    def streams(self, path: Path, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return the charge of the film in pC, and the force in N if wanted."""
+        force_n = self._pressed_n(path)
+        fast = {tables.FILM_TOPIC: tables.FILM_PC_PER_COUNT * self._fast.exact(self._charge(force_n))}
+        if not slow:
+            return fast
+        return {**fast, tables.FORCE_TOPIC: tables.FORCE_N_PER_COUNT * self._slow.exact(self._force(force_n))}
 
     def advance(self, path: Path) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
         """Return what is measured along the next piece of path.
@@ -70,23 +79,33 @@ class PvdfModel:
         force : (n_force,) counts
             Those whose time, at 64 Hz from the very first point on, lies in this piece.
         """
-        force_n = self._pressed_n(path.moved(*self._origin_m))
-        felt_n, self._film_band = filters.sosfilt(FILM_BAND, force_n, zi=self._film_band)
-        charge_pc = PC_PER_C * self._film.update(felt_n[:, None])[OVERSAMPLING - 1 :: OVERSAMPLING, 0]
-        slow_n, self._force_band = filters.sosfilt(FORCE_BAND, force_n, zi=self._force_band)
+        force_n = self._pressed_n(path)
+        film = self._fast.counts(self._charge(force_n), np.int16)
+        return film[..., 0], self._slow.counts(self._force(force_n), np.int16)[..., 0]
+
+    def _charge(self, force_n: Array) -> Samples:
+        """Return the counts of the charge, (..., n_samples, 1)."""
+        charge_pc = tables.D33_PC_N * self._film(force_n)[..., OVERSAMPLING - 1 :: OVERSAMPLING, None]
+        return np.asarray(charge_pc / tables.FILM_PC_PER_COUNT)
+
+    def _force(self, force_n: Array) -> Samples:
+        """Return the counts of the force sensor, (..., n_force, 1)."""
+        slow_n = self._force_band(force_n)
         first = -self._points % POINTS_PER_FORCE
-        self._points += len(path)
-        effects = self._scene.effects
-        return (
-            self._counts(charge_pc / tables.FILM_PC_PER_COUNT, effects.noise_count),
-            self._counts(slow_n[first::POINTS_PER_FORCE] / tables.FORCE_N_PER_COUNT, effects.static_noise_count),
-        )
+        self._points += force_n.shape[-1]
+        return slow_n[..., first::POINTS_PER_FORCE, None] / tables.FORCE_N_PER_COUNT
 
     def _pressed_n(self, path: Path) -> Array:
-        contact = self._scene.contact
-        texture_n = contact.force_variation_n(self.surface, path, contact.blur_at_m(path.force_n))
-        return path.force_n + uneven_gain(path.x_m, path.y_m, self._scene.effects.unevenness) * texture_n
+        placed = self.touch.placed(path)
+        return placed.force_n + self.touch.variation_n(placed)
 
-    def _counts(self, exact: Array, noise_count: float) -> NDArray[np.int16]:
-        noisy = exact + noise_count * self._rng.standard_normal(len(exact))
-        return np.clip(np.rint(noisy), -(2**15), 2**15 - 1).astype(np.int16)
+
+KIND = SensorKind(
+    make=PvdfModel,
+    path_rate_hz=PATH_RATE_HZ,
+    step_points=OVERSAMPLING,
+    streams=(
+        Stream(tables.FILM_TOPIC, tables.FILM_SENSOR, tables.FILM_CHANNELS, 'pC', tables.FILM_RATE_HZ),
+        Stream(tables.FORCE_TOPIC, tables.FORCE_SENSOR, tables.FORCE_CHANNELS, 'N', tables.FORCE_RATE_HZ),
+    ),
+)

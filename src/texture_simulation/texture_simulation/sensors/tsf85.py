@@ -1,24 +1,28 @@
 """What a TSF-85 fingertip measures while it goes along a path.
 
 Dynamic channel: rate of change of the force on the skin, 50 to 450 Hz, sampled at 1 kHz. Static channel: the pressure
-on 28 taxels at 60 Hz. The counts per newton are ours: none are published.
+on the taxels. The counts per newton are ours: none are published.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, TypeVar
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal as filters
 
-from texture_core.arrays import Array
-from texture_drivers.tsf85.tables import RATE_HZ, STATIC_COLUMNS, STATIC_RATE_HZ, STATIC_ROWS
-from texture_simulation.effects import uneven_gain
+from texture_core.arrays import Array, Samples
+from texture_drivers.tsf85 import tables
+from texture_drivers.tsf85.tables import RATE_HZ, TSF85, Layout
+from texture_simulation.filters import Filter
 from texture_simulation.path import Path
 from texture_simulation.scene import Scene
-from texture_simulation.surfaces import Surface
+from texture_simulation.sensors.converter import Converter
+from texture_simulation.sensors.model import SensorKind, Stream, traits
+from texture_simulation.surfaces.surface import Surface
+from texture_simulation.touch import Touch
 
 OVERSAMPLING = 2  # so that what lies above the band is filtered and not folded into it
 PATH_RATE_HZ = OVERSAMPLING * RATE_HZ
@@ -34,55 +38,46 @@ STATIC_BASELINE = (9000.0, 30000.0)  # range met in the field, without load
 TAXEL_PITCH_M = 4e-3
 TAXEL_BLUR_M = 1e-3
 CONTACT_RADIUS_M = 6e-3  # of the pressed area at 1 N
-SAMPLE_SIZE_M = 0.1  # where on the sample a slide begins is drawn from so much
-
-
-Integer = TypeVar('Integer', bound=np.integer[Any])
-
-
-def _quantised(counts: Array, kind: type[Integer]) -> NDArray[Integer]:
-    """Return counts as the converter gives them: whole, and within its range."""
-    limits = np.iinfo(kind)
-    whole: NDArray[Integer] = np.clip(np.rint(counts), limits.min, limits.max).astype(kind)
-    return whole
-
-
-def _tick_from(point: int) -> int:
-    """Return the first tick of the static channel at or after a point of the path."""
-    return math.ceil(point * STATIC_RATE_HZ / PATH_RATE_HZ)
+FAST_LIMITS, SLOW_LIMITS = (-(2**15), 2**15 - 1), (0, 2**16 - 1)
 
 
 class Tsf85Model:
-    """Turn a path, block by block, into the sensor's counts; what lies between the blocks is continuous.
+    """Turn a path, block by block, into the sensor's counts; see `sensors.model.MakeModel` for the arguments.
 
     Parameters
     ----------
-    scene
-        How the finger feels.
-    surface
-        What it feels; may be changed between blocks.
-    rng
-        All randomness: taxel baselines, where a sample is touched, noise.
+    layout
+        Kind of fingertip: how many taxels, and how often they are read.
     """
 
-    def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator) -> None:
-        self.surface = surface
-        self._scene = scene
-        self._rng = rng
-        self._force_before_n: float | None = None
-        self._filter = np.zeros((len(BAND), 2))
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        layout: Layout = TSF85,
+        *,
+        finger: int = 0,
+        scans: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> None:
+        self.touch = Touch(scene, surface, rng, PATH_RATE_HZ, finger=finger, scans=scans)
+        self._static_rate_hz = layout.static_rate_hz
+        self._force_before_n: Array | None = None
+        self._band = Filter(BAND, settled=settled)
         self._points = 0
-        columns, rows = np.meshgrid(np.arange(STATIC_COLUMNS), np.arange(STATIC_ROWS))
-        self._taxel_x_m = (columns.ravel() - (STATIC_COLUMNS - 1) / 2) * TAXEL_PITCH_M
-        self._taxel_y_m = (rows.ravel() - (STATIC_ROWS - 1) / 2) * TAXEL_PITCH_M
-        self._baseline = rng.uniform(*STATIC_BASELINE, len(self._taxel_x_m))
-        self._origin_m = (0.0, 0.0)
-        self.touch_elsewhere()
+        rows, columns = np.divmod(np.arange(layout.rows * layout.columns), layout.columns)
+        self._taxel_x_m = (columns[:, None] - (layout.columns - 1) / 2) * TAXEL_PITCH_M
+        self._taxel_y_m = (rows[:, None] - (layout.rows - 1) / 2) * TAXEL_PITCH_M
+        self._baseline = traits(finger).uniform(*STATIC_BASELINE, len(rows))
+        self._fast = Converter(scene, rng, RATE_HZ, 1, FAST_LIMITS, scans=scans)
+        self._slow = Converter(scene, rng, layout.static_rate_hz, len(rows), SLOW_LIMITS, scans=scans, slow=True)
 
-    def touch_elsewhere(self) -> None:
-        """Let the sample lie otherwise from now on: no two touches meet the same place."""
-        x_m, y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, 2)
-        self._origin_m = (float(x_m), float(y_m))
+    def streams(self, path: Path, *, slow: bool = True) -> Mapping[str, Samples]:
+        """Return the dynamic channel, and the taxels if wanted, in counts."""
+        placed = self.touch.placed(path)
+        fast = {'signal': self._fast.exact(self._dynamic(placed))}
+        return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast
 
     def advance(self, path: Path) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
         """Return what is measured along the next piece of path.
@@ -95,51 +90,66 @@ class Tsf85Model:
         Returns
         -------
         dynamic : (n_points / OVERSAMPLING,) counts
-        images : (n_images, 28) counts
-            Those whose time, at 60 Hz from the very first point on, lies in this piece.
+        images : (n_images, n_taxels) counts
+            Those whose time, from the very first point on, lies in this piece.
         """
-        placed = path.moved(*self._origin_m)
-        return self._dynamic(placed), self._images(placed)
+        placed = self.touch.placed(path)
+        dynamic = self._fast.counts(self._dynamic(placed), np.int16)
+        return dynamic[..., 0], self._slow.counts(self._images(placed), np.uint16)
 
-    def _dynamic(self, path: Path) -> NDArray[np.int16]:
-        contact, effects = self._scene.contact, self._scene.effects
-        texture_n = contact.force_variation_n(self.surface, path, contact.blur_at_m(path.force_n))
-        force_n = path.force_n + uneven_gain(path.x_m, path.y_m, effects.unevenness) * texture_n
-        before = force_n[:1] if self._force_before_n is None else np.array([self._force_before_n])
-        self._force_before_n = float(force_n[-1])
+    def _dynamic(self, placed: Path) -> Samples:
+        force_n = placed.force_n + self.touch.variation_n(placed)
+        before = force_n[..., :1] if self._force_before_n is None else self._force_before_n
+        self._force_before_n = force_n[..., -1:]
         rate_n_s = np.diff(force_n, prepend=before) * PATH_RATE_HZ
-        band, self._filter = filters.sosfilt(BAND, COUNTS_PER_N_S * rate_n_s, zi=self._filter)
-        counts = band[OVERSAMPLING - 1 :: OVERSAMPLING]
-        return _quantised(counts + effects.noise_count * self._rng.standard_normal(len(counts)), np.int16)
+        return self._band(COUNTS_PER_N_S * rate_n_s)[..., OVERSAMPLING - 1 :: OVERSAMPLING, None]
 
-    def _images(self, path: Path) -> NDArray[np.uint16]:
-        at = path.at(self._image_points(len(path)))
-        taxels = len(self._baseline)
-        if not len(at):
-            return np.empty((0, taxels), dtype=np.uint16)
-        contact, effects = self._scene.contact, self._scene.effects
-        under = Path(
-            (at.x_m[:, None] + self._taxel_x_m).ravel(),
-            (at.y_m[:, None] + self._taxel_y_m).ravel(),
-            np.repeat(at.force_n, taxels),
-        )
-        texture_n = contact.force_variation_n(self.surface, under, np.full(len(under), TAXEL_BLUR_M))
-        gain = uneven_gain(at.x_m, at.y_m, effects.unevenness)[:, None]
-        pressed_n = self._shares(at.force_n) * (at.force_n[:, None] + gain * texture_n.reshape(-1, taxels))
-        counts = self._baseline + STATIC_COUNTS_PER_N * pressed_n
-        return _quantised(counts + effects.static_noise_count * self._rng.standard_normal(counts.shape), np.uint16)
+    def _images(self, placed: Path) -> Samples:
+        at = placed.at(self._image_points(len(placed)))
+        texture_n = self.touch.still_n(at, TAXEL_BLUR_M, (self._taxel_x_m, self._taxel_y_m))
+        pressed_n = self._shares(at.force_n) * (at.force_n[..., None, :] + texture_n)
+        return self._baseline + STATIC_COUNTS_PER_N * np.swapaxes(pressed_n, -1, -2)
 
     def _image_points(self, n_points: int) -> NDArray[np.intp]:
         """Return which of the next points of the path fall on a tick of the static channel."""
         end = self._points + n_points
-        ticks = np.arange(_tick_from(self._points), _tick_from(end))
-        points: NDArray[np.intp] = np.floor(ticks * PATH_RATE_HZ / STATIC_RATE_HZ).astype(np.intp) - self._points
+        ticks = np.arange(self._tick_from(self._points), self._tick_from(end))
+        points: NDArray[np.intp] = np.floor(ticks * PATH_RATE_HZ / self._static_rate_hz).astype(np.intp) - self._points
         self._points = end
         return points
 
+    def _tick_from(self, point: int) -> int:
+        """Return the first tick of the static channel at or after a point of the path."""
+        return math.ceil(point * self._static_rate_hz / PATH_RATE_HZ)
+
     def _shares(self, force_n: Array) -> Array:
-        """Return the share of the force on each taxel, (n, 28): a dome as wide as the contact, roughly Hertz."""
-        radius_m = CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))[:, None]
+        """Return the share of the force on each taxel, (..., n_taxels, n): a dome as wide as the contact, as Hertz'."""
+        radius_m = CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))[..., None, :]
         dome = np.maximum(0.0, 1 - (self._taxel_x_m**2 + self._taxel_y_m**2) / radius_m**2)
-        shares: Array = dome / np.maximum(dome.sum(axis=1, keepdims=True), 1e-9)
+        shares: Array = dome / np.maximum(dome.sum(axis=-2, keepdims=True), 1e-9)
         return shares
+
+
+def kind(layout: Layout) -> SensorKind:
+    """Return a kind of TSF-85."""
+
+    def make(
+        scene: Scene,
+        surface: Surface,
+        rng: np.random.Generator,
+        *,
+        finger: int = 0,
+        scans: tuple[int, ...] = (),
+        settled: bool = False,
+    ) -> Tsf85Model:
+        return Tsf85Model(scene, surface, rng, layout, finger=finger, scans=scans, settled=settled)
+
+    return SensorKind(
+        make=make,
+        path_rate_hz=PATH_RATE_HZ,
+        step_points=OVERSAMPLING,
+        streams=(
+            Stream('signal', tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, tables.UNIT, RATE_HZ),
+            Stream('signal_static', tables.STATIC_SENSOR, layout.static_channels, tables.UNIT, layout.static_rate_hz),
+        ),
+    )

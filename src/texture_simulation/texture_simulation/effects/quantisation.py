@@ -1,0 +1,27 @@
+"""A converter of fewer bits than its numbers have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.arrays import Samples
+from texture_core.parameters import param
+from texture_simulation.effects.stages import Scans, ThroughSignal
+
+
+@dataclass(frozen=True)
+class Quantisation:
+    """Samples come in steps of several counts; steps of one count are always there."""
+
+    step_count: float = param(16.0, 'Height of a step.', unit='count', low=1.0)
+
+    def start_signal(
+        self, rng: np.random.Generator, rate_hz: float, scans: Scans, channels: int, *, slow: bool
+    ) -> ThroughSignal:
+        """Return what rounds the samples."""
+        return self._round
+
+    def _round(self, samples: Samples) -> Samples:
+        return self.step_count * np.rint(samples / self.step_count)

@@ -1,0 +1,68 @@
+"""From exact values to what a converter sends, with the effects on the way."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Samples
+from texture_simulation.effects.stages import Scans, SignalEffect
+from texture_simulation.scene import Scene
+
+Integer = TypeVar('Integer', bound=np.integer[Any])
+
+
+class Converter:
+    """Turn samples of one stream into whole counts within a range.
+
+    Parameters
+    ----------
+    scene
+        Whose effects on the signal are applied.
+    rng
+        Their randomness.
+    rate_hz, channels
+        Of the stream.
+    limits
+        Least and most count.
+    scans
+        () for one slide, (count,) for many at once.
+    slow
+        Whether it is the slow stream beside the fast one.
+    scale
+        Counts of this converter for one count of the effects, which are those of a TSF-85.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        rng: np.random.Generator,
+        rate_hz: float,
+        channels: int,
+        limits: tuple[int, int],
+        *,
+        scans: Scans,
+        slow: bool = False,
+        scale: float = 1.0,
+    ) -> None:
+        self._limits = limits
+        self._scale = scale
+        self._through = [
+            effect.start_signal(rng, rate_hz, scans, channels, slow=slow) for effect in scene.effects_of(SignalEffect)
+        ]
+
+    def exact(self, counts: Samples) -> Samples:
+        """Return the next samples, (..., n_samples, n_channels), with the effects, clipped and whole."""
+        if self._through:
+            counts = counts / self._scale
+            for through in self._through:
+                counts = through(counts)
+            counts = counts * self._scale
+        return np.clip(np.rint(counts), *self._limits)
+
+    def counts(self, counts: Samples, kind: type[Integer]) -> NDArray[Integer]:
+        """Return the same as whole numbers."""
+        whole: NDArray[Integer] = self.exact(counts).astype(kind)
+        return whole

@@ -1,0 +1,38 @@
+"""Bumps or hollows in rows and columns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_simulation.surfaces.ridges import SHAPES, profile
+
+MEAN = {'sine': 0.5}
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Posts in rows and columns, or a net of ribs between hollows.
+
+    The relief is a product of two profiles; a round Gaussian blurs each of them by itself, so this is exact.
+    """
+
+    pitch_x_m: float = param(2e-3, 'Distance of posts along the first direction.', unit='m', low=1e-5, high=0.1)
+    pitch_y_m: float = param(2e-3, 'The same across it.', unit='m', low=1e-5, high=0.1)
+    depth_m: float = param(2e-4, 'Height of posts or ribs.', unit='m', low=0.0, high=0.01)
+    angle_rad: float = param(0.0, 'First direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi)
+    shape: str = param('sine', 'Shape of the posts, or of the hollows.', choices=SHAPES)
+    duty: float = param(0.5, 'Share of the pitch that a post, or a hollow, takes.', low=0.05, high=0.95)
+    relief: str = param('posts', 'What stands out.', choices=('posts', 'net'))
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the height felt at places, (..., n)."""
+        cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
+        mean = MEAN.get(self.shape, self.duty)
+        along = profile(x_m * cosine + y_m * sine, blur_m, self.pitch_x_m, self.shape, self.duty)
+        across = profile(y_m * cosine - x_m * sine, blur_m, self.pitch_y_m, self.shape, self.duty)
+        sign = 1.0 if self.relief == 'posts' else -1.0
+        # (mean + along)·(mean + across) less its own mean
+        return sign * self.depth_m * (along * across + mean * (along + across))

@@ -1,0 +1,49 @@
+"""A surface: heights over a plane, as a soft finger feels them.
+
+A surface is a sum of terms. Each kind of term is a frozen dataclass with a method that gives its height at places
+(x, y), blurred by a Gaussian of standard deviation `blur_m`: what is finer than the contact is not felt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from texture_core.arrays import Array
+
+LEAST_BLUR_M, MOST_BLUR_M = 5e-5, 2e-3
+
+
+class Term(Protocol):
+    """A kind of relief."""
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the height felt at places, (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A named sum of terms."""
+
+    name: str
+    terms: tuple[Any, ...]
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the height felt at places.
+
+        Parameters
+        ----------
+        x_m, y_m : (..., n)
+        blur_m : (..., n), or (..., 1) where it stays the same
+
+        Returns
+        -------
+        (..., n) m, of zero mean over a large surface
+        """
+        blur_m = np.clip(blur_m, LEAST_BLUR_M, MOST_BLUR_M)
+        height = np.zeros(np.broadcast_shapes(x_m.shape, y_m.shape, blur_m.shape))
+        for term in self.terms:
+            height += term.height_m(x_m, y_m, blur_m)
+        return height

@@ -1,0 +1,60 @@
+"""Cloth: yarns that go over and under each other."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+
+# Plane waves of 6 to 18 mm that shift the yarns from their even places.
+WAVES_1_M = 2 * np.pi * np.array([[90.0, 40.0], [-55.0, 130.0], [60.0, -75.0], [25.0, 50.0]])
+PHASES = np.array([[0.7, 2.6, 4.4, 1.1], [5.9, 0.2, 3.3, 2.0]])
+
+
+@dataclass(frozen=True)
+class Weave:
+    """Two sets of yarns: those met when sliding along x stand `pitch_x_m` apart.
+
+    Each set is a sine across its yarns. Over and under is one wave along the diagonal in a twill, and a chequerboard
+    in a plain weave (`repeat` 2). Each wave is blurred by its own factor, which is exact. `irregular_m` shifts the
+    yarns by slow waves, as in linen: its lines are broader the finer they are.
+    """
+
+    pitch_x_m: float = param(8e-4, 'Distance of the yarns met when sliding along x.', unit='m', low=5e-5, high=0.05)
+    pitch_y_m: float = param(8e-4, 'The same along y.', unit='m', low=5e-5, high=0.05)
+    thickness_x_m: float = param(1e-4, 'How far those met along x stand out.', unit='m', low=0.0, high=0.01)
+    thickness_y_m: float = param(1e-4, 'The same along y.', unit='m', low=0.0, high=0.01)
+    repeat: int = param(2, 'Yarns after which over and under repeat: 2 plain, more a twill.', low=2, high=12)
+    irregular_m: float = param(0.0, 'Standard deviation of the places of the yarns.', unit='m', low=0.0, high=0.005)
+    seed: int = param(0, 'Which of all such cloths.', low=0)
+
+    def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+        """Return the height felt at places, (..., n)."""
+        x_m, y_m = self._even(x_m, y_m)
+        across_x, across_y = 2 * np.pi / self.pitch_x_m * x_m, 2 * np.pi / self.pitch_y_m * y_m
+        weak_x = np.exp(-0.5 * (2 * np.pi * blur_m / self.pitch_x_m) ** 2)
+        weak_y = np.exp(-0.5 * (2 * np.pi * blur_m / self.pitch_y_m) ** 2)
+        height = 0.25 * self.thickness_x_m * weak_x * np.cos(across_x)
+        height += 0.25 * self.thickness_y_m * weak_y * np.cos(across_y)
+        weak = (weak_x * weak_y) ** (1 / self.repeat**2)
+        over = (
+            np.cos(across_x / 2) * np.cos(across_y / 2)
+            if self.repeat == 2
+            else 0.5 * np.cos((across_x + across_y) / self.repeat)
+        )
+        crossing: Array = height + 0.25 * (self.thickness_x_m + self.thickness_y_m) * weak * over
+        return crossing
+
+    def _even(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
+        """Return where places would lie if the yarns were even."""
+        if not self.irregular_m:
+            return x_m, y_m
+        turn = np.random.default_rng(self.seed).uniform(0, 2 * np.pi, PHASES.shape) + PHASES
+        scale = self.irregular_m * math.sqrt(2 / len(WAVES_1_M))
+        angles = [kx * x_m + ky * y_m for kx, ky in WAVES_1_M]
+        shift_x, shift_y = (sum(np.cos(a + p) for a, p in zip(angles, phases, strict=True)) for phases in turn)
+        return x_m + scale * shift_x, y_m + scale * shift_y

@@ -1,0 +1,130 @@
+"""What the skin of a finger feels along a path: the chain from places to the variation of the force on it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_simulation.effects.stages import ForceEffect, GrowthEffect, PathEffect, Scans, TextureEffect
+from texture_simulation.path import Path
+from texture_simulation.scene import Scene
+from texture_simulation.surfaces.surface import Surface
+
+SAMPLE_SIZE_M = 0.1  # where on the sample a slide begins is drawn from so much
+# A point of a fast path stands for the stretch up to the next: the texture is blurred by at least so much of the step.
+# Half of the sampling rate is then felt to 17 %, what would be folded down to nearly 0 Hz to 0.1 %.
+LEAST_BLUR_PER_STEP = 0.6
+
+
+class Touch:
+    """Follow the skin over one surface, block by block.
+
+    Parameters
+    ----------
+    scene, surface
+        How the finger feels, and what; the surface may be changed between blocks.
+    rng
+        All randomness: where a sample is touched, what the effects do.
+    rate_hz
+        Points of the path a second.
+    finger
+        Which individual of the sensor.
+    scans
+        () for one slide at a time, (count,) for many at once.
+    """
+
+    def __init__(
+        self, scene: Scene, surface: Surface, rng: np.random.Generator, rate_hz: float, *, finger: int, scans: Scans
+    ) -> None:
+        self.surface = surface
+        self._contact = scene.contact
+        self._rng = rng
+        self._scans = scans
+        self._finger = finger
+        self._before: tuple[Array, Array] | None = None
+        self._growths = scene.effects_of(GrowthEffect)
+        self._gains = scene.effects_of(TextureEffect)
+        self._through_path = [effect.start_path(rng, rate_hz, scans) for effect in scene.effects_of(PathEffect)]
+        self._through_force = [effect.start_force(rng, rate_hz, scans) for effect in scene.effects_of(ForceEffect)]
+        self.elsewhere()
+
+    def elsewhere(self) -> None:
+        """Let the sample lie otherwise from now on: no two touches meet the same place."""
+        self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._scans, 1))
+        self._before = None
+
+    def placed(self, path: Path) -> Path:
+        """Return where the skin goes on the sample."""
+        placed = path.moved(self._x_m, self._y_m)
+        for through in self._through_path:
+            placed = through(placed)
+        return placed
+
+    def variation_n(
+        self,
+        placed: Path,
+        own_blur_m: float | Array = 0.0,
+        offset_m: tuple[Array, Array] | None = None,
+    ) -> Array:
+        """Return by how much the shape of the surface changes the force on the skin; 0 in the air.
+
+        Parameters
+        ----------
+        placed
+            The next piece of the way, as `placed` returns it; n points.
+        own_blur_m, offset_m : (n_elements, 1)
+            Over what length each element of the finger averages by itself, and where it lies; of one element in the
+            middle of the finger, which may be as sharp as the contact, if not given.
+
+        Returns
+        -------
+        (..., n) or (..., n_elements, n)
+        """
+        if not len(placed):
+            return np.empty((*placed.x_m.shape[:-1], *np.shape(own_blur_m)[:-1], 0))
+        force_n = constant(placed.force_n)
+        blur_m, gain = self._grown(force_n)
+        blur_m = np.maximum(blur_m, LEAST_BLUR_PER_STEP * self._steps_m(placed))
+        for effect in self._gains:
+            gain = gain * effect.gain(placed, self._finger)
+        x_m, y_m = placed.x_m, placed.y_m
+        if offset_m is not None:
+            x_m, y_m = x_m[..., None, :] + offset_m[0], y_m[..., None, :] + offset_m[1]
+            blur_m, gain = np.hypot(blur_m[..., None, :], own_blur_m), gain[..., None, :]
+        variation_n = gain * self.surface.height_m(x_m, y_m, blur_m)
+        for through in self._through_force:
+            variation_n = through(placed, variation_n)
+        return np.asarray(variation_n)
+
+    def still_n(self, placed: Path, blur_m: float, offset_m: tuple[Array, Array]) -> Array:
+        """Return the same of slow elements at chosen points, (..., n_elements, n): without what shakes the skin."""
+        _, gain = self._grown(placed.force_n)
+        for effect in self._gains:
+            gain = gain * effect.gain(placed, self._finger)
+        x_m, y_m = placed.x_m[..., None, :] + offset_m[0], placed.y_m[..., None, :] + offset_m[1]
+        height = self.surface.height_m(x_m, y_m, np.full((1,), blur_m))
+        return np.asarray(gain[..., None, :] * height)
+
+    def _grown(self, force_n: Array) -> tuple[Array, Array]:
+        """Return blur and stiffness at forces."""
+        blur_m: Array = self._contact.blur_m * np.ones_like(force_n)
+        stiffness: Array = self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
+        for effect in self._growths:
+            blur_m, stiffness = blur_m * effect.blur_growth(force_n), stiffness * effect.gain_growth(force_n)
+        return blur_m, stiffness
+
+    def _steps_m(self, placed: Path) -> Array:
+        """Return how far it is from point to point, (..., n), or (..., 1) where that hardly matters."""
+        x_m, y_m = self._before or (placed.x_m[..., :1], placed.y_m[..., :1])
+        self._before = placed.x_m[..., -1:], placed.y_m[..., -1:]
+        step_x, step_y = np.diff(placed.x_m, prepend=x_m), np.diff(placed.y_m, prepend=y_m)
+        longest = np.abs(step_x).max(initial=0.0) + np.abs(step_y).max(initial=0.0)
+        if LEAST_BLUR_PER_STEP * longest < self._contact.blur_m / 2:
+            return np.zeros_like(placed.x_m[..., :1])
+        steps: Array = np.hypot(step_x, step_y)
+        return steps
+
+
+def constant(values: Array) -> Array:
+    """Return (..., 1) of values that numpy repeats without a copy, as `numpy.broadcast_to` does, else the values."""
+    return values[..., :1] if values.strides and values.strides[-1] == 0 and values.shape[-1] else values
