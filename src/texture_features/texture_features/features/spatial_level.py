@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +13,9 @@ from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
 from texture_features.feature import Windows
 from texture_features.line_spectrum import line_spectrum, without_force
+
+# A band is at least so wide: one beyond the lines takes part of the last.
+LEAST_LINES = 1e-3
 
 
 @dataclass(frozen=True)
@@ -46,23 +50,23 @@ class SpatialLevel:
     def __call__(self, windows: Windows) -> Array:
         """Return log(mean density + floor) of each band."""
         densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
-        speed = np.asarray(windows.speed_m_s)[..., None, None]
-        edges = np.geomspace(1.0 / self.longest_m, 1.0 / self.shortest_m, self.bands + 1)
-        # Line n (from 1) stands for the stretch from n - 1/2 to n + 1/2 lines.
-        at = np.clip(edges * (speed / hertz[0]) - 0.5, 0.0, len(hertz) - 1.0)
-        at[..., 1:] = np.minimum(np.maximum(at[..., 1:], at[..., :-1] + 1e-3), len(hertz))
-        lines = np.diff(at, axis=-1)
-        power = np.diff(_up_to(densities, np.broadcast_to(at, (*densities.shape[:-1], self.bands + 1))), axis=-1)
+        speed = np.asarray(windows.speed_m_s)[..., None, None, None]
+        # Line n, from 0, stands for the stretch from n to n + 1; edges are in lines, too.
+        edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
+        low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
+        high = np.minimum(np.maximum(edges[..., 1:, :], low + LEAST_LINES), len(hertz))
+        line = np.arange(len(hertz), dtype=np.float64)
+        share = np.maximum(np.minimum(high, line + 1.0) - np.maximum(low, line), 0.0)
+        mean = np.add.reduce(share * densities[..., None, :], axis=-1) / (high - low)[..., 0]
         # Density per wave per metre: the same power on a stretch that is speed times narrower.
-        return without_force(np.log(np.maximum(power / lines, 0.0) * speed + self.floor), windows, self.force_exponent)
+        return without_force(np.log(mean * speed[..., 0] + self.floor), windows, self.force_exponent)
 
 
-def _up_to(densities: Array, at: Array) -> Array:
-    """Return the sum of densities, (..., n_lines), up to fractions of lines, (..., n_places)."""
-    total = np.zeros((*densities.shape[:-1], densities.shape[-1] + 1))
-    np.cumsum(densities, axis=-1, out=total[..., 1:])
-    known = np.isfinite(at)  # an unknown speed gives NaN in the end
-    low = np.minimum(np.where(known, at, 0.0).astype(np.intp), densities.shape[-1] - 1)
-    below = np.take_along_axis(total, low, axis=-1)
-    summed: Array = below + (at - low) * np.take_along_axis(densities, low, axis=-1)
-    return summed
+@lru_cache(maxsize=64)
+def _edges_1_m(feature: SpatialLevel) -> Array:
+    """Return the edges of the bands in waves per metre, (bands + 1, 1)."""
+    edges: Array = np.asarray(
+        np.geomspace(1.0 / feature.longest_m, 1.0 / feature.shortest_m, feature.bands + 1), dtype=np.float64
+    )[:, None]
+    edges.flags.writeable = False
+    return edges

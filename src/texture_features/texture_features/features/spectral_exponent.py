@@ -10,14 +10,17 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.line_spectrum import line_spectrum
+from texture_features.line_spectrum import at_reference_speed, line_spectrum
+
+TINY = 1e-300
 
 
 @dataclass(frozen=True)
 class SpectralExponent:
     """Exponent s of the power spectral density 1/f^s, by least squares in double logarithms.
 
-    A power law keeps its exponent when the finger goes faster. 0 if fewer than two lines lie in the band.
+    A power law keeps its exponent when the finger goes faster; where the spectrum of a surface is none, the same waves
+    of the surface must be looked at: `at_speed_m_s` moves the band with the speed. 0 if fewer than two lines lie in it.
 
     Source: Toscani & Metzger 2022.
     """
@@ -28,6 +31,9 @@ class SpectralExponent:
     low_hz: float = param(60.0, 'Lower end of the band.', unit='Hz', low=0.0, high=1e6)
     high_hz: float = param(420.0, 'Upper end of the band.', unit='Hz', low=0.0, high=1e6)
     rate_of_change: bool = param(False, 'The signal is the rate of change of what touches: adds 2 to the exponent.')
+    at_speed_m_s: float = param(
+        0.0, 'The band holds at this speed and moves with it; 0: it stands.', unit='m/s', low=0.0, high=10.0
+    )
     floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
 
     @property
@@ -38,12 +44,15 @@ class SpectralExponent:
     def __call__(self, windows: Windows) -> Array:
         """Return s."""
         densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
-        within = (hertz >= self.low_hz) & (hertz <= self.high_hz)
-        octaves = np.log(hertz[within])
-        if len(octaves) < 2:
-            return np.zeros((*densities.shape[:-1], 1))
-        weights = octaves - octaves.mean()
-        weights /= weights @ weights
-        logs = np.log(densities[..., within] + self.floor)
-        slope: Array = np.add.reduce(logs * weights, axis=-1, keepdims=True)
+        felt = at_reference_speed(hertz, windows, self.at_speed_m_s)
+        within = np.where((felt >= self.low_hz) & (felt <= self.high_hz), 1.0, np.where(np.isnan(felt), np.nan, 0.0))
+        logs = np.log(hertz)
+        middle = _total(within * logs) / (_total(within) + TINY)
+        weights = within * (logs - middle)
+        slope: Array = _total(weights * np.log(densities + self.floor)) / (_total(weights * logs) + TINY)
         return -slope
+
+
+def _total(values: Array) -> Array:
+    total: Array = np.add.reduce(values, axis=-1, keepdims=True)
+    return total
