@@ -1,0 +1,1 @@
+"""What judges a half in a search, one learner a file; `catalogue` lists them."""

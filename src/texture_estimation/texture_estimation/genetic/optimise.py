@@ -1,0 +1,202 @@
+"""Find the best recipe of a space on labelled slides."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from texture_estimation.genetic.cost import operations
+from texture_estimation.genetic.division import Division
+from texture_estimation.genetic.feature_cache import FeatureCache
+from texture_estimation.genetic.fitness import fitness
+from texture_estimation.genetic.judges.catalogue import judge_of
+from texture_estimation.genetic.memory import Memory
+from texture_estimation.genetic.recipe_space import RecipeSpace
+from texture_estimation.genetic.recipe_trial import RecipeTrial
+from texture_estimation.genetic.search import Found, Generation, Scored, SearchParams, search
+from texture_estimation.genetic.spread import Spread, in_turn
+from texture_estimation.genetic.trial import Record
+from texture_estimation.genetic.variables import Individual
+from texture_estimation.recipe import Recipe
+from texture_features.feature_set import FeatureSet
+
+# Best individuals of the last generation that are judged again by the learner itself.
+FINALISTS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Finalist:
+    """A recipe judged by its own learner on every half.
+
+    Parameters
+    ----------
+    recipe
+        As a file would hold it.
+    searched
+        Score and cost in the search.
+    record
+        Learning and test accuracy on each half, by the learner itself.
+    """
+
+    recipe: Recipe
+    searched: Scored
+    record: Record
+
+    @property
+    def fitness(self) -> float:
+        """Mean of learning and test accuracy over all halves."""
+        return fitness(self.record.learning, self.record.test)
+
+
+@dataclass(frozen=True, eq=False)
+class Optimised:
+    """What was found.
+
+    Parameters
+    ----------
+    best
+        The finalist with the highest fitness.
+    finalists
+        The best of the search, or the whole front of accuracy and cost; best first.
+    found
+        What the search says of its last generation.
+    memory
+        All scores.
+    """
+
+    best: Finalist
+    finalists: tuple[Finalist, ...]
+    found: Found
+    memory: Memory
+
+
+def optimise(
+    space: RecipeSpace,
+    division: Division,
+    params: SearchParams,
+    *,
+    features: FeatureCache | None = None,
+    spread: Spread = in_turn,
+    checkpoint: str | Path | None = None,
+    resume: str | Path | None = None,
+    tell: Callable[[Generation], None] = lambda _: None,
+) -> Optimised:
+    """Search the space with quick judges, then judge the best again with the learner itself.
+
+    Parameters
+    ----------
+    space
+        The recipe, and what of it is varied. The recipe itself takes part in the first generation.
+    division
+        Slides and their halves; with as many halves as `params` has, and its seed.
+    params
+        Population, generations and so on.
+    features
+        Of earlier searches on the same slides.
+    spread
+        Over cores or a cluster.
+    checkpoint, resume
+        File that is written after each generation, and file that is read first.
+    tell
+        Called after each generation.
+    """
+    plan = _Plan(space, division, features or FeatureCache(division.examples), spread)
+    memory = Memory(plan.identity)
+    if resume:
+        memory.load(resume)
+
+    def after_generation(generation: Generation) -> None:
+        if checkpoint:
+            memory.save(checkpoint)
+        tell(generation)
+
+    found = search(
+        space.variables,
+        plan.trials,
+        params,
+        memory,
+        start=[space.of_base()],
+        cost=plan.cost if params.objective == 'front' else lambda _: 0.0,
+        spread=spread,
+        tell=after_generation,
+    )
+    chosen = found.front if params.objective == 'front' else found.ranked[:FINALISTS]
+    finalists = plan.judged_exactly(chosen)
+    return Optimised(finalists[0], finalists, found, memory)
+
+
+class _Plan:
+    """Trials, costs and exact judgements of individuals."""
+
+    def __init__(self, space: RecipeSpace, division: Division, features: FeatureCache, spread: Spread) -> None:
+        self._space, self._division, self._features, self._spread = space, division, features, spread
+        self.cost = lru_cache(maxsize=None)(self._cost)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """What the scores of this search belong to."""
+        examples = self._division.examples(self._space.base.training_windows)
+        recipe = json.dumps(self._space.base.as_mapping(), sort_keys=True)
+        return {
+            'recipe': hashlib.sha256(recipe.encode()).hexdigest()[:8],
+            'variables': {name: repr(axis) for name, axis in self._space.axes.items()},
+            'slides': examples.digest,
+            'surfaces': list(examples.names),
+            'halves': self._division.n_halves,
+            'seed': self._division.seed,
+        }
+
+    def trials(self, individuals: Sequence[Individual], *, quick: bool = True) -> list[RecipeTrial]:
+        """Return the trials of individuals."""
+        recipes = [self._space.recipe(individual) for individual in individuals]
+        described = self._features.many([_as_learnt(recipe) for recipe in recipes], self._spread)
+        return [self._trial(recipe, values, quick) for recipe, values in zip(recipes, described, strict=True)]
+
+    def judged_exactly(self, chosen: Sequence[Scored]) -> tuple[Finalist, ...]:
+        """Return the recipes with the scores of their learners on all halves, best first."""
+        trials = self.trials([one.individual for one in chosen], quick=False)
+        n_halves = self._division.n_halves
+        cases = [(trial, number) for trial in trials for number in range(n_halves)]
+        scores = self._spread(_one_half, cases)
+        finalists = []
+        for place, one in enumerate(chosen):
+            mine = scores[place * n_halves : (place + 1) * n_halves]
+            recipe = self._space.recipe(one.individual)
+            finalists.append(Finalist(recipe, one, Record.of(mine)))
+        return tuple(sorted(finalists, key=lambda finalist: -finalist.fitness))
+
+    def _trial(self, recipe: Recipe, values: Any, quick: bool) -> RecipeTrial:
+        windows = recipe.training_windows
+        examples = self._division.examples(windows)
+        return RecipeTrial(
+            judge=judge_of(recipe.learner_name, quick=quick),
+            learner=recipe.learner,
+            rule=recipe.evidence,
+            values=values,
+            codes=examples.codes,
+            slides=examples.slides,
+            halves=self._division.halves(windows),
+            hop_share=windows.hop_s / windows.length_s,
+        )
+
+    def _cost(self, individual: Individual) -> float:
+        recipe = self._space.recipe(individual)
+        examples = self._division.examples(recipe.training_windows)
+        n_samples = sum(item.samples[0].size for item in examples.inputs.values())
+        n_values = self._features.values(_as_learnt(recipe)).shape[1]
+        return operations(recipe, n_samples, n_values, len(examples.names), len(examples.codes) // 2)
+
+
+def _as_learnt(recipe: Recipe) -> FeatureSet:
+    return dataclasses.replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+
+
+def _one_half(case: tuple[RecipeTrial, int]) -> tuple[float, float]:
+    trial, number = case
+    return trial.start()(number)

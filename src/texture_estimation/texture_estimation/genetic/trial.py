@@ -1,0 +1,107 @@
+"""One individual on trial: judged on half after half, until it has lost or all halves are done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
+
+import numpy as np
+from scipy.stats import t as student_t
+
+from texture_core.arrays import Array
+
+Half = Callable[[int], tuple[float, float]]  # number of a half → learning and test score
+# Halves after which an individual may have lost; the first look is for the hopeless.
+LOOKS = (2, 4, 7, 12)
+# Probability, at each look, of giving up one that is as good as its rival; it is ranked by its estimate even so.
+RISK = 0.05
+# Shares come in steps: two differences may be equal by chance, and seem to have no scatter at all.
+LEAST_SCATTER = 0.005
+
+
+class Trial(Protocol):
+    """What an individual needs to be judged; plain data that may travel to another process."""
+
+    def start(self) -> Half:
+        """Prepare what all halves share, such as a matrix of distances, and return what judges one half."""
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """Learning and test scores on the first halves, (n_done,) each; fewer than all if the individual lost."""
+
+    learning: Array
+    test: Array
+
+    @classmethod
+    def of(cls, scores: Sequence[tuple[float, float]]) -> Record:
+        """Return the record of (learning, test) scores of the first halves."""
+        learning, test = np.array(scores, dtype=np.float64).reshape(-1, 2).T
+        return cls(learning, test)
+
+    @property
+    def means(self) -> Array:
+        """Mean of learning and test score on each half, (n_done,)."""
+        mean: Array = (self.learning + self.test) / 2.0
+        return mean
+
+    @property
+    def halves(self) -> int:
+        """How many halves were done."""
+        return len(self.test)
+
+
+EMPTY = Record(np.zeros(0), np.zeros(0))
+
+
+def judge(trial: Trial, known: Record, rival: Array | None, n_halves: int) -> Record:
+    """Judge an individual on the halves until it has clearly lost against its rival, or all are done.
+
+    Individuals are compared half by half, each half being the same for all: differences scatter far less than scores.
+
+    Parameters
+    ----------
+    trial
+        Of the individual; not started if all that is needed is known.
+    known
+        Scores that are remembered.
+    rival : (n_halves,) or None
+        Mean scores on each half of one that is to be beaten; None: all halves are done.
+    n_halves
+        How many there are.
+    """
+    scores = list(zip(known.learning.tolist(), known.test.tolist(), strict=True))
+    half: Half | None = None
+    for number in range(n_halves):
+        if rival is not None and number in LOOKS and has_lost(Record.of(scores).means[:number], rival[:number]):
+            break
+        if number >= len(scores):
+            half = half or trial.start()
+            scores.append(half(number))
+    return Record.of(scores)
+
+
+def verdict(record: Record, rival: Array | None, n_halves: int) -> tuple[float, int]:
+    """Return the fitness and the halves it rests on, as `judge` would have found them: what else is known is not used.
+
+    One that lost is placed below its rival by their mean difference on the halves that both did.
+    """
+    for number in range(1, n_halves):
+        means = record.means[:number]
+        if rival is not None and number in LOOKS and has_lost(means, rival[:number]):
+            return float(rival.mean() + (means - rival[:number]).mean()), number
+    return float(record.means[:n_halves].mean()), n_halves
+
+
+def has_lost(means: Array, rival: Array) -> bool:
+    """Tell whether an individual is worse than its rival beyond chance (paired, one-sided t test)."""
+    difference = means - rival
+    spread = max(float(difference.std(ddof=1)), LEAST_SCATTER) / np.sqrt(len(difference))
+    return bool(difference.mean() + _quantile(len(difference) - 1) * spread < 0.0)
+
+
+@lru_cache
+def _quantile(freedom: int) -> float:
+    return float(student_t.ppf(1.0 - RISK, freedom))
