@@ -20,7 +20,7 @@ def model(surface: str) -> BioTacModel:
 
 
 def slide(n_frames: int, speed_m_s: float = 0.0, force_n: float = 2.0) -> Path:
-    time_s = np.arange(n_frames * 88) / PATH_RATE_HZ
+    time_s = np.arange(n_frames * len(BIOTAC.slots)) / PATH_RATE_HZ
     return Path(speed_m_s * time_s, np.zeros_like(time_s), np.full_like(time_s, force_n))
 
 
@@ -64,6 +64,6 @@ def test_cutting_the_path_into_blocks_changes_nothing() -> None:
     whole = model('ridges').advance(path)
     pieces, parts = model('ridges'), []
     for first in range(0, 40, 8):
-        points = np.arange(first * 88, (first + 8) * 88)
+        points = np.arange(first * len(BIOTAC.slots), (first + 8) * len(BIOTAC.slots))
         parts.append(pieces.advance(path.at(points)))
     assert (np.concatenate(parts) == whole).all()

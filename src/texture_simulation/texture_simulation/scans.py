@@ -14,7 +14,7 @@ from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
 from texture_simulation.sliding import Sliding
 
-POINTS_AT_ONCE = 16_000  # so that what is computed stays in the processor's cache
+POINTS_AT_ONCE = 40_000  # so that what is computed stays in the processor's cache
 
 
 def scans(

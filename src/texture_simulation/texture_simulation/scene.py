@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import yaml
@@ -52,12 +53,17 @@ class Scene:
 
     def effects_of(self, stage: Any) -> list[Any]:
         """Return the effects that act at a stage (`effects/stages.py`), in the order of the catalogue."""
-        return [self.effects[name] for name in EFFECTS if isinstance(self.effects.get(name), stage)]
+        return [self.effects[name] for name in EFFECTS if name in self.effects and _acts_at(EFFECTS[name], stage)]
 
     def without(self, effect: str) -> Scene:
         """Return the same scene with one of its effects off."""
         find(self.effects, effect, 'effect of this scene')
         return replace(self, effects={name: kept for name, kept in self.effects.items() if name != effect})
+
+
+@cache
+def _acts_at(effect: type, stage: type) -> bool:
+    return issubclass(effect, stage)  # asks for the stage's methods, which takes its time
 
 
 def load_scene(name_or_path: str) -> Scene:
