@@ -1,0 +1,126 @@
+import math
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidParameter, UnknownName
+from texture_simulation.path import Path
+from texture_simulation.stick_slip.border import BORDERS, MARGIN, Phase, border_s, check_step
+from texture_simulation.stick_slip.bristle import jacobian
+from texture_simulation.stick_slip.friction import StickSlip
+from texture_simulation.stick_slip.integrators import INTEGRATORS
+from texture_simulation.stick_slip.reference import solve
+from texture_simulation.stick_slip.simulate import drag, pull_n
+from texture_simulation.stick_slip.tip_drag import TipDrag
+from texture_simulation.stick_slip.trial import found_border_s
+
+USUAL = StickSlip()
+RATE_HZ = 2000.0
+
+
+@pytest.mark.parametrize('method', INTEGRATORS)
+@pytest.mark.parametrize('phase', Phase)
+def test_the_border_of_stability_is_found_where_it_was_predicted(method: str, phase: Phase) -> None:
+    slip_m_s = 0.0 if phase is Phase.STICK else 0.4
+    predicted_s = BORDERS[method](USUAL, slip_m_s, 2.0)
+    between = (predicted_s / 3, predicted_s * 3) if math.isfinite(predicted_s) else (1e-5, 0.1)
+    found_s = found_border_s(method, USUAL, phase, 2.0, slip_m_s=0.4, between_s=between)
+    assert found_s == pytest.approx(predicted_s, rel=0.02)
+
+
+def test_the_border_of_euler_falls_with_the_stiffness_and_that_of_the_default_does_not() -> None:
+    soft, stiff = StickSlip(bristle_1_m=1e5), StickSlip(bristle_1_m=1e7)
+    assert border_s('explicit_euler', stiff, 0.1, 1.0) < 0.02 * border_s('explicit_euler', soft, 0.1, 1.0)
+    assert border_s('semi_implicit', stiff, 0.1, 1.0) == border_s('semi_implicit', soft, 0.1, 1.0)
+
+
+def test_eigenvalues_at_rest_are_those_of_a_mass_on_bristles_and_skin() -> None:
+    roots = jacobian(USUAL, 0.0, 2.0)
+    stiffness = USUAL.skin_n_m + 2.0 * USUAL.bristle_1_m
+    damping = USUAL.skin_n_s_m + 2.0 * USUAL.bristle_s_m
+    expected = np.append(np.roots([USUAL.mass_kg, damping, stiffness]), 0.0)
+    assert np.allclose(np.sort_complex(np.linalg.eigvals(roots)), np.sort_complex(expected), atol=1e-3)
+
+
+@pytest.mark.parametrize('method', INTEGRATORS)
+def test_a_step_beyond_the_border_is_refused_with_what_is_allowed(method: str) -> None:
+    allowed_s = MARGIN * border_s(method, USUAL, 0.1, 2.0)
+    check_step(method, USUAL, 0.99 * allowed_s, 0.1, 2.0)
+    with pytest.raises(InvalidParameter, match=f'{method} allows at most .* take a shorter step_s'):
+        drag(USUAL, np.full(3, 0.1), np.full(3, 2.0), 1.01 * allowed_s, method=method)
+
+
+def test_no_step_and_unknown_methods_are_refused() -> None:
+    with pytest.raises(InvalidParameter, match='must be above 0'):
+        check_step('semi_implicit', USUAL, 0.0, 0.1, 1.0)
+    with pytest.raises(UnknownName, match="did you mean 'semi_implicit'"):
+        check_step('semi_implicitt', USUAL, 1e-4, 0.1, 1.0)
+    with pytest.raises(InvalidParameter, match='allows at most'):
+        TipDrag(StickSlip(step_s=0.05), RATE_HZ)
+
+
+def test_all_integrators_come_to_the_reference_as_the_step_shrinks() -> None:
+    friction, speed_m_s, force_n = StickSlip(bristle_1_m=3e4, stribeck_m_s=0.03), 0.1, 1.0
+    times_s = np.arange(1, 61) * 1e-3
+    exact = solve(friction, speed_m_s, force_n, times_s, tolerance=1e-8).tip
+    expected_n = pull_n(friction, exact, np.full(60, speed_m_s))
+    for method in INTEGRATORS:
+        errors = []
+        for steps in (100, 400):
+            drive = np.full(60 * steps, speed_m_s)
+            tip = drag(
+                friction, drive, np.full_like(drive, force_n), 1e-3 / steps, method=method, force_before_n=force_n
+            )
+            errors.append(np.abs(pull_n(friction, tip, drive)[steps - 1 :: steps] - expected_n).max())
+        assert errors[1] < 0.05 * np.ptp(expected_n), method
+        assert errors[1] < 0.4 * errors[0] or errors[1] < 1e-5, method
+
+
+def test_both_solvers_of_scipy_agree() -> None:
+    times_s = np.arange(1, 21) * 1e-3
+    tips = [solve(USUAL, 0.1, 1.0, times_s, method=method, tolerance=1e-7).tip for method in ('lsoda', 'radau')]
+    assert np.allclose(tips[0].stretch_m, tips[1].stretch_m, rtol=1e-3)
+
+
+def along_x(x_m: np.ndarray, force_n: float = 2.0) -> Path:
+    return Path(x_m, np.zeros_like(x_m), np.full_like(x_m, force_n))
+
+
+def test_a_path_in_blocks_feels_like_the_whole() -> None:
+    path = along_x(0.05 / RATE_HZ * np.arange(600))
+    whole = TipDrag(USUAL, RATE_HZ).advance(path)
+    follower = TipDrag(USUAL, RATE_HZ)
+    parts = [follower.advance(path.at(slice(first, first + 7))) for first in range(0, 600, 7)]
+    assert np.allclose(np.concatenate(parts), whole, atol=1e-12)
+    assert not len(follower.advance(along_x(np.zeros(0))))
+
+
+def test_back_the_way_it_came_the_skin_is_pulled_the_other_way_even_after_a_rest() -> None:
+    friction = StickSlip(skin_n_s_m=20.0)
+    there = 0.1 / RATE_HZ * np.arange(800)
+    way = np.concatenate([there, np.full(200, there[-1]), there[::-1]])
+    felt = TipDrag(friction, RATE_HZ).advance(along_x(way)) / friction.felt
+    assert felt[700] == pytest.approx(2.0 * 0.5, rel=0.05)
+    assert felt[-50] == pytest.approx(-2.0 * 0.5, rel=0.05)
+
+
+def test_the_direction_of_a_way_does_not_matter() -> None:
+    way = 0.05 / RATE_HZ * np.arange(400)
+    straight = TipDrag(USUAL, RATE_HZ).advance(along_x(way))
+    oblique = TipDrag(USUAL, RATE_HZ).advance(Path(-0.6 * way, 0.8 * way, np.full(400, 2.0)))
+    assert np.allclose(straight, oblique, atol=1e-9)
+
+
+def test_many_slides_at_once_are_each_as_alone() -> None:
+    rng = np.random.default_rng(0)
+    way = np.cumsum(rng.normal(2e-5, 2e-5, (3, 300)), axis=-1)
+    paths = Path(way, np.zeros_like(way), rng.uniform(0.0, 3.0, (3, 300)))
+    together = TipDrag(USUAL, RATE_HZ).advance(paths)
+    for i in range(3):
+        alone = TipDrag(USUAL, RATE_HZ).advance(Path(way[i], 0 * way[i], paths.force_n[i]))
+        assert np.allclose(together[i], alone)
+
+
+def test_a_finger_put_elsewhere_has_not_slid() -> None:
+    way = np.concatenate([np.zeros(50), np.ones(50)])
+    assert not TipDrag(USUAL, RATE_HZ).advance(along_x(way)).any()

@@ -1,0 +1,36 @@
+"""The vibration of a slowly dragged tip, by formula: it sticks until the skin pulls enough, then slips half a swing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from texture_simulation.stick_slip.friction import StickSlip
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """How long a tip sticks and slips, and how far the force on the skin swings."""
+
+    stick_s: float
+    slip_s: float
+    swing_n: float
+
+    @property
+    def period_s(self) -> float:
+        """Time from one letting go to the next."""
+        return self.stick_s + self.slip_s
+
+
+def slow_drag(friction: StickSlip, speed_m_s: float, force_n: float) -> LimitCycle:
+    """Return the cycle of a drag that is slow against the Stribeck speed and the swing of the tip.
+
+    The tip lets go at static·force and swings about kinetic·force; without damping it comes to rest as far below, hence
+    the period 2·(static − kinetic)·force / (stiffness·speed) + half a period of the skin. Damping shortens the swing.
+    """
+    drop_n = (friction.static - friction.kinetic) * force_n
+    natural_1_s = math.sqrt(friction.skin_n_m / friction.mass_kg)
+    damping = min(friction.skin_n_s_m / (2 * friction.mass_kg * natural_1_s), 1 - 1e-9)
+    root = math.sqrt(1 - damping**2)
+    swing_n = drop_n * (1 + math.exp(-math.pi * damping / root))
+    return LimitCycle(swing_n / (friction.skin_n_m * speed_m_s), math.pi / (natural_1_s * root), swing_n)
