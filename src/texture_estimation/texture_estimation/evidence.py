@@ -55,18 +55,19 @@ class Evidence:
         self._end_ns = 0
         self._message = '' if self.model else NO_MODEL
         self._sum = np.zeros(len(self.model.labels) if self.model else 0)
+        self._zeros = np.zeros(len(self.model.names) if self.model else 0)
 
     def _judge(self, vector: FeatureVector, model: Model) -> None:
         if vector.feature_set != model.feature_set:
             self.refused += 1
             self._message = f"model '{model.name}' does not fit: {difference(vector.feature_set, model.feature_set)}"
             return
-        if math.isnan(vector.values @ np.zeros(len(vector.values))):  # faster than isfinite().all(): inf · 0 is NaN
+        if math.isnan(vector.values @ self._zeros):  # faster than isfinite().all(): inf · 0 is NaN
             self.not_finite += 1
             bad = vector.names[int((~np.isfinite(vector.values)).argmax())]
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
-        self._sum += model.recipe.evidence.voice(model.predict_log_proba(vector.values))
+        self._sum += model.recipe.evidence.voice(model.judge(vector.values))
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns

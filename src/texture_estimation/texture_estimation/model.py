@@ -15,7 +15,7 @@ from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch, TextureError
 from texture_estimation import model_files
 from texture_estimation.learners.learner import LogProbabilities
-from texture_estimation.log_probabilities import undecided
+from texture_estimation.log_probabilities import log_softmax, undecided
 from texture_estimation.recipe import Recipe
 
 # What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
@@ -60,7 +60,7 @@ class Model:
 
     def predict_log_proba(self, values: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        return self.judge(values)
+        return log_softmax(self.judge(values))
 
     def decide(self, values: Array) -> list[str]:
         """Return the label of each window alone, (n,) of (n, n_features); '' where several labels are equally good."""

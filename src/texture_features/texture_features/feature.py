@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -87,8 +88,17 @@ class Feature(Protocol):
 
 def centred(rows: Array) -> Array:
     """Return rows less their mean, (..., n_samples)."""
-    difference: Array = rows - np.add.reduce(rows, axis=-1, keepdims=True) / rows.shape[-1]
+    # A product with equal shares is the fastest mean, and has the same rounding for one row as for many.
+    difference: Array = rows - (rows @ shares(rows.shape[-1]))[..., None]
     return difference
+
+
+@lru_cache(maxsize=64)
+def shares(count: int) -> Array:
+    """Return 1 / count, `count` times: what a mean is a product with."""
+    equal = np.full(count, 1.0 / count)
+    equal.flags.writeable = False
+    return equal
 
 
 def power(rows: Array) -> Array:

@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import chain, groupby
 from typing import Any
 
@@ -43,7 +44,7 @@ class InputFeatures:
     topic: str
     features: tuple[tuple[str, Feature], ...]
 
-    @property
+    @cached_property
     def topics(self) -> tuple[str, ...]:
         """What is subscribed to."""
         return tuple(self.topic.split(JOINT))
@@ -107,7 +108,7 @@ class FeatureSet:
             'inputs': {item.topic: item.as_mapping() for item in self.inputs},
         }
 
-    @property
+    @cached_property
     def topics(self) -> tuple[str, ...]:
         """What the inputs need, in order, each once."""
         return tuple(dict.fromkeys(chain.from_iterable(item.topics for item in self.inputs)))

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from texture_estimation.learners.ann_pairs import AnnPairs
 from texture_estimation.learners.em_mixture import EmMixture
 from texture_estimation.learners.learner import Learner
+from texture_estimation.learners.mlp import Mlp
 from texture_estimation.learners.naive_bayes import NaiveBayes
 from texture_estimation.learners.passive_aggressive import PassiveAggressive
 from texture_estimation.learners.svm_linear import SvmLinear
@@ -15,6 +16,7 @@ from texture_estimation.learners.svm_pairs import SvmPairs
 from texture_estimation.learners.svm_rbf import SvmRbf
 
 LEARNERS: Mapping[str, type[Learner]] = {
+    'mlp': Mlp,  # one hidden layer, softmax, calibrated
     'svm_rbf': SvmRbf,  # Cortes & Vapnik 1995, one against one, calibrated
     'ann_pairs': AnnPairs,  # Roberge et al.
     'svm_pairs': SvmPairs,  # Roberge et al.

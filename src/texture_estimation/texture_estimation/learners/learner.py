@@ -18,7 +18,7 @@ class LogProbabilities(Protocol):
     """What judges windows, as plain arrays."""
 
     def __call__(self, values: Array) -> Array:
-        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
+        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.spectrum import densities_of, mean_over_segments
+from texture_features.spectrum import mean_densities
 
 
 @dataclass(frozen=True)
@@ -38,5 +38,5 @@ class LowLines:
     def __call__(self, windows: Windows) -> Array:
         """Return log(mean density + floor)."""
         segment = 2 * (self.points // 2)
-        densities = densities_of(windows, segment, segment // 2, self._count)
-        return np.log(mean_over_segments(densities) + self.floor)
+        densities = mean_densities(windows.centred_rows, windows.rate_hz, segment, segment // 2, self._count)
+        return np.log(densities + self.floor)

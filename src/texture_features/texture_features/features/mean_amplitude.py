@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from texture_core.arrays import Array
+from texture_core.parameters import param
 from texture_features.feature import Windows
 
 
@@ -20,13 +21,16 @@ class MeanAmplitude:
 
     of_signal: ClassVar[bool] = True
 
+    logarithm: bool = param(False, 'Give the logarithm.')
+    floor: float = param(1e-10, 'Amplitude added before the logarithm, unit.', low=1e-300, high=1e300)
+
     @property
     def names(self) -> tuple[str, ...]:
         """One value without a name of its own."""
         return ('',)
 
     def __call__(self, windows: Windows) -> Array:
-        """Return mean |s - mean(s)|."""
+        """Return mean |s - mean(s)|, or its logarithm."""
         rows = np.abs(windows.centred_rows)
-        amplitudes: Array = np.add.reduce(rows, axis=-1) / rows.shape[-1]
-        return amplitudes[..., None]
+        amplitudes: Array = np.add.reduce(rows, axis=-1, keepdims=True) / rows.shape[-1]
+        return np.log(amplitudes + self.floor) if self.logarithm else amplitudes

@@ -1,0 +1,52 @@
+"""The multilayer perceptron against what mathematics says of it."""
+
+import numpy as np
+import pytest
+
+from texture_estimation.learners.mlp import Mlp, _first_weights, _slopes
+from texture_estimation.log_probabilities import log_loss, log_softmax
+
+
+def test_slopes_are_the_derivatives_of_the_cross_entropy():
+    rng = np.random.default_rng(0)
+    weights = [part.astype(np.float64) for part in _first_weights(3, 5, 4, rng)]
+    inputs, codes = rng.standard_normal((7, 3)), rng.integers(0, 4, 7)
+
+    def loss():
+        active = np.maximum(inputs @ weights[0] + weights[1], 0)
+        return log_loss(log_softmax(active @ weights[2] + weights[3]), codes)
+
+    slopes = _slopes(weights, inputs, np.eye(4)[codes])
+    for weight, slope in zip(weights, slopes, strict=True):
+        place = (0,) * weight.ndim
+        weight[place] += 1e-6
+        above = loss()
+        weight[place] -= 2e-6
+        below = loss()
+        weight[place] += 1e-6
+        assert slope[place] == pytest.approx((above - below) / 2e-6, abs=1e-7)
+
+
+def test_two_overlapping_clouds_are_told_apart_as_well_as_can_be_and_no_better_is_claimed():
+    rng = np.random.default_rng(1)
+    codes = np.tile([0, 1], 1000)
+    values = rng.standard_normal((2000, 2)) + codes[:, None] * [1.0, 0.0]
+    fitted = Mlp(hidden=16).fit(values, codes, np.arange(2000))
+    right = (fitted.held_out.argmax(axis=1) == codes).mean()
+    assert right == pytest.approx(0.691, abs=0.03)  # Φ(1/2)
+    assert np.exp(fitted.held_out.max(axis=1)).mean() == pytest.approx(right, abs=0.03)
+
+
+def test_a_feature_that_was_constant_is_ignored_and_units_do_not_matter(examples):
+    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+    values = np.column_stack([examples.values, np.full(len(codes), 7.0)])
+    judge = Mlp.array_form(Mlp(epochs=5).fit(values, codes, groups).parts)
+    assert judge(values + np.eye(values.shape[1])[-1] * 1e9) == pytest.approx(judge(values), abs=1e-6)
+    in_micro = Mlp.array_form(Mlp(epochs=5).fit(values * 1e6, codes, groups).parts)
+    assert log_softmax(in_micro(values * 1e6)) == pytest.approx(log_softmax(judge(values)), abs=1e-3)
+
+
+def test_the_same_seed_learns_the_same(examples):
+    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+    first, again = (Mlp(epochs=2).fit(examples.values, codes, groups).parts for _ in range(2))
+    assert all(np.array_equal(first[name], again[name]) for name in first)

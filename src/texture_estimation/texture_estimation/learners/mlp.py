@@ -1,0 +1,162 @@
+"""Multilayer perceptron: one hidden layer, softmax output, trained with noise on its inputs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_estimation.learners.folds import divide
+from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.log_probabilities import log_loss, log_softmax
+
+Weights = list[NDArray[np.float32]]  # hidden: (n_features, hidden), (hidden,); output: (hidden, n_labels), (n_labels,)
+BATCH = 128
+LEAST_STEPS = 400
+RATE = 2e-3
+MEAN_DECAY, SQUARE_DECAY = 0.9, 0.999  # Kingma & Ba's
+TINY = np.float32(1e-8)
+
+
+@dataclass(frozen=True)
+class Mlp:
+    """Standardised features, one layer of rectifiers, softmax; probabilities calibrated on slides held out.
+
+    As accurate on recorded slides as an RBF support vector machine, at a cost that does not grow with the examples and
+    hardly with the labels. Noise on the standardised inputs takes the place of an early stop (Bishop 1995).
+
+    Source: Adam of Kingma & Ba 2015 with a rate that falls like a cosine; one temperature (Guo et al. 2017).
+    """
+
+    hidden: int = param(128, 'Units of the hidden layer.', low=1, high=4096)
+    noise: float = param(0.3, 'Standard deviation of the noise on standardised features.', low=0.0, high=10.0)
+    decay: float = param(0.01, 'Weight decay, over the number of examples.', low=0.0, high=1e6)
+    epochs: int = param(60, 'Passes over the examples.', low=1, high=100_000)
+    folds: int = param(5, 'Parts into which the slides are divided to calibrate.', low=2, high=50)
+    seed: int = param(0, 'Of the first weights, the order of the examples and the noise.', low=0)
+
+    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
+        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
+        n_labels = int(codes.max()) + 1
+        division = divide(codes, groups, self.folds)
+        if division is None:
+            return Fitted(self._fit(values, codes, n_labels), None, 'not calibrated, as a label has a single window')
+        parts, note = division
+        scores = np.empty((len(codes), n_labels))
+        for part in np.unique(parts):
+            held = parts == part
+            scores[held] = self.array_form(self._fit(values[~held], codes[~held], n_labels))(values[held])
+        best = minimize_scalar(
+            lambda log_t: log_loss(log_softmax(scores / math.exp(log_t)), codes), bounds=(-2.0, 4.0), method='bounded'
+        )
+        temperature = math.exp(best.x)
+        fitted = self._fit(values, codes, n_labels, temperature)
+        return Fitted(fitted, log_softmax(scores / temperature), note)
+
+    @staticmethod
+    def array_form(parts: Mapping[str, Any]) -> ArrayMlp:
+        """Return what judges, from the stored parts."""
+        return ArrayMlp(*(np.asarray(parts[name], dtype=np.float64) for name in ArrayMlp.__dataclass_fields__))
+
+    def _fit(self, values: Array, codes: Codes, n_labels: int, temperature: float = 1.0) -> dict[str, Array]:
+        """Return the layers, with standardisation and temperature worked into them."""
+        mean, scale = values.mean(axis=0), values.std(axis=0)
+        scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # what is constant tells nothing
+        weights = self._descend(((values - mean) / scale).astype(np.float32), codes, n_labels)
+        hidden, hidden_offset, output, output_offset = (part.astype(np.float64) for part in weights)
+        hidden /= scale[:, None]
+        return {
+            'hidden': hidden,
+            'hidden_offset': hidden_offset - mean @ hidden,
+            'output': output / temperature,
+            'output_offset': output_offset / temperature,
+        }
+
+    def _descend(self, inputs: NDArray[np.float32], codes: Codes, n_labels: int) -> Weights:
+        rng = np.random.default_rng(self.seed)
+        weights = _first_weights(inputs.shape[1], self.hidden, n_labels, rng)
+        truth = np.eye(n_labels, dtype=np.float32)[codes]
+        batches = -(-len(inputs) // BATCH)
+        steps = max(self.epochs * batches, LEAST_STEPS)
+        adam = _Adam(weights)
+        for step in range(steps):
+            if step % batches == 0:
+                order = rng.permutation(len(inputs))
+            rows = order[step % batches :: batches]
+            noisy = inputs[rows] + np.float32(self.noise) * rng.standard_normal(inputs[rows].shape, dtype=np.float32)
+            slopes = _slopes(weights, noisy, truth[rows])
+            for layer in (0, 2):
+                slopes[layer] += np.float32(self.decay / len(inputs)) * weights[layer]
+            adam.step(weights, slopes, RATE * 0.5 * (1.0 + math.cos(math.pi * step / steps)))
+        return weights
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayMlp:
+    """The two layers, made for features as they come.
+
+    Parameters
+    ----------
+    hidden : (n_features, n_hidden)
+    hidden_offset : (n_hidden,)
+    output : (n_hidden, n_labels)
+    output_offset : (n_labels,)
+    """
+
+    hidden: Array
+    hidden_offset: Array
+    output: Array
+    output_offset: Array
+
+    def __call__(self, values: Array) -> Array:
+        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
+        active = values @ self.hidden
+        active += self.hidden_offset
+        np.maximum(active, 0.0, out=active)
+        scores: Array = active @ self.output
+        scores += self.output_offset
+        return scores
+
+
+class _Adam:
+    """Steps along the slopes, each weight at its own pace."""
+
+    def __init__(self, weights: Weights) -> None:
+        self._means = [np.zeros_like(weight) for weight in weights]
+        self._squares = [np.zeros_like(weight) for weight in weights]
+        self._count = 0
+
+    def step(self, weights: Weights, slopes: Weights, rate: float) -> None:
+        """Change the weights in place."""
+        self._count += 1
+        pace = np.float32(rate * math.sqrt(1 - SQUARE_DECAY**self._count) / (1 - MEAN_DECAY**self._count))
+        for part, slope in enumerate(slopes):
+            self._means[part] += np.float32(1 - MEAN_DECAY) * (slope - self._means[part])
+            self._squares[part] += np.float32(1 - SQUARE_DECAY) * (slope * slope - self._squares[part])
+            weights[part] -= pace * self._means[part] / (np.sqrt(self._squares[part]) + TINY)
+
+
+def _first_weights(n_features: int, hidden: int, n_labels: int, rng: np.random.Generator) -> Weights:
+    """Return random layers that keep the size of the signals (He et al. 2015)."""
+    first = rng.standard_normal((n_features, hidden), dtype=np.float32) * np.float32(math.sqrt(2.0 / n_features))
+    second = rng.standard_normal((hidden, n_labels), dtype=np.float32) * np.float32(math.sqrt(1.0 / hidden))
+    return [first, np.zeros(hidden, np.float32), second, np.zeros(n_labels, np.float32)]
+
+
+def _slopes(weights: Weights, inputs: NDArray[np.float32], truth: NDArray[np.float32]) -> Weights:
+    """Return the derivatives of the mean cross-entropy, (n, n_features) and (n, n_labels)."""
+    hidden, hidden_offset, output, output_offset = weights
+    before = inputs @ hidden + hidden_offset
+    active = np.maximum(before, 0)
+    scores = active @ output + output_offset
+    odds = np.exp(scores - scores.max(axis=1, keepdims=True))
+    error = (odds / odds.sum(axis=1, keepdims=True) - truth) / np.float32(len(inputs))
+    back = (error @ output.T) * (before > 0)
+    return [inputs.T @ back, back.sum(axis=0), active.T @ error, error.sum(axis=0)]
