@@ -13,7 +13,7 @@ from texture_core.errors import InvalidData, InvalidParameter
 from texture_estimation.learners.ann_pairs import AnnPairs
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.em_mixture import EmMixture
-from texture_estimation.learners.levenberg_marquardt import Network, fit_network
+from texture_estimation.learners.levenberg_marquardt import Network, _by_examples, _by_weights, fit_network
 from texture_estimation.learners.naive_bayes import NaiveBayes
 from texture_estimation.learners.pair_votes import PairVotes
 from texture_estimation.learners.passive_aggressive import OnlinePlanes, PassiveAggressive
@@ -235,6 +235,19 @@ def test_votes_are_counted_and_a_tie_of_three_is_undecided():
     assert votes.won(first_wins).tolist() == [[2, 1, 0], [1, 1, 1], [1, 1, 1]]
     assert undecided(votes.won(first_wins)).tolist() == [False, True, True]
     assert votes.won_clearly(np.array([3.0, -1.0, 1.0])).argmax() == 0
+
+
+def test_a_step_is_the_same_by_weights_and_by_examples():
+    rng = np.random.default_rng(2)
+    network = Network.random(7, 3, rng)
+    values, residual = rng.normal(size=(20, 3)), rng.normal(size=20)
+    by_weights, by_examples = _by_weights(network, values), _by_examples(network, values)
+    steps = [
+        form.step(np.linalg.solve(form.curvature + 0.1 * np.eye(len(form.curvature)), form.slope(residual)))
+        for form in (by_weights, by_examples)
+    ]
+    np.testing.assert_allclose(by_weights.output, by_examples.output)
+    np.testing.assert_allclose(*steps, atol=1e-10)
 
 
 def test_the_jacobian_of_a_network_is_its_slope():

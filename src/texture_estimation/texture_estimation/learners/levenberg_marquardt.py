@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -99,20 +100,52 @@ def fit_network(network: Network, values: Array, targets: Array, held: NDArray[n
 
 def _step(network: Network, values: Array, targets: Array, damping: float) -> tuple[Network | None, float]:
     """Return the network after one step that lessens the error, and the next damping; None if there is no such step."""
-    output, jacobian = network.jacobian(values)
-    residual = targets - output
+    n_weights = network.hidden.size + 2 * len(network.out) + 1
+    linear = _by_examples(network, values) if n_weights > len(values) else _by_weights(network, values)
+    residual = targets - linear.output
     error = float(residual @ residual) / len(residual)
-    curvature = jacobian.T @ jacobian
-    slope = jacobian.T @ residual
+    curvature = linear.curvature
+    slope = linear.slope(residual)
     diagonal = np.diag_indices_from(curvature)
     own = curvature[diagonal]
     while damping <= MOST_DAMPING:
         curvature[diagonal] = own + damping
-        stepped = network.moved(np.asarray(np.linalg.solve(curvature, slope), dtype=np.float64))
+        solved: Array = np.asarray(np.linalg.solve(curvature, slope), dtype=np.float64)
+        stepped = network.moved(linear.step(solved))
         if _error(stepped, values, targets) < error:
             return stepped, max(damping * LESS, 1e-12)
         damping *= MORE
     return None, damping
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """A network near its weights: with Jacobian J and residual r, a step is (JᵀJ + μ)⁻¹ Jᵀr = Jᵀ(JJᵀ + μ)⁻¹ r."""
+
+    output: Array
+    curvature: Array
+    slope: Callable[[Array], Array]
+    step: Callable[[Array], Array]
+
+
+def _by_weights(network: Network, values: Array) -> _Linear:
+    """Return the first form, for fewer weights than examples."""
+    output, jacobian = network.jacobian(values)
+    return _Linear(output, jacobian.T @ jacobian, lambda residual: jacobian.T @ residual, lambda solved: solved)
+
+
+def _by_examples(network: Network, values: Array) -> _Linear:
+    """Return the second form, for fewer examples than weights; JJᵀ is made of its factors, without J."""
+    active = np.tanh(values @ network.hidden.T + network.hidden_bias)
+    by_bias = (1.0 - active * active) * network.out
+    curvature = (by_bias @ by_bias.T) * (values @ values.T + 1.0) + active @ active.T + 1.0
+
+    def step(solved: Array) -> Array:
+        weighted = by_bias * solved[:, None]
+        parts = ((weighted.T @ values).ravel(), weighted.sum(axis=0), solved @ active, solved.sum(keepdims=True))
+        return np.concatenate(parts)
+
+    return _Linear(active @ network.out + network.out_bias, curvature, lambda residual: residual, step)
 
 
 def _error(network: Network, values: Array, targets: Array) -> float:
