@@ -31,7 +31,7 @@ LEAK = ChargeLeak(tables.RESISTANCE_OHM, tables.CAPACITANCE_F, tables.D33_PC_N /
 # Eq. 5 for a force that is constant between points: the charge follows each step, and leaks by a constant share.
 KEPT = math.exp(-1 / (LEAK.time_constant_s * PATH_RATE_HZ))
 LEAK_SECTIONS = np.array([[1.0, -1.0, 0.0, 1.0, -KEPT, 0.0]])
-FILM_BAND = np.concatenate([filters.butter(2, 1000.0, 'lowpass', fs=PATH_RATE_HZ, output='sos'), LEAK_SECTIONS])
+FILM_BAND = np.concatenate([filters.butter(2, 800.0, 'lowpass', fs=PATH_RATE_HZ, output='sos'), LEAK_SECTIONS])
 FORCE_BAND = filters.butter(2, 20.0, 'lowpass', fs=PATH_RATE_HZ, output='sos')
 POINTS_PER_FORCE = round(PATH_RATE_HZ / tables.FORCE_RATE_HZ)
 LIMITS = (-(2**15), 2**15 - 1)
