@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from sklearn.svm import SVC
 
 from texture_core.errors import InvalidData, TextureError
 from texture_core.resources import folder
@@ -67,8 +68,6 @@ def test_a_constant_feature_gives_no_nan(name) -> None:
 
 
 def test_the_machines_decide_as_those_of_scikit_learn() -> None:
-    from sklearn.svm import SVC
-
     values, grades, textures = graded_windows(spread=3.0)
     head = Svm5(c=2.0, kernel_scale=1.5)
     parts = head.fit(values, grades, textures)
