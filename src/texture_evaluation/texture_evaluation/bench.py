@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from texture_core.catalogue import find
-from texture_evaluation.benches import biotac20, clock, latency, load, sensors
+from texture_evaluation.benches import biotac20, clock, latency, load, recipes, sensors
 from texture_evaluation.benches.result import Bench, BenchResult
 
 BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
+    'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates

@@ -165,6 +165,39 @@ def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], 
     return Path(path)
 
 
+def front_chart(
+    panels: Mapping[str, Mapping[str, tuple[float, float]]], title: str, axis_labels: tuple[str, str], path: str | Path
+) -> Path:
+    """Draw methods by cost and share of successes, a panel for each data set, and the front that no other betters.
+
+    Parameters
+    ----------
+    panels
+        Title of the panel → name of the method → its cost, on a logarithmic axis, and its share, 0 to 1.
+    """
+    names = list(dict.fromkeys(name for points in panels.values() for name in points))
+    with chart(path, (4.2 * len(panels) + 2.0, 4.8)) as figure:
+        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+        rows = figure.subplots(1, len(panels) + 1, squeeze=False, width_ratios=[4.2] * len(panels) + [2.0])[0]
+        for axes, (name, points) in zip(rows, panels.items(), strict=False):
+            _front(axes, points, names)
+            axes.set(xlabel=axis_labels[0], title=name, xscale='log')
+        rows[0].set_ylabel(axis_labels[1])
+        listed = '\n'.join(f'{number}  {name}' for number, name in enumerate(names, 1))
+        rows[-1].text(0.0, 1.0, listed, va='top', fontsize=8)
+        rows[-1].axis('off')
+    return Path(path)
+
+
+def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
+    """Return the points, by rising cost, of which no other has at most the cost and at least the share."""
+    front: list[int] = []
+    for index in sorted(range(len(points)), key=lambda index: (points[index][0], -points[index][1])):
+        if not front or points[index][1] > points[front[-1]][1]:
+            front.append(index)
+    return front
+
+
 def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, path: str | Path) -> Path:
     """Draw how values are spread, each group on its own row; the line stands at 99 % of them."""
     with chart(path, (7.0, 1.0 + 1.3 * len(series))) as figure:
@@ -191,6 +224,21 @@ def chart(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
         yield figure
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=DPI, bbox_inches='tight', pad_inches=0.12)
+
+
+def _front(axes: Any, points: Mapping[str, tuple[float, float]], names: Sequence[str]) -> None:
+    values = list(points.values())
+    best = pareto_front(values)
+    axes.step(
+        [values[index][0] for index in best], [100 * values[index][1] for index in best],
+        where='post', color=COLOURS[5], linewidth=1,
+    )  # fmt: skip
+    for index, (name, (cost, share)) in enumerate(points.items()):
+        axes.plot(cost, 100 * share, '.', color=COLOURS[5 if index in best else 0])
+        axes.annotate(
+            str(names.index(name) + 1), (cost, 100 * share), xytext=(3, 3), textcoords='offset points',
+            fontsize=8, fontweight='bold' if index in best else 'normal',
+        )  # fmt: skip
 
 
 def _styles() -> Iterator[dict[str, Any]]:

@@ -1,0 +1,251 @@
+"""Every recipe on the same recorded slides: how often it is right, how long it learns, and how long it thinks."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.resources import folder
+from texture_estimation.model import Model
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_evaluation import minirocket
+from texture_evaluation.benches.result import Bench, BenchResult
+from texture_evaluation.charts import front_chart
+from texture_evaluation.datasets.biotac20 import import_biotac20
+from texture_evaluation.datasets.ntp21 import import_ntp21
+from texture_evaluation.evaluate import judge
+from texture_evaluation.recipe_trials import (
+    LENGTH_S,
+    Division,
+    Recorded,
+    comparable,
+    division_by_time,
+    divisions_by,
+    random_divisions,
+    read_recorded,
+    try_recipe,
+)
+from texture_evaluation.train import with_channels
+
+VIBRATION, ALL_CHANNELS, ARRAY = 'biotac20, PAC at 1 kHz', 'biotac20, all channels', 'ntp21'
+DATA = {
+    'biotac20': 'BioTac, 20 materials × 40 slides of 6 s (github dexrob/BioTac_slide_20_50, Gao et al. 2020)',
+    'ntp21': 'MEMS array of 9 taxels, 21 textures × 4 speeds × 4 forces, one slide each (github LIMB-UCF/NTP)',
+}
+RATE_HZ, FOLDS, LAST_LEARNT = 1000.0, 5, 30
+QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_LEARNT = ('material01', 'material02', 'material03'), '1-6', 2, 4
+QUICK_RECIPES = ('default', 'ets-linear-svm-vote', 'kaboli-pa')
+TIMED_SLIDES = 40
+# They describe what only an array of taxels feels.
+NEEDS_ARRAY = frozenset({'any-speed'})
+# Published with the data, for all of its 50 slides a material: windows of 0.5 s of PAC at 1 kHz, five random folds by
+# slide, one window one vote over 5 s. Window, vote, and computing time of a window (µs).
+REFERENCES: Mapping[str, tuple[float, float | None, float | None]] = {
+    '5 spectral peaks, naive Bayes': (0.280, 0.439, None),
+    '8 spectral peaks, integral, length, RBF SVC': (0.506, 0.763, None),
+    'log PSD, PCA to 99 %, RBF SVC': (0.510, 0.858, None),
+    'Hjorth, SVC': (0.471, 0.684, None),
+    'catch22+2, SVC': (0.480, 0.759, 1_200.0),
+    'MiniRocket, ridge': (0.619, 0.883, 1_600.0),
+    'MultiRocket, ridge': (0.630, 0.945, 17_000.0),
+    'tsfresh efficient, SVC': (0.663, None, 97_000.0),
+    '42 features, 64 log-Welch bands, RBF SVC': (0.710, 0.969, 150.0),
+    'the same, calibrated, soft vote': (0.705, 0.983, 150.0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Slides of one data set as all recipes get them, and how they are divided into those learnt from and tested.
+
+    Parameters
+    ----------
+    recorded
+        All slides.
+    splits
+        Divisions by the name of the split.
+    rate_hz
+        Of the vibration.
+    channels
+        'fast' for the vibration alone, 'all' for what the recipe asks for.
+    of_motion
+        Whether recipes may use speed and force.
+    """
+
+    recorded: Sequence[Recorded]
+    splits: Mapping[str, Sequence[Division]]
+    rate_hz: float
+    channels: str
+    of_motion: bool
+
+    def recipe(self, name: str) -> Recipe:
+        """Return a shipped recipe as it is tried here."""
+        return comparable(with_channels(load_recipe(name), self.channels), self.rate_hz, of_motion=self.of_motion)
+
+
+class _Job(NamedTuple):
+    setting: str
+    split: str
+    recipe: str
+
+
+class _Cell(NamedTuple):
+    """One cell of the table, and the model of the last division."""
+
+    figures: dict[str, Any]
+    model: Model
+
+
+def run(bench: Bench) -> BenchResult:
+    """Try all shipped recipes on all recorded data sets that are there."""
+    settings = _settings(bench)
+    cells = _try_all(settings, _jobs(settings, bench))
+    numbers: dict[str, Any] = {name: {split: {} for split in setting.splits} for name, setting in settings.items()}
+    for job, cell in cells.items():
+        latency = _latency(settings[job.setting], job.recipe, cell.model)
+        numbers[job.setting][job.split][job.recipe] = {**cell.figures, 'latency_us': latency}
+    if not bench.quick:
+        _add_minirocket(numbers, settings, bench.seed)
+    sets = {name.partition(',')[0] for name in settings}
+    return BenchResult(
+        name='recipes',
+        measured=(
+            'share of single windows recognised; share of slides after so much sliding; share unclassified; mean time '
+            'of a training (s); time from window to estimate (µs). Windows of '
+            f'{LENGTH_S} s that do not overlap, learnt from as tested; recipes that vote over shorter parts keep '
+            f'those, and learn from parts {LENGTH_S} s apart. Recipes as shipped, but on biotac20 without speed, force '
+            'and stretching: there they belong to the session and not to the surface'
+        ),
+        data='; '.join(text for name, text in DATA.items() if name in sets),
+        split=(
+            f'random: {FOLDS} folds by slide; by time: learnt from slides 1-{LAST_LEARNT} of each surface, tested on '
+            'the later ones; one force out, one speed out: each in turn is tested and not learnt from'
+        ),
+        numbers={'references': REFERENCES, 'MiniRocket': _note(bench), **numbers},
+        charts=(_chart(numbers, bench.out),),
+    )
+
+
+def _settings(bench: Bench) -> dict[str, Setting]:
+    builders: Mapping[str, Callable[[Path, Bench], dict[str, Setting]]] = {'biotac20': _biotac20, 'ntp21': _ntp21}
+    present = {name: bench.data / name for name in builders if bench.data and (bench.data / name).is_dir()}
+    if not present:
+        raise InvalidData(
+            f"no recorded data in '{bench.data or 'no folder'}'; give the folder of biotac20/ with --data"
+        )
+    settings: dict[str, Setting] = {}
+    for name, source in present.items():
+        settings |= builders[name](source, bench)
+    return settings
+
+
+def _biotac20(source: Path, bench: Bench) -> dict[str, Setting]:
+    chosen = {'slides': QUICK_SLIDES, 'materials': QUICK_MATERIALS} if bench.quick else {}
+    with tempfile.TemporaryDirectory() as bags:
+        recorded = read_recorded(import_biotac20(source, Path(bags), **chosen))  # type: ignore[arg-type]
+    slides = [item.slide for item in recorded]
+    by_time = {'by time': division_by_time(slides, QUICK_LAST_LEARNT if bench.quick else LAST_LEARNT)}
+    rng = np.random.default_rng(bench.seed)
+    at_random = {'random': random_divisions(slides, QUICK_FOLDS if bench.quick else FOLDS, rng)}
+    vibration = [item.at_rate('signal', RATE_HZ) for item in recorded]
+    return {
+        VIBRATION: Setting(vibration, {**at_random, **by_time}, RATE_HZ, 'fast', of_motion=False),
+        ALL_CHANNELS: Setting(recorded, by_time, 2200.0, 'all', of_motion=False),
+    }
+
+
+def _ntp21(source: Path, bench: Bench) -> dict[str, Setting]:
+    with tempfile.TemporaryDirectory() as bags:
+        paths = import_ntp21(source, Path(bags))
+        recorded = read_recorded(paths[:3] if bench.quick else paths)
+    first = {item.slide.name: item.states[0] for item in recorded}
+    splits = {
+        'one force out': divisions_by({name: state.force_n for name, state in first.items()}),
+        'one speed out': divisions_by({name: round(state.speed_m_s, 3) for name, state in first.items()}),
+    }
+    if bench.quick:
+        splits = {name: divisions[:1] for name, divisions in splits.items()}
+    rate_hz = recorded[0].signals['signal'][0].sampling_rate_hz
+    return {ARRAY: Setting(recorded, splits, rate_hz, 'all', of_motion=True)}
+
+
+def _jobs(settings: Mapping[str, Setting], bench: Bench) -> list[_Job]:
+    shipped = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+    jobs = []
+    for name, setting in settings.items():
+        topics = set(setting.recorded[0].signals)
+        for recipe in QUICK_RECIPES if bench.quick else shipped:
+            usable = recipe not in NEEDS_ARRAY or name == ARRAY
+            try:
+                usable &= set(setting.recipe(recipe).feature_set.topics) <= topics
+            except InvalidParameter:  # it has no vibration at all
+                usable = False
+            jobs += [_Job(name, split, recipe) for split in setting.splits if usable]
+    # What takes long first, so that no core waits at the end.
+    return sorted(jobs, key=lambda job: ('-ann' not in job.recipe, -len(settings[job.setting].splits[job.split])))
+
+
+_shared: dict[str, Setting] = {}
+
+
+def _share(settings: Mapping[str, Setting]) -> None:
+    """Keep the settings in a worker, which has them by being forked: nothing is copied."""
+    _shared.update(settings)
+    import_module('threadpoolctl').threadpool_limits(1)  # one core each
+
+
+def _try(job: _Job) -> _Cell:
+    setting = _shared[job.setting]
+    outcome = try_recipe(setting.recipe(job.recipe), setting.recorded, setting.splits[job.split])
+    return _Cell(outcome.numbers(), outcome.model)
+
+
+def _try_all(settings: Mapping[str, Setting], jobs: Sequence[_Job]) -> dict[_Job, _Cell]:
+    context = multiprocessing.get_context('fork')
+    with ProcessPoolExecutor(os.cpu_count(), context, _share, (settings,)) as pool:
+        return dict(zip(jobs, pool.map(_try, jobs), strict=True))
+
+
+def _latency(setting: Setting, recipe: str, model: Model) -> dict[str, float]:
+    """Return the computing time of windows one by one; the first slide warms up."""
+    cut = [
+        item.cut(setting.recipe(recipe)) for item in setting.recorded[:: max(1, len(setting.recorded) // TIMED_SLIDES)]
+    ]
+    taken = [judge(model, pieces)[2][:-1] for pieces in (cut[0], *cut)][1:]
+    median, p99 = np.percentile(np.concatenate(taken), (50, 99))
+    return {'median': round(float(median), 1), 'p99': round(float(p99), 1)}
+
+
+def _note(bench: Bench) -> str:
+    if bench.quick:
+        return 'not measured in a quick run'
+    return 'measured' if minirocket.installed() else minirocket.ABSENT
+
+
+def _add_minirocket(numbers: dict[str, Any], settings: Mapping[str, Setting], seed: int) -> None:
+    if minirocket.installed() and VIBRATION in settings:
+        setting = settings[VIBRATION]
+        for split, divisions in setting.splits.items():
+            numbers[VIBRATION][split]['MiniRocket'] = minirocket.try_minirocket(setting.recorded, divisions, seed)
+
+
+def _chart(numbers: Mapping[str, Any], out: Path) -> Path:
+    panels = {
+        f'{name}, split {split}': {
+            recipe: (cell['latency_us']['median'], cell['window_accuracy']) for recipe, cell in of_split.items()
+        }
+        for name, of_setting in numbers.items()
+        for split, of_split in list(of_setting.items())[-1:]
+    }
+    title = 'All recipes on recorded slides: single windows recognised, and time from window to estimate'
+    return front_chart(panels, title, ('time of a window (µs)', 'single windows recognised (%)'), out / 'recipes.png')
