@@ -35,6 +35,13 @@ def test_an_argument_has_its_default_until_one_is_given(launch) -> None:
     assert launch(elements, who='you')[0].name == 'you'
 
 
+@pytest.mark.parametrize(('model', 'started'), [('', 0), ('a b/rough.json', 1)])
+def test_a_node_can_depend_on_whether_an_argument_is_given(launch, model, started) -> None:
+    condition = 'if="$(not-equals \'m$(var model)\' m)"'
+    nodes = launch(f'<arg name="model" default=""/><node pkg="p" exec="e" {condition}/>', model=model)
+    assert len(nodes) == started
+
+
 def test_a_required_argument_must_be_given(launch) -> None:
     with pytest.raises(InvalidLaunch, match='give bag:=VALUE'):
         launch('<arg name="bag"/>')

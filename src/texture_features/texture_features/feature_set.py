@@ -224,6 +224,8 @@ def read_recipe(name_or_path: str) -> Mapping[str, Any]:
         If there is no such file or it cannot be read.
     """
     path = find_file(name_or_path, 'texture_estimation', 'config/recipes', 'recipe')
+    if path.suffix == '.skops':  # what a model's card says stands beside it
+        path = path.with_suffix('.json')
     try:
         text = path.read_text(encoding='utf-8')
         content = json.loads(text).get('recipe') if path.suffix == '.json' else yaml.safe_load(text)

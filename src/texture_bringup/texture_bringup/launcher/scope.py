@@ -64,6 +64,11 @@ def _find_share(_scope: Scope, arguments: Sequence[str]) -> str:
     return str(packages.share(arguments[0]))
 
 
+def _not_equals(_scope: Scope, arguments: Sequence[str]) -> str:
+    left, right = arguments
+    return 'true' if left != right else 'false'
+
+
 @dataclass(frozen=True)
 class Substitution:
     """How a call is performed, and how many arguments it takes."""
@@ -77,4 +82,5 @@ SUBSTITUTIONS: Mapping[str, Substitution] = {
     'var': Substitution(_variable, 1, 2),
     'env': Substitution(_environment, 1, 2),
     'find-pkg-share': Substitution(_find_share, 1, 1),
+    'not-equals': Substitution(_not_equals, 2, 2),
 }
