@@ -30,7 +30,7 @@ class Division:
     n_halves: int = 20
     seed: int = 0
     labels: tuple[str, ...] = ()
-    _known: dict[WindowParams, tuple[Examples, Mask]] = field(default_factory=dict, repr=False)
+    _known: dict[WindowParams, tuple[Examples, Mask, Mask]] = field(default_factory=dict, repr=False)
 
     def examples(self, windows: WindowParams) -> Examples:
         """Return the windows."""
@@ -40,16 +40,21 @@ class Division:
         """Return which windows are learnt from in each half, (n_halves, n)."""
         return self._divided(windows)[1]
 
+    def rows(self, windows: WindowParams) -> Mask:
+        """Return which of all windows that `cut` gives are those, (n_all,)."""
+        return self._divided(windows)[2]
+
     def only(self, labels: Sequence[str]) -> Division:
         """Return the same division of some surfaces alone."""
         return Division(self.cut, self.n_halves, self.seed, tuple(labels))
 
-    def _divided(self, windows: WindowParams) -> tuple[Examples, Mask]:
+    def _divided(self, windows: WindowParams) -> tuple[Examples, Mask, Mask]:
         if windows not in self._known:
             examples = self.cut(windows)
             halves = random_halves(examples.codes, examples.slides, self.n_halves, np.random.default_rng(self.seed))
+            rows: Mask = np.ones(len(examples.codes), dtype=bool)
             if self.labels:
                 examples, rows = examples.of(self.labels)
                 halves = halves[:, rows]
-            self._known[windows] = (examples, halves)
+            self._known[windows] = (examples, halves, rows)
         return self._known[windows]

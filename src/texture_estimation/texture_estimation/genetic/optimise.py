@@ -98,7 +98,7 @@ def optimise(
     params
         Population, generations and so on.
     features
-        Of earlier searches on the same slides.
+        Of earlier searches on the same slides, all surfaces included.
     spread
         Over cores or a cluster.
     checkpoint, resume
@@ -106,7 +106,7 @@ def optimise(
     tell
         Called after each generation.
     """
-    plan = _Plan(space, division, features or FeatureCache(division.examples), spread)
+    plan = _Plan(space, division, features or FeatureCache(division.cut), spread)
     memory = Memory(plan.identity)
     if resume:
         memory.load(resume)
@@ -155,8 +155,11 @@ class _Plan:
     def trials(self, individuals: Sequence[Individual], *, quick: bool = True) -> list[RecipeTrial]:
         """Return the trials of individuals."""
         recipes = [self._space.recipe(individual) for individual in individuals]
-        described = self._features.many([_as_learnt(recipe) for recipe in recipes], self._spread)
-        return [self._trial(recipe, values, quick) for recipe, values in zip(recipes, described, strict=True)]
+        described = self._features.many([as_learnt(recipe) for recipe in recipes], self._spread)
+        return [
+            self._trial(recipe, values[self._division.rows(recipe.training_windows)], quick)
+            for recipe, values in zip(recipes, described, strict=True)
+        ]
 
     def judged_exactly(self, chosen: Sequence[Scored]) -> tuple[Finalist, ...]:
         """Return the recipes with the scores of their learners on all halves, best first."""
@@ -189,11 +192,12 @@ class _Plan:
         recipe = self._space.recipe(individual)
         examples = self._division.examples(recipe.training_windows)
         n_samples = sum(item.samples[0].size for item in examples.inputs.values())
-        n_values = self._features.values(_as_learnt(recipe)).shape[1]
+        n_values = self._features.values(as_learnt(recipe)).shape[1]
         return operations(recipe, n_samples, n_values, len(examples.names), len(examples.codes) // 2)
 
 
-def _as_learnt(recipe: Recipe) -> FeatureSet:
+def as_learnt(recipe: Recipe) -> FeatureSet:
+    """Return the feature set with the windows that `train` learns from."""
     return dataclasses.replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
 
 
