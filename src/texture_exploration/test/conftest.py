@@ -12,7 +12,8 @@ from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 # The pure tests run where there is no ROS.
-collect_ignore = [] if importlib.util.find_spec('rclpy') else ['test_explorer_node.py', 'test_explore_preset.py']
+ROS_TESTS = ['test_explorer_node.py', 'test_explore_preset.py', 'test_signal_watch_node.py']
+collect_ignore = [] if importlib.util.find_spec('rclpy') else ROS_TESTS
 
 ARM_STEP_NS = 5_000_000
 ARM, TOUCH, LIMITS = SimulatedArmParams(), TouchParams(), SafetyLimits()

@@ -109,7 +109,8 @@ class StiffnessEstimate:
             return
         self._points.append((height_m, force_n))
         # A finger is the stiffer the harder it is pressed: what counts is how stiff it is now.
-        self._points = [point for point in self._points if point[1] >= RECENT_SHARE * force_n]
+        recent_n = min(RECENT_SHARE * force_n, force_n - 1.5 * MIN_RISE_N)
+        self._points = [point for point in self._points if point[1] >= recent_n]
         if len(self._points) >= MIN_POINTS and force_n - self._points[0][1] > MIN_RISE_N:
             self.value_n_m = max(SOFTEST_N_M, self._slope())
 
@@ -259,7 +260,7 @@ class ForceLoop:
             return
         if self.stiffness.empty:
             self._surface_m = feeling.height_m
-        if speed_m_s > SLOWEST_M_S or self._observer.running:
+        if speed_m_s > SLOWEST_M_S:
             self.stiffness.fixed = True
         self.stiffness.update(feeling.height_m, feeling.force_n)
         self._choose_gain()

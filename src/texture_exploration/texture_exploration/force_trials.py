@@ -24,6 +24,7 @@ SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance
 CIRCLE = ExplorationRequest('circular', speed_m_s=0.1, force_n=1.0, radius_m=0.02, turns=2.0)
 # One configuration for all stiffnesses: the stiffest contact is expected throughout.
 ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, stiffest_n_m=20000.0)
+TOUCH = TouchParams(approach_stiffness_n_m=20000.0)
 LIMITS = SafetyLimits()
 
 
@@ -50,7 +51,7 @@ Log = Sequence[tuple[Phase, ArmState]]
 def slide_trial(
     arm: SimulatedArmParams = ARM,
     request: ExplorationRequest = SLIDE,
-    touch: TouchParams = TouchParams(),  # noqa: B008
+    touch: TouchParams = TOUCH,
 ) -> Trial:
     """Explore once with a simulated arm, under the real exploration loop."""
     log: list[tuple[Phase, ArmState]] = []

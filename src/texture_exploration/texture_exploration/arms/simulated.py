@@ -167,14 +167,17 @@ class SimulatedArm:
         """Return the change of height in one step, m.
 
         Admittance control, vz = a·(F − F_wanted), solved exactly over the step: with F = k·depth the force error
-        decays as exp(−a·k·t), which no step size makes unstable.
+        decays as exp(−a·k·t), which no step size makes unstable. In contact the finger follows the surface beside.
         """
         if command.force_n is None:
             return command.normal_m_s * dt_s
         admittance = self._params.admittance_m_s_n
         decay_s = admittance * self._params.stiffness_n_m
         effective_s = -math.expm1(-decay_s * dt_s) / decay_s if decay_s > 0 else dt_s
-        return admittance * (self._state.force_n - command.force_n) * effective_s
+        x = self._state.position[0]
+        rise = self._surface.height_m(x + command.tangential_m_s[0] * dt_s) - self._surface.height_m(x)
+        follow = rise if self._state.force_n > 0 else 0.0
+        return admittance * (self._state.force_n - command.force_n) * effective_s + follow
 
     def _run(self) -> None:
         last_ns = self._clock()

@@ -19,7 +19,7 @@ def slide_over(
     slide = Slide(follower, speed, force, limits)
     stages = [
         GoHome(home, touch, limits),
-        Approach(touch, limits),
+        Approach(force, touch, limits),
         Settle(force, touch, limits),
         Accelerate(follower, speed, force, touch, limits),
         slide,

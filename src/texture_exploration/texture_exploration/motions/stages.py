@@ -12,6 +12,7 @@ from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 NEAR_M = 0.0005
+PRESSING_S = 0.1  # from contact to the wanted force: a step would swing on a stiff surface
 PROMISE_S = 0.1  # the longest promise a slide gives; ending it early takes as long
 
 
@@ -77,9 +78,10 @@ class GoHome(Stage):
 class Approach(Stage):
     """Come down until the finger feels the surface."""
 
-    def __init__(self, touch: TouchParams, limits: SafetyLimits) -> None:
+    def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to meet the surface')
         self._touch = touch
+        self._speed_m_s = touch.approach_m_s(force_n)
         self._start_m = 0.0
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
@@ -96,22 +98,24 @@ class Approach(Stage):
                 f'no surface within {self._touch.approach_travel_m:g} m below the start; '
                 "bring the finger closer or raise 'approach_travel_m'"
             )
-        return ArmCommand(normal_m_s=-self._touch.approach_speed_m_s)
+        return ArmCommand(normal_m_s=-self._speed_m_s)
 
 
 class Settle(Stage):
-    """Press until the force has stayed within its tolerance for a while."""
+    """Press gently harder, until the force has stayed within its tolerance for a while."""
 
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.CONTACT, limits.contact_timeout_s, f'the force to settle at {force_n:g} N')
         self._force_n = force_n
         self._touch = touch
         self._outside_ns = 0
+        self._first_n = force_n
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Nothing has settled yet."""
         super().begin(time_ns, arm)
         self._outside_ns = time_ns
+        self._first_n = min(arm.force_n, self._force_n)
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Hold the force."""
@@ -119,7 +123,8 @@ class Settle(Stage):
             self._outside_ns = time_ns
         if (time_ns - self._outside_ns) * 1e-9 >= self._touch.settle_s and time_ns > self._outside_ns:
             return None
-        return ArmCommand(force_n=self._force_n)
+        rise = smooth(self.elapsed_s(time_ns) / PRESSING_S)
+        return ArmCommand(force_n=self._first_n + (self._force_n - self._first_n) * rise)
 
 
 class Accelerate(Stage):
