@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from texture_core.catalogue import find
-from texture_evaluation.benches import biotac20, clock, latency, load, motion, recipes, sensors
+from texture_evaluation.benches import biotac20, clock, latency, load, recipes, sensors, stick_slip
 from texture_evaluation.benches.result import Bench, BenchResult
 
 BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
@@ -16,7 +16,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates
-    'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
+    'stick_slip': stick_slip.run,  # cost, error and longest step of simulated friction
 }
 
 
