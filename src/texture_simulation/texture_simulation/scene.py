@@ -15,10 +15,12 @@ from texture_core.parameters import from_mapping
 from texture_core.resources import find_file
 from texture_simulation.contact import Contact
 from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.frictions import FRICTIONS
 from texture_simulation.surfaces.catalogue import KINDS
 from texture_simulation.surfaces.surface import Surface
 
 DEFAULT_SENSOR = 'tsf85'
+TERMS: Mapping[str, type] = {**KINDS, **FRICTIONS}
 SECTIONS = ('about', 'sensor', 'contact', 'effects', 'surfaces')
 
 
@@ -115,8 +117,13 @@ def _surface(name: str, terms: Any, where: str) -> Surface:
     place = f"{where}, surface '{name}'"
     if not isinstance(terms, list) or not all(isinstance(term, Mapping) and 'kind' in term for term in terms):
         raise InvalidParameter(f'{place} is {terms!r}; a list of terms, each with a `kind`, is needed')
-    return Surface(name, tuple(_term(dict(term), place) for term in terms))
+    made = [_term(dict(term), place) for term in terms]
+    frictions = [term for term in made if type(term) in FRICTIONS.values()]
+    if len(frictions) > 1:
+        raise InvalidParameter(f'{place} has {len(frictions)} kinds of friction; name one of {", ".join(FRICTIONS)}')
+    relief = tuple(term for term in made if term not in frictions)
+    return Surface(name, relief, *frictions)
 
 
 def _term(term: dict[str, Any], place: str) -> Any:
-    return from_mapping(find(KINDS, str(term.pop('kind')), 'kind of surface term'), term, place)
+    return from_mapping(find(TERMS, str(term.pop('kind')), 'kind of surface term'), term, place)

@@ -6,6 +6,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_simulation.effects.stages import ForceEffect, GrowthEffect, PathEffect, Scans, TextureEffect
+from texture_simulation.frictions import Drag, follow
 from texture_simulation.path import Path
 from texture_simulation.scene import Scene
 from texture_simulation.surfaces.surface import Surface
@@ -36,7 +37,8 @@ class Touch:
     def __init__(
         self, scene: Scene, surface: Surface, rng: np.random.Generator, rate_hz: float, *, finger: int, scans: Scans
     ) -> None:
-        self.surface = surface
+        self._surface = surface
+        self._rate_hz = rate_hz
         self._contact = scene.contact
         self._rng = rng
         self._scans = scans
@@ -48,10 +50,21 @@ class Touch:
         self._through_force = [effect.start_force(rng, rate_hz, scans) for effect in scene.effects_of(ForceEffect)]
         self.elsewhere()
 
+    @property
+    def surface(self) -> Surface:
+        """What is touched."""
+        return self._surface
+
+    @surface.setter
+    def surface(self, surface: Surface) -> None:
+        self._surface = surface
+        self._drag = self._follow()
+
     def elsewhere(self) -> None:
         """Let the sample lie otherwise from now on: no two touches meet the same place."""
         self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._scans, 1))
         self._before = None
+        self._drag = self._follow()
 
     def placed(self, path: Path) -> Path:
         """Return where the skin goes on the sample."""
@@ -66,7 +79,7 @@ class Touch:
         own_blur_m: float | Array = 0.0,
         offset_m: tuple[Array, Array] | None = None,
     ) -> Array:
-        """Return by how much the shape of the surface changes the force on the skin; 0 in the air.
+        """Return by how much the shape of the surface, and its friction, change the force on the skin; 0 in the air.
 
         Parameters
         ----------
@@ -91,7 +104,12 @@ class Touch:
         if offset_m is not None:
             x_m, y_m = x_m[..., None, :] + offset_m[0], y_m[..., None, :] + offset_m[1]
             blur_m, gain = np.hypot(blur_m[..., None, :], own_blur_m), gain[..., None, :]
-        variation_n = gain * self.surface.height_m(x_m, y_m, blur_m)
+        variation_n = gain * self._surface.height_m(x_m, y_m, blur_m)
+        drag = self._drag  # may be replaced from another thread, where a sample is swapped
+        if drag:
+            # One skin is dragged as a whole: all elements of a finger with several feel the same.
+            dragged_n = drag.advance(placed)
+            variation_n = variation_n + (dragged_n if offset_m is None else dragged_n[..., None, :])
         for through in self._through_force:
             variation_n = through(placed, variation_n)
         return np.asarray(variation_n)
@@ -102,8 +120,13 @@ class Touch:
         for effect in self._gains:
             gain = gain * effect.gain(placed, self._finger)
         x_m, y_m = placed.x_m[..., None, :] + offset_m[0], placed.y_m[..., None, :] + offset_m[1]
-        height = self.surface.height_m(x_m, y_m, np.full((1,), blur_m))
+        height = self._surface.height_m(x_m, y_m, np.full((1,), blur_m))
         return np.asarray(gain[..., None, :] * height)
+
+    def _follow(self) -> Drag | None:
+        """Return what feels the friction from here on, if there is any."""
+        friction = self._surface.friction
+        return follow(friction, self._rate_hz, self._rng, self._scans) if friction else None
 
     def _grown(self, force_n: Array) -> tuple[Array, Array]:
         """Return blur and stiffness at forces."""

@@ -26,6 +26,9 @@ class TipDrag:
         Of the surface, and the skin.
     rate_hz
         Points of the path a second; several steps are taken between two points where `step_s` asks for it.
+    stretched : number or (...)
+        How far the skin is stretched at the first point, as a share of what makes it let go: a slide need not begin
+        with a touch.
 
     Raises
     ------
@@ -33,12 +36,13 @@ class TipDrag:
         If the step is beyond the border of stability.
     """
 
-    def __init__(self, friction: StickSlip, rate_hz: float) -> None:
+    def __init__(self, friction: StickSlip, rate_hz: float, stretched: float | Array = 0.0) -> None:
         self.friction = friction
         self._rate_hz = rate_hz
         check_step(DEFAULT, friction, friction.step_s, 0.0, 0.0)
         self._substeps = max(1, math.ceil(1 / (rate_hz * friction.step_s) - 1e-9))
         self._step_s = 1 / (rate_hz * self._substeps)
+        self._stretched = np.asarray(stretched, dtype=np.float64)
         self._tip = AT_REST
         self._before: tuple[Array, Array, Array, Array] | None = None  # x, y, speed and force, (..., 1)
         self._forward: tuple[Array, Array] | None = None  # the direction that counts as forward, (..., 1)
@@ -54,14 +58,23 @@ class TipDrag:
         if not len(path):
             return np.zeros_like(path.x_m)
         speed_m_s, force_n = self._along(path), np.maximum(path.force_n, 0.0)
-        nothing = np.zeros_like(force_n[..., :1])
-        _, _, speed_before, force_before = self._before or (nothing,) * 4
+        _, _, speed_before, force_before = self._before or self._first(force_n[..., :1])
         speeds, forces = self._between(speed_before, speed_m_s), self._between(force_before, force_n)
         tip = drag(self.friction, speeds, forces, self._step_s, start=self._tip, force_before_n=force_before[..., 0])
         self._tip = Tip(*(values[..., -1] for values in tip))
         self._before = path.x_m[..., -1:], path.y_m[..., -1:], speed_m_s[..., -1:], force_n[..., -1:]
         felt_n: Array = self.friction.felt * pull_n(self.friction, tip, speeds)
         return felt_n[..., self._substeps - 1 :: self._substeps]
+
+    def _first(self, force_n: Array) -> tuple[Array, Array, Array, Array]:
+        """Return what was before the first point, (..., 1) each, and let the tip hang there."""
+        nothing = np.zeros_like(force_n)
+        if not self._stretched.any():
+            return (nothing,) * 4
+        pull_n = self._stretched * self.friction.static * force_n[..., 0]
+        bend_m = self._stretched * self.friction.static / self.friction.bristle_1_m
+        self._tip = Tip(pull_n / self.friction.skin_n_m, np.zeros_like(pull_n), bend_m)
+        return nothing, nothing, nothing, force_n
 
     def _along(self, path: Path) -> Array:
         """Return the speed at each point, (..., n); below 0 while the path goes back the way it came."""

@@ -25,10 +25,11 @@ class Term(Protocol):
 
 @dataclass(frozen=True)
 class Surface:
-    """A named sum of terms."""
+    """A named sum of terms, and the friction on it (`frictions.py`); without one, the skin glides."""
 
     name: str
     terms: tuple[Any, ...]
+    friction: Any = None
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the height felt at places.

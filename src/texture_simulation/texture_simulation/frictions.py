@@ -1,0 +1,58 @@
+"""The kinds of friction by name, each off unless a surface asks for it, and what follows a finger with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_simulation.path import Path
+from texture_simulation.stick_slip.friction import StickSlip
+from texture_simulation.stick_slip.tip_drag import TipDrag
+from texture_simulation.surfaces.sliding_friction import SlidingDrag, SlidingFriction
+
+FRICTIONS: Mapping[str, type] = {
+    'sliding_friction': SlidingFriction,  # a Stribeck curve, without memory
+    'stick_slip': StickSlip,  # bristles (LuGre): the skin hangs and lets go
+}
+
+
+class Drag(Protocol):
+    """What a finger feels of the friction along its path, block by block."""
+
+    def advance(self, path: Path) -> Array:
+        """Return the force that the sensor feels beside the shape of the surface, (..., n) N."""
+
+
+def _hanging(friction: StickSlip, rate_hz: float, rng: np.random.Generator, scans: tuple[int, ...]) -> Drag:
+    # Slides that are cut out of longer ones begin with the skin at any point of its cycle, not all at the same.
+    return TipDrag(friction, rate_hz, stretched=rng.uniform(0.0, 1.0, scans))
+
+
+def _sliding(friction: SlidingFriction, rate_hz: float, rng: np.random.Generator, scans: tuple[int, ...]) -> Drag:
+    return SlidingDrag(friction, rate_hz)
+
+
+FOLLOW: Mapping[type, Callable[[Any, float, np.random.Generator, tuple[int, ...]], Drag]] = {
+    StickSlip: _hanging,
+    SlidingFriction: _sliding,
+}
+
+
+def follow(friction: Any, rate_hz: float, rng: np.random.Generator, scans: tuple[int, ...]) -> Drag:
+    """Return what follows a finger over a surface.
+
+    Parameters
+    ----------
+    friction
+        One of `FRICTIONS`.
+    rate_hz
+        Points of the path a second.
+    rng
+        Decides how far the skin is stretched where a slide begins under load.
+    scans
+        () for one slide, (count,) for many at once.
+    """
+    return FOLLOW[type(friction)](friction, rate_hz, rng, scans)

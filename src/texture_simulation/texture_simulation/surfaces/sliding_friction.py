@@ -1,0 +1,77 @@
+"""Friction that only ever slides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_simulation.path import Path
+from texture_simulation.stick_slip.friction import StickSlip
+from texture_simulation.stick_slip.stribeck import steady_force_n
+
+CREEP_M_S = 1e-3  # below about this speed friction builds up, so that nothing jumps where a slide begins
+
+
+@dataclass(frozen=True)
+class SlidingFriction:
+    """A Stribeck curve without memory: the skin is pulled along as at a steady speed, and never hangs.
+
+    For surfaces on which nothing sticks, hundreds of times cheaper than `StickSlip`.
+
+    Raises
+    ------
+    InvalidParameter
+        If friction is lower at rest than in fast sliding.
+    """
+
+    static: float = param(0.6, 'Coefficient of friction of slow sliding.', low=0.0, high=5.0)
+    kinetic: float = param(0.5, 'Coefficient of friction of fast sliding.', low=1e-3, high=5.0)
+    stribeck_m_s: float = param(0.05, 'Speed over which friction falls.', unit='m/s', low=1e-4, high=10.0)
+    viscous_s_m: float = param(0.0, 'Growth of the coefficient with speed.', unit='s/m', low=0.0, high=100.0)
+    felt: float = param(0.2, 'Newtons that the sensor feels for each newton along the surface.', low=-10.0, high=10.0)
+
+    def __post_init__(self) -> None:
+        self.curve()
+
+    def curve(self) -> StickSlip:
+        """Return the same curve as that of bristles."""
+        return StickSlip(self.static, self.kinetic, self.stribeck_m_s, self.viscous_s_m, bristle_s_m=0.0)
+
+
+class SlidingDrag:
+    """Follow a finger that slides along a path; what lies between the blocks is continuous.
+
+    Parameters
+    ----------
+    friction
+        Of the surface.
+    rate_hz
+        Points of the path a second.
+    """
+
+    def __init__(self, friction: SlidingFriction, rate_hz: float) -> None:
+        self._curve = friction.curve()
+        self._felt = friction.felt
+        self._rate_hz = rate_hz
+        self._before: tuple[Array, Array] | None = None
+
+    def advance(self, path: Path) -> Array:
+        """Return the force that the sensor feels, (..., n) N: of one sign, whichever way the finger goes."""
+        if not len(path):
+            return np.zeros_like(path.x_m)
+        x_m, y_m = self._before or (_before_first(path.x_m), _before_first(path.y_m))
+        self._before = path.x_m[..., -1:], path.y_m[..., -1:]
+        speed_m_s = np.hypot(np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)) * self._rate_hz
+        built_up = speed_m_s / np.hypot(speed_m_s, CREEP_M_S)
+        felt: Array = (
+            self._felt * np.maximum(path.force_n, 0.0) * built_up * steady_force_n(self._curve, speed_m_s, 1.0)
+        )
+        return felt
+
+
+def _before_first(place_m: Array) -> Array:
+    """Return the place before the first of a path, (..., 1): as far from it as the second is."""
+    return np.asarray(2 * place_m[..., :1] - place_m[..., :2][..., -1:])
