@@ -34,6 +34,9 @@ def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
         (['launch', 'bench', 'surfcae:=glass'], "did you mean 'surface'?"),
         (['launch', 'bench', 'surface'], 'write NAME:=VALUE'),
         (['launch', 'replay'], 'give bag:=VALUE'),
+        (['scene', 'ets_lnear'], "no scene 'ets_lnear'; did you mean 'ets_linear'?"),
+        (['scene', 'hu', 'linen_9'], 'Known: linen_1, linen_2, linen_3, linen_4, linen_5'),
+        (['scene', 'hu', 'linen_1', '--speed', '-1'], 'speed_m_s'),
         (['bench', 'biotc'], "did you mean 'biotac20'?"),
         (['bench', 'biotac20', '--quick'], '--data'),
     ],
@@ -52,3 +55,9 @@ def test_the_arguments_shown_are_also_those_of_included_files(capsys) -> None:
     assert 'ip:=127.0.0.2' in shown
     assert 'surface:=glass' in shown
     assert shown.count('finger_port:=') == 1
+
+
+def test_a_scene_is_drawn_and_explained(capsys, tmp_path) -> None:
+    assert main(['scene', 'ets_linear', 'grid_1', '--duration', '0.2', '-o', str(tmp_path / 'grid.png')]) == 0
+    assert (tmp_path / 'grid.png').read_bytes().startswith(b'\x89PNG')
+    assert 'surfaces: ridge_1, ridge_2a, ridge_2b, grid_1' in capsys.readouterr().out

@@ -60,11 +60,20 @@ class Touch:
         self._surface = surface
         self._drag = self._follow()
 
+    @property
+    def start_m(self) -> tuple[Array, Array]:
+        """Where on the sample a path begins that begins at (0, 0): x and y, (..., 1) each."""
+        return self._x_m, self._y_m
+
     def elsewhere(self) -> None:
         """Let the sample lie otherwise from now on: no two touches meet the same place."""
         self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._scans, 1))
         self._before = None
         self._drag = self._follow()
+
+    def blur_m(self, force_n: float) -> float:
+        """Return over what length the contact averages under a force."""
+        return float(self._grown(np.array([force_n]))[0][0])
 
     def placed(self, path: Path) -> Path:
         """Return where the skin goes on the sample."""
