@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from texture_core.arrays import Array
@@ -23,12 +25,13 @@ def line_spectrum(windows: Windows, points: int, rate_of_change: bool) -> tuple[
         integral is returned, by division by (2πf)².
     """
     segment = 2 * (points // 2)
-    hertz: Array = np.arange(1, segment // 2 + 1, dtype=np.float64) * (windows.rate_hz / segment)
+    hertz, integration = _lines(segment, windows.rate_hz)
     densities = windows.shared(
         ('line_spectrum', segment), lambda: mean_over_segments(densities_of(windows, segment, segment // 2, len(hertz)))
     )
     if rate_of_change:
-        densities = densities / (2.0 * np.pi * hertz) ** 2
+        whole = densities
+        densities = windows.shared(('line_spectrum', segment, 'integral'), lambda: whole * integration)
     return densities, hertz
 
 
@@ -39,8 +42,10 @@ def at_reference_speed(hertz: Array, windows: Windows, speed_m_s: float) -> Arra
     """
     if not speed_m_s:
         return hertz
-    scaled: Array = hertz * (speed_m_s / np.asarray(windows.speed_m_s)[..., None, None])
-    return scaled
+    return windows.shared(
+        ('at_reference_speed', speed_m_s, len(hertz)),
+        lambda: hertz * (speed_m_s / np.asarray(windows.speed_m_s)[..., None, None]),
+    )
 
 
 def without_force(log_power: Array, windows: Windows, exponent: float) -> Array:
@@ -52,3 +57,13 @@ def without_force(log_power: Array, windows: Windows, exponent: float) -> Array:
         return log_power
     less: Array = log_power - exponent * np.log(np.asarray(windows.force_n))[..., None, None]
     return less
+
+
+@lru_cache(maxsize=64)
+def _lines(segment: int, rate_hz: float) -> tuple[Array, Array]:
+    """Return the frequency of each line, (segment / 2,) Hz, and the share of its density that its integral has."""
+    hertz: Array = np.arange(1, segment // 2 + 1, dtype=np.float64) * (rate_hz / segment)
+    integration: Array = 1.0 / (2.0 * np.pi * hertz) ** 2
+    for array in (hertz, integration):
+        array.flags.writeable = False
+    return hertz, integration

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -76,8 +75,9 @@ class Checks:
         """Return why a window cannot be graded; '' if it can."""
         if vector.force_n < self.params.least_force_n:  # an unknown force is NaN and says nothing
             return f'no contact: the force is {vector.force_n:.2f} N'
-        if math.isnan(vector.values @ np.zeros(len(vector.values))):  # inf · 0 is NaN, too
-            bad = vector.names[int((~np.isfinite(vector.values)).argmax())]
+        finite = np.isfinite(vector.values)
+        if not finite.all():
+            bad = vector.names[int(finite.argmin())]
             return f"its feature '{bad}' is not finite; is the speed known?"
         if LEVEL in self.limits and float(vector.values[self._columns[LEVEL]].max()) < self.limits[LEVEL]:
             return 'no contact: the signal is weaker than on the smoothest surface learnt'
