@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from texture_estimation.learners.ann_pairs import AnnPairs
 from texture_estimation.learners.svm_pairs import SvmPairs
-from texture_estimation.recipe import Recipe
+from texture_estimation.roughness.ann1 import Ann1
+from texture_estimation.roughness.ann5 import Ann5
+from texture_estimation.roughness.svm5 import Svm5
 from texture_features.feature import Feature
 from texture_features.features.arc_length import ArcLength
 from texture_features.features.force import Force
@@ -23,23 +25,24 @@ EXPONENTIAL = 10.0
 UNKNOWN = 50.0
 
 
-def operations(recipe: Recipe, n_samples: int, n_values: int, n_labels: int, n_learnt: int) -> float:
+def operations(
+    features: Sequence[Feature], learner: Any, *, n_samples: int, n_values: int, n_labels: int, n_learnt: int
+) -> float:
     """Return about how many operations it takes from the samples of one window to the decision.
 
     Parameters
     ----------
-    recipe
-        What is done.
+    features, learner
+        What is done; the learner may be a head that grades.
     n_samples
         Of a window, all channels together.
     n_values
-        Features.
+        Values of all features.
     n_labels, n_learnt
-        Surfaces, and examples learnt from, all of which may become support vectors.
+        Surfaces or grades, and examples learnt from, all of which may become support vectors.
     """
-    features = [feature for item in recipe.feature_set.inputs for _, feature in item.features]
     described = sum(_feature(feature, n_samples) for feature in features)
-    return described + _learner(recipe.learner, n_values, n_labels, n_learnt)
+    return described + LEARNERS.get(type(learner), _unknown_learner)(learner, n_values, n_labels, n_learnt)
 
 
 def _feature(feature: Any, n: int) -> float:
@@ -48,12 +51,15 @@ def _feature(feature: Any, n: int) -> float:
     return FEATURES.get(type(feature), _unknown)(feature, n)
 
 
-def _learner(learner: Any, n_values: int, n_labels: int, n_learnt: int) -> float:
-    n_pairs = n_labels * (n_labels - 1) / 2
-    if isinstance(learner, AnnPairs):
-        return float(n_pairs * learner.hidden * (2.0 * n_values + EXPONENTIAL))
-    if isinstance(learner, SvmPairs):
-        return n_learnt * (2.0 * n_values + EXPONENTIAL + 2.0 * (n_labels - 1))
+def _networks(learner: Any, count: float, n_values: int) -> float:
+    return float(count * learner.hidden * (2.0 * n_values + EXPONENTIAL))
+
+
+def _machines(count: float, n_values: int, n_learnt: int) -> float:
+    return n_learnt * (2.0 * n_values + EXPONENTIAL + 2.0 * count)
+
+
+def _unknown_learner(_: Any, n_values: int, n_labels: int, n_learnt: int) -> float:
     return float(n_learnt * n_values)
 
 
@@ -76,4 +82,11 @@ FEATURES: Mapping[type[Feature], Callable[[Any, int], float]] = {
     ArcLength: lambda _, n: 6.0 * n,
     Speed: lambda _, n: 1.0,
     Force: lambda _, n: 1.0,
+}
+LEARNERS: Mapping[type, Callable[[Any, int, int, int], float]] = {
+    AnnPairs: lambda learner, v, k, _: _networks(learner, k * (k - 1) / 2, v),
+    SvmPairs: lambda _, v, k, n: _machines(k - 1, v, n),  # each example has a weight in k - 1 pairs
+    Ann1: lambda head, v, _, n: _networks(head, 1.0, v),
+    Ann5: lambda head, v, k, _: _networks(head, k, v),
+    Svm5: lambda _, v, k, n: _machines(k, v, n),
 }

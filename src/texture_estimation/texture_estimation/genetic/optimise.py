@@ -2,36 +2,29 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
-from texture_estimation.genetic.cost import operations
+from texture_core.arrays import Array
 from texture_estimation.genetic.division import Division
 from texture_estimation.genetic.feature_cache import FeatureCache
 from texture_estimation.genetic.fitness import fitness
-from texture_estimation.genetic.judges.catalogue import judge_of
 from texture_estimation.genetic.memory import Memory
 from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.recipe_trial import RecipeTrial
 from texture_estimation.genetic.search import Found, Generation, Scored, SearchParams, search
 from texture_estimation.genetic.spread import Spread, in_turn
-from texture_estimation.genetic.trial import Record
+from texture_estimation.genetic.task import R, Task
+from texture_estimation.genetic.trial import Record, Trial
 from texture_estimation.genetic.variables import Individual
-from texture_estimation.recipe import Recipe
-from texture_features.feature_set import FeatureSet
-
-# Best individuals of the last generation that are judged again by the learner itself.
-FINALISTS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Finalist:
+class Finalist(Generic[R]):
     """A recipe judged by its own learner on every half.
 
     Parameters
@@ -44,7 +37,7 @@ class Finalist:
         Learning and test accuracy on each half, by the learner itself.
     """
 
-    recipe: Recipe
+    recipe: R
     searched: Scored
     record: Record
 
@@ -55,7 +48,7 @@ class Finalist:
 
 
 @dataclass(frozen=True, eq=False)
-class Optimised:
+class Optimised(Generic[R]):
     """What was found.
 
     Parameters
@@ -70,23 +63,24 @@ class Optimised:
         All scores.
     """
 
-    best: Finalist
-    finalists: tuple[Finalist, ...]
+    best: Finalist[R]
+    finalists: tuple[Finalist[R], ...]
     found: Found
     memory: Memory
 
 
 def optimise(
-    space: RecipeSpace,
+    space: RecipeSpace[R],
     division: Division,
     params: SearchParams,
+    task: Task[R],
     *,
     features: FeatureCache | None = None,
     spread: Spread = in_turn,
     checkpoint: str | Path | None = None,
     resume: str | Path | None = None,
     tell: Callable[[Generation], None] = lambda _: None,
-) -> Optimised:
+) -> Optimised[R]:
     """Search the space with quick judges, then judge the best again with the learner itself.
 
     Parameters
@@ -97,6 +91,8 @@ def optimise(
         Slides and their halves; with as many halves as `params` has, and its seed.
     params
         Population, generations and so on.
+    task
+        `TellingApart()`, or `Grading(grades)`.
     features
         Of earlier searches on the same slides, all surfaces included.
     spread
@@ -106,7 +102,7 @@ def optimise(
     tell
         Called after each generation.
     """
-    plan = _Plan(space, division, features or FeatureCache(division.cut), spread)
+    plan = _Plan(space, division, task, features or FeatureCache(division.cut), spread)
     memory = Memory(plan.identity)
     if resume:
         memory.load(resume)
@@ -126,16 +122,19 @@ def optimise(
         spread=spread,
         tell=after_generation,
     )
-    chosen = found.front if params.objective == 'front' else found.ranked[:FINALISTS]
+    chosen = found.front if params.objective == 'front' else found.ranked[: params.finalists]
     finalists = plan.judged_exactly(chosen)
     return Optimised(finalists[0], finalists, found, memory)
 
 
-class _Plan:
+class _Plan(Generic[R]):
     """Trials, costs and exact judgements of individuals."""
 
-    def __init__(self, space: RecipeSpace, division: Division, features: FeatureCache, spread: Spread) -> None:
-        self._space, self._division, self._features, self._spread = space, division, features, spread
+    def __init__(
+        self, space: RecipeSpace[R], division: Division, task: Task[R], features: FeatureCache, spread: Spread
+    ) -> None:
+        self._space, self._division, self._task, self._features = space, division, task, features
+        self._spread = spread
         self.cost = lru_cache(maxsize=None)(self._cost)
 
     @property
@@ -152,16 +151,16 @@ class _Plan:
             'seed': self._division.seed,
         }
 
-    def trials(self, individuals: Sequence[Individual], *, quick: bool = True) -> list[RecipeTrial]:
+    def trials(self, individuals: Sequence[Individual], *, quick: bool = True) -> list[Trial]:
         """Return the trials of individuals."""
         recipes = [self._space.recipe(individual) for individual in individuals]
-        described = self._features.many([as_learnt(recipe) for recipe in recipes], self._spread)
+        described = self._features.many([self._task.described(recipe) for recipe in recipes], self._spread)
         return [
             self._trial(recipe, values[self._division.rows(recipe.training_windows)], quick)
             for recipe, values in zip(recipes, described, strict=True)
         ]
 
-    def judged_exactly(self, chosen: Sequence[Scored]) -> tuple[Finalist, ...]:
+    def judged_exactly(self, chosen: Sequence[Scored]) -> tuple[Finalist[R], ...]:
         """Return the recipes with the scores of their learners on all halves, best first."""
         trials = self.trials([one.individual for one in chosen], quick=False)
         n_halves = self._division.n_halves
@@ -174,33 +173,19 @@ class _Plan:
             finalists.append(Finalist(recipe, one, Record.of(mine)))
         return tuple(sorted(finalists, key=lambda finalist: -finalist.fitness))
 
-    def _trial(self, recipe: Recipe, values: Any, quick: bool) -> RecipeTrial:
+    def _trial(self, recipe: R, values: Array, quick: bool) -> Trial:
         windows = recipe.training_windows
-        examples = self._division.examples(windows)
-        return RecipeTrial(
-            judge=judge_of(recipe.learner_name, quick=quick),
-            learner=recipe.learner,
-            rule=recipe.evidence,
-            values=values,
-            codes=examples.codes,
-            slides=examples.slides,
-            halves=self._division.halves(windows),
-            hop_share=windows.hop_s / windows.length_s,
-        )
+        examples, halves = self._division.examples(windows), self._division.halves(windows)
+        return self._task.trial(recipe, values, examples, halves, quick=quick)
 
     def _cost(self, individual: Individual) -> float:
         recipe = self._space.recipe(individual)
         examples = self._division.examples(recipe.training_windows)
         n_samples = sum(item.samples[0].size for item in examples.inputs.values())
-        n_values = self._features.values(as_learnt(recipe)).shape[1]
-        return operations(recipe, n_samples, n_values, len(examples.names), len(examples.codes) // 2)
+        n_values = self._features.values(self._task.described(recipe)).shape[1]
+        return self._task.cost(recipe, n_samples, n_values, examples)
 
 
-def as_learnt(recipe: Recipe) -> FeatureSet:
-    """Return the feature set with the windows that `train` learns from."""
-    return dataclasses.replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
-
-
-def _one_half(case: tuple[RecipeTrial, int]) -> tuple[float, float]:
+def _one_half(case: tuple[Trial, int]) -> tuple[float, float]:
     trial, number = case
     return trial.start()(number)

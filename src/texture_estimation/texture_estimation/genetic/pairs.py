@@ -15,12 +15,14 @@ from texture_estimation.genetic.division import Division
 from texture_estimation.genetic.feature_cache import FeatureCache
 from texture_estimation.genetic.fitness import UNDECIDED, decided_by_slide, decisions, fitness, shares_right
 from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.optimise import Optimised, as_learnt, optimise
+from texture_estimation.genetic.optimise import Optimised, optimise
 from texture_estimation.genetic.recipe_space import RecipeSpace
 from texture_estimation.genetic.search import Generation, SearchParams
 from texture_estimation.genetic.spread import Spread, in_turn
+from texture_estimation.genetic.telling_apart import TellingApart
 from texture_estimation.genetic.trial import Record
 from texture_estimation.learners.learner import Codes, Learner
+from texture_estimation.recipe import Recipe
 
 Pair = tuple[str, str]
 
@@ -37,7 +39,7 @@ class OptimisedPairs:
         Learning and test accuracy of the most pairs won, over all surfaces, on each half.
     """
 
-    by_pair: Mapping[Pair, Optimised]
+    by_pair: Mapping[Pair, Optimised[Recipe]]
     record: Record
 
     @property
@@ -47,7 +49,7 @@ class OptimisedPairs:
 
 
 def optimise_pairs(
-    space: RecipeSpace,
+    space: RecipeSpace[Recipe],
     division: Division,
     params: SearchParams,
     *,
@@ -70,6 +72,7 @@ def optimise_pairs(
             space,
             division.only(pair),
             params,
+            TellingApart(),
             features=features,
             spread=spread,
             checkpoint=checkpoint and beside(checkpoint, pair),
@@ -112,7 +115,7 @@ class _PairVotes:
         return np.where(decided == UNDECIDED, UNDECIDED, np.array(self.pair)[decided]), first
 
 
-def _votes_of(pair: Pair, result: Optimised, division: Division, features: FeatureCache) -> _PairVotes:
+def _votes_of(pair: Pair, result: Optimised[Recipe], division: Division, features: FeatureCache) -> _PairVotes:
     recipe = result.best.recipe
     windows = recipe.training_windows
     examples = division.examples(windows)
@@ -120,7 +123,7 @@ def _votes_of(pair: Pair, result: Optimised, division: Division, features: Featu
         pair=(examples.names.index(pair[0]), examples.names.index(pair[1])),
         learner=recipe.learner,
         rule=recipe.evidence,
-        values=features.values(as_learnt(recipe)),
+        values=features.values(TellingApart().described(recipe)),
         codes=examples.codes,
         slides=examples.slides,
         halves=division.halves(windows),

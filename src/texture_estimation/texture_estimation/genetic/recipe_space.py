@@ -6,15 +6,15 @@ import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic
 
 import yaml
 
 from texture_core.catalogue import find, unknown
 from texture_core.errors import InvalidParameter
 from texture_core.resources import find_file
+from texture_estimation.genetic.task import R
 from texture_estimation.genetic.variables import Choice, Individual, Integer, LogReal, SearchSpace, Value, Variable
-from texture_estimation.recipe import Recipe
 
 KEYS = ('description', 'include', 'variables')
 PACKAGE, FOLDER = 'texture_estimation', 'config/search'
@@ -67,8 +67,8 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class RecipeSpace:
-    """The variables of a recipe.
+class RecipeSpace(Generic[R]):
+    """The variables of a recipe, of textures or of roughness.
 
     Examples
     --------
@@ -76,12 +76,12 @@ class RecipeSpace:
     >>> space.recipe(space.variables.decode(np.full(len(space.variables.names), 0.5)))
     """
 
-    base: Recipe
+    base: R
     axes: Mapping[str, Axis]
     name: str = ''
 
     @classmethod
-    def load(cls, name_or_path: str, base: Recipe) -> RecipeSpace:
+    def load(cls, name_or_path: str, base: R) -> RecipeSpace[R]:
         """Read a table of variables, by the name of a shipped one or by path.
 
         Raises
@@ -98,13 +98,14 @@ class RecipeSpace:
         """What the search sees."""
         return SearchSpace({name: axis.variable for name, axis in self.axes.items()})
 
-    def recipe(self, individual: Individual) -> Recipe:
+    def recipe(self, individual: Individual) -> R:
         """Return the recipe that an individual stands for."""
         content = copy.deepcopy(self.base.as_mapping())
         for axis, value in zip(self.axes.values(), individual, strict=True):
             for edit in axis.edits_for(value):
                 edit.apply(content)
-        return Recipe.from_mapping(content, self.base.name)
+        recipe: R = self.base.from_mapping(content, self.base.name)
+        return recipe
 
     def of_base(self) -> Individual:
         """Return the individual nearest to the recipe itself."""
@@ -119,7 +120,8 @@ class RecipeSpace:
         variable = axis.variable
         if axis.edits is not None:
             return next(
-                (option for option in axis.edits if _changes_nothing(axis.edits[option], content)), variable.value(0)
+                (option for option in axis.edits if self._changes_nothing(axis.edits[option], content)),
+                variable.value(0),
             )
         place: Any = content
         for step in axis.path:
@@ -128,6 +130,13 @@ class RecipeSpace:
             return variable.value(variable.index(place))
         except ValueError:
             return variable.value(0)
+
+    def _changes_nothing(self, edits: Sequence[Edit], content: Mapping[str, Any]) -> bool:
+        changed = copy.deepcopy(dict(content))
+        for edit in edits:
+            edit.apply(changed)
+        same: bool = self.base.from_mapping(changed, '').as_mapping() == content
+        return same
 
 
 def _read(name_or_path: str) -> dict[str, Axis]:
@@ -222,13 +231,6 @@ def _enter(place: Any, step: str, path: Sequence[str]) -> Any:
             'add it to the recipe, or give a search space that fits with --search'
         )
     return place[step]
-
-
-def _changes_nothing(edits: Sequence[Edit], content: Mapping[str, Any]) -> bool:
-    changed = copy.deepcopy(dict(content))
-    for edit in edits:
-        edit.apply(changed)
-    return Recipe.from_mapping(changed, '').as_mapping() == content
 
 
 def _described(variable: Variable) -> tuple[str, str]:

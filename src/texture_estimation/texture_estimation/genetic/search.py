@@ -31,6 +31,8 @@ class SearchParams:
     objective: str = param(
         'accuracy', 'accuracy alone, or the front of accuracy and computing time (NSGA-II).', choices=OBJECTIVES
     )
+    finalists: int = param(3, 'Best individuals that are judged again by the learner itself.', low=1, high=1000)
+    race: bool = param(True, 'Give up an individual once it is clearly worse than the best; else do all its halves.')
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ class _Jury:
         """Return the scores of one generation."""
         self._memory.hits += sum(one in self._memory.records for one in individuals)
         costs = [self._cost(one) for one in individuals]
-        leaders = parents or self._first_leaders(individuals, costs)
+        leaders = parents or (self._first_leaders(individuals, costs) if self._params.race else [])
         rivals = [self._rival(leaders, cost) for cost in costs]
         self._judge(individuals, rivals, self._params.halves)
         scored = []
@@ -199,6 +201,8 @@ class _Jury:
         Whoever is clearly worse than the best need not be known exactly: it is ranked by its estimate.
         """
         n_halves = self._params.halves
+        if not self._params.race:
+            return None
         fair = [one for one in leaders if one.cost <= cost and one.halves == n_halves]
         if not fair:
             return None
