@@ -41,6 +41,7 @@ COMMANDS: Mapping[str, Command] = {
     'record': Command('record', 'record the running system into a bag'),
     'replay': Command('replay', 'play a bag to the running system'),
     'import': Command('import_recordings', "turn other people's recordings into labelled bags"),
+    'segment': Command('segment', 'find the slides in bags that do not tell them'),
     'train': Command('train', 'learn a model from labelled bags'),
     'evaluate': Command('evaluate', 'say how good a model is on labelled bags'),
     'scene': Command('scene', 'draw a simulated surface, the way over it, the signal and its spectrum'),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections import deque
 
 import numpy as np
@@ -67,6 +68,12 @@ class Run:
         """Return the index of the first sample at or after a time, reckoned from the anchor."""
         index, stamp = anchor
         return index + math.ceil((time_ns - stamp) * self.rate_hz / NANOSECONDS - INDEX_TOLERANCE)
+
+    def time_of(self, index: float) -> int:
+        """Return when a sample, or a place between two, was taken, ns: reckoned from its batch, or the nearest kept."""
+        batch = max(0, bisect_right(self._marks, index, key=lambda mark: mark[0]) - 1)
+        first, stamp, _ = self._marks[batch]
+        return stamp + round((index - first) / self.rate_hz * NANOSECONDS)
 
     def take(self, first_sample: int, count: int) -> Samples:
         """Return a copy of samples that are kept, (count, n_channels) float64."""

@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidData
+from texture_core.exploration import Phase
+from texture_evaluation.bags import BagWriter, read_bag
+from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
+from texture_evaluation.segment import segment_bags
+from texture_evaluation.slides import find_slides
+from texture_features.segmentation import SegmentParams
+
+SURFACE = 'ridge_2mm_deep'
+
+
+@pytest.fixture(scope='module')
+def bag(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('told')
+    return write_simulated(folder, SlidePlan(slides=3, slide_s=1.0), np.random.default_rng(2), surfaces=[SURFACE])[0]
+
+
+def slides_of(path):
+    states = [value for _, _, value in read_bag(path, ('exploration',))]
+    begun = [state for state in states if state.phase is Phase.SLIDE]
+    ids = dict.fromkeys(state.exploration_id for state in begun)
+    return [next(state for state in begun if state.exploration_id == name) for name in ids], states
+
+
+def test_the_slides_found_are_those_that_the_explorer_told(bag, tmp_path):
+    [(path, count)] = segment_bags([bag], tmp_path / 'found', SegmentParams()).items()
+    (told, _), (found, _) = slides_of(bag), slides_of(path)
+    assert count == len(found) == len(told) == 3
+    for true, felt in zip(told, found, strict=True):
+        assert felt.stamp_ns == pytest.approx(true.stamp_ns, abs=40e6)
+        assert felt.steady_s == pytest.approx(1.0, abs=0.045)
+        assert (felt.surface, felt.speed_m_s) == (SURFACE, 0.1)
+    assert [slide.number for slide in find_slides([path])] == [1, 2, 3]
+
+
+def test_a_bag_without_states_gets_labelled_slides(bag, tmp_path):
+    bare = tmp_path / 'bare'
+    with BagWriter(bare, namespace='left') as writer:
+        for topic, log_ns, value in read_bag(bag, ('signal', 'signal_static')):
+            writer.write(topic, value, log_ns)
+    [path] = segment_bags([bare], tmp_path / 'found', SegmentParams(), surface='oak')
+    assert [slide.name for slide in find_slides([path])] == ['oak/1', 'oak/2', 'oak/3']
+
+
+def test_a_bag_without_vibration_gets_one_sentence(bag, tmp_path):
+    bare = tmp_path / 'bare'
+    with BagWriter(bare) as writer:
+        for topic, log_ns, value in read_bag(bag, ('signal_static',)):
+            writer.write(topic, value, log_ns)
+    with pytest.raises(InvalidData, match='record the vibration'):
+        segment_bags([bare], tmp_path / 'found', SegmentParams())

@@ -1,0 +1,99 @@
+"""When a finger is pressed on something, told from channels whose level follows the load."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.arrays import Array, Samples
+
+# Between these shares of the load its change is drawn as a line, out to where it began and ended.
+LOW, HIGH = 0.2, 0.8
+# A channel follows the load if it changes by such a share of the one that changes most.
+FOLLOWS = 0.1
+# A load is believed if it changes by so many times its own scatter from sample to sample.
+OVER_SCATTER = 20.0
+
+
+@dataclass(frozen=True)
+class Touch:
+    """One contact, s from the first sample: begins to be pressed, is pressed, is let go, is free.
+
+    Times before the first and after the last sample are -inf and inf.
+    """
+
+    begins_s: float
+    pressed_s: float
+    falls_s: float
+    ends_s: float
+
+    def later(self, by_s: float) -> Touch:
+        """Return the same contact, reckoned from a time before."""
+        return Touch(self.begins_s + by_s, self.pressed_s + by_s, self.falls_s + by_s, self.ends_s + by_s)
+
+
+def find_touches(levels: Samples, rate_hz: float, vibration: Array) -> list[Touch]:
+    """Return the contacts in their order; none without a clear load.
+
+    Parameters
+    ----------
+    levels : (n_samples, n_channels)
+        Channels of which some follow the load, in whatever direction; what is not finite counts as no change.
+    rate_hz
+        Their sampling rate.
+    vibration : (n_samples,)
+        How much the finger vibrates at the same times: it tells which of the two levels is contact.
+    """
+    if len(levels) < 3:
+        return []
+    load = _load(levels, vibration)
+    high = load > 0.5 * load.max()
+    if not high.any() or high.all():
+        return []
+    full, steps = float(np.median(load[high])), np.abs(np.diff(load, prepend=load[0]))
+    if full <= OVER_SCATTER * max(float(np.median(steps[high])), float(np.median(steps[~high]))):
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], high, [0])).astype(int))).reshape(-1, 2)
+    return [_touch(load / full, first, last - 1, rate_hz) for first, last in edges.tolist()]
+
+
+def _load(levels: Samples, vibration: Array) -> Array:
+    """Return the common change of the channels, (n_samples,), about 0 without contact."""
+    middle = np.nanmedian(np.where(np.isfinite(levels), levels, np.nan), axis=0, keepdims=True)
+    centred = np.nan_to_num(np.where(np.isfinite(levels), levels - middle, 0.0))
+    _, vectors = np.linalg.eigh(centred.T @ centred)
+    weights = vectors[:, -1]
+    # Channels saturate one after the other: those that follow the load count alike, or the strongest tell its end late.
+    load: Array = centred @ np.where(np.abs(weights) > FOLLOWS * np.abs(weights).max(), np.sign(weights), 0.0)
+    upper = load > 0.5 * (load.min() + load.max())
+    if 0 < upper.sum() < len(load) and np.median(vibration[upper]) < np.median(vibration[~upper]):
+        load = -load
+    return load - np.quantile(load, 0.05)
+
+
+def _touch(load: Array, first: int, last: int, rate_hz: float) -> Touch:
+    """Return the contact that is above one half from sample `first` to sample `last`."""
+    ends = _line(load, last)
+    count = len(load) - 1
+    begins = [count - place for place in _line(load[::-1], count - first)]
+    return Touch(begins[1] / rate_hz, begins[0] / rate_hz, ends[0] / rate_hz, ends[1] / rate_hz)
+
+
+def _line(load: Array, last: int) -> tuple[float, float]:
+    """Return where a load that is above one half up to sample `last` begins to fall and is gone, in samples."""
+    if last == len(load) - 1:
+        return math.inf, math.inf
+    above = np.flatnonzero(load[: last + 1] > HIGH)
+    below = np.flatnonzero(load[last:] < LOW)
+    if not len(above) or not len(below):
+        return float(last), float(last + 1)
+    high, low = _crossing(load, int(above[-1]), HIGH), _crossing(load, last + int(below[0]) - 1, LOW)
+    step = (low - high) / (HIGH - LOW)
+    return high - step * (1.0 - HIGH), low + step * LOW
+
+
+def _crossing(load: Array, before: int, level: float) -> float:
+    drop = float(load[before] - load[before + 1])
+    return before + (float(load[before]) - level) / drop if drop > 0 else float(before)

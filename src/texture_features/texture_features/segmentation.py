@@ -1,0 +1,279 @@
+"""When a finger slides, told from what it feels alone: no force sensor, no word from the robot.
+
+A finger at rest gives the sensor's noise; a sliding one gives vibration that grows with its speed. So sliding is where
+the power stays above that of rest, and its steady part begins one ramp after the power began to grow as it does while a
+finger gains speed. It ends where the load on the finger begins to fall, or, without channels that follow the load, one
+ramp before the power is back at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import percentile_filter, uniform_filter1d
+from scipy.special import gammaln
+
+from texture_core.arrays import Array, Samples
+from texture_core.errors import InvalidData
+from texture_core.parameters import param
+from texture_features.cell_power import SENSES, SMOOTH_S, SMOOTHED_CELLS, SPEEDS, TINY, cell_power, growth, rest_power
+from texture_features.contact_load import Touch, find_touches
+
+# Rest and sliding are told apart over 50 ms. A touch or a knock lasts a part of that, sliding most.
+SMOOTHED_PERCENTILE = 70
+KNOCK_S = 0.08
+# In a contact, its knocks left out, less is enough for longer: the mean of 0.25 s of rest scatters by some percent.
+LONG_S, LONG_ON, LONG_OFF = 0.25, 3.0, 1.5
+# How near, in cells, a slide begins to where it is seen first.
+NEAR_CELLS = 36
+# Independent values in the power of a cell, halved: at rest, and at least in a vibration that comes in bursts.
+REST_SHAPE, LEAST_SHAPE = 2.5, 0.2
+ONSETS_A_CELL = 2
+LEAST_POWER = 0.01
+# One cell in a hundred is a knock, of any power over nine decades (20 nats).
+ANYTHING = math.log(0.01 / 20)
+# Levels of the vibration channels themselves, where no others tell the load.
+LEVEL_S = 0.01
+UNTOUCHED = Touch(-math.inf, -math.inf, math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class SegmentParams:
+    """How sliding is found. None of it is fitted to recordings: the power of 50 ms of rest scatters by a fifth."""
+
+    cell_s: float = param(0.005, 'Time over which power is taken.', unit='s', low=0.001, high=0.1)
+    on: float = param(6.0, 'Power, in that of rest, above which sliding is certain.', low=1.0, high=1e6)
+    off: float = param(3.0, 'Power, in that of rest, down to which it then goes on.', low=1.0, high=1e6)
+    bridge_s: float = param(0.2, 'A quieter part of a slide is at most so long.', unit='s', low=0.0, high=10.0)
+    least_s: float = param(0.15, 'A slide is at least so long.', unit='s', low=0.0, high=60.0)
+    ramp_s: float = param(
+        0.2, 'Time in which the robot gains its speed, and loses it, from its plan.', unit='s', low=0.0, high=10.0
+    )
+    press_s: float = param(
+        0.1, 'Time in which the robot presses on, and lets go, from its plan.', unit='s', low=0.0, high=10.0
+    )
+    senses: str = param(
+        'either', "What the vibration channels feel: the force, its change, or 'either'.", choices=tuple(SENSES)
+    )
+    rest_rms: float = param(
+        0.0, "The sensor's noise at rest, in its unit; 0: that of the quietest tenth of the recording.", low=0.0
+    )
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """One stretch of sliding, s from the first sample: when the finger sets off, and where its speed is steady."""
+
+    moving_s: float
+    start_s: float
+    end_s: float
+
+
+def find_sliding(
+    fast: Samples,
+    rate_hz: float,
+    params: SegmentParams,
+    *,
+    slow: Samples | None = None,
+    slow_rate_hz: float = math.nan,
+    slow_from_s: float = 0.0,
+    rest: Array | None = None,
+) -> list[Sliding]:
+    """Return the stretches of sliding in a recording that holds some rest, in order.
+
+    A surface that makes no more vibration than the sensor has noise is not found to slide.
+
+    Parameters
+    ----------
+    fast : (n_samples, n_channels)
+        Vibration; what is not finite counts as rest.
+    rate_hz
+        Its sampling rate.
+    slow : (n_slow_samples, n_slow_channels), optional
+        Pressure: tells the end to some milliseconds. Without it the levels of `fast` are looked at.
+    slow_rate_hz, slow_from_s
+        Its sampling rate, and when its first sample was taken after the first of `fast`.
+    rest : (n_channels,), optional
+        Power of each channel at rest, if it is known; see `rest_power`.
+
+    Raises
+    ------
+    InvalidData
+        If the shape or a rate makes no sense.
+    """
+    if fast.ndim != 2 or not rate_hz > 0 or (slow is not None and (slow.ndim != 2 or not slow_rate_hz > 0)):
+        raise InvalidData(
+            f'sliding is looked for in samples of shape {fast.shape} at {rate_hz} Hz; '
+            '(n_samples, n_channels) at a rate above 0 is needed, of the slow channels too'
+        )
+    cell_s, powers = cell_power(fast, rate_hz, params.cell_s)
+    if len(powers) < SMOOTHED_CELLS:
+        return []
+    if rest is None:
+        rest = rest_power(powers)
+    if params.rest_rms:
+        rest = np.full(fast.shape[1], params.rest_rms**2)
+    power = _mean(powers / rest)
+    if slow is None:
+        slow, slow_rate_hz, slow_from_s = levels_of(fast, rate_hz)
+    touches = _touches(slow, slow_rate_hz, slow_from_s, power, cell_s)
+    known = np.where(_unchanged(len(power), cell_s, touches, params.press_s), power, np.nan)
+    found = []
+    for run in active_runs(known, cell_s, touches, params):
+        touch, steady = _steady(run, touches, cell_s)
+        width = round(cell_s * rate_hz)
+        grows = growth(fast[steady.start * width : steady.stop * width], rate_hz, rest, params.senses)
+        found.append(_refined(known, cell_s, run, touch=touch, steady=steady, grows=grows, params=params))
+    return [sliding for sliding in found if sliding.end_s - sliding.start_s >= params.least_s]
+
+
+def _mean(ratios: Array) -> Array:
+    """Return the mean over the channels that are known, (n_cells,); 1 without one."""
+    known = np.isfinite(ratios)
+    means: Array = np.where(known, ratios, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    return np.where(known.any(axis=1), means, 1.0)
+
+
+def levels_of(fast: Samples, rate_hz: float) -> tuple[Samples, float, float]:
+    """Return the means of 10 ms of vibration channels, their rate, and the time of the first."""
+    width = max(1, round(LEVEL_S * rate_hz))
+    count = len(fast) // width
+    known = np.isfinite(fast[: count * width])
+    sums = np.where(known, fast[: count * width], 0.0).reshape(count, width, -1).sum(axis=1)
+    means = sums / np.maximum(known.reshape(count, width, -1).sum(axis=1), 1)
+    return means, rate_hz / width, 0.5 * (width - 1) / rate_hz
+
+
+def active_runs(power: Array, cell_s: float, touches: Sequence[Touch], params: SegmentParams) -> list[tuple[int, int]]:
+    """Return the stretches of cells, first and one past the last, in which the power stays above that of rest, 1.
+
+    NaN for a cell in which a changing load knocks.
+    """
+    known = np.isfinite(power)
+    filled = np.where(known, power, 0.0)
+    smooth = percentile_filter(filled, SMOOTHED_PERCENTILE, SMOOTHED_CELLS, mode='nearest')
+    width = max(1, round(LONG_S / cell_s))
+    share = uniform_filter1d(known.astype(float), width, mode='constant')
+    longer = uniform_filter1d(filled, width, mode='constant') / np.maximum(share, 0.5 / width)
+    touched = _touched(len(power), cell_s, touches)
+    active = (smooth > params.off) | (touched & (longer > LONG_OFF))
+    certain = (smooth > params.on) | (touched & (longer > LONG_ON))
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], active, [0]))))
+    runs: list[tuple[int, int]] = []
+    for first, last in edges.reshape(-1, 2).tolist():
+        if (last - first) * cell_s < KNOCK_S or not certain[first:last].any():
+            continue
+        if runs and (first - runs[-1][1]) * cell_s <= params.bridge_s:
+            runs[-1] = (runs[-1][0], last)
+        else:
+            runs.append((first, last))
+    return [run for run in runs if (run[1] - run[0]) * cell_s >= params.least_s]
+
+
+def _touches(slow: Samples, rate_hz: float, from_s: float, power: Array, cell_s: float) -> list[Touch]:
+    """Return the contacts, in the time of the vibration."""
+    smooth = uniform_filter1d(np.log(power + TINY**0.1), SMOOTHED_CELLS)
+    vibration = np.interp(from_s + np.arange(len(slow)) / rate_hz, (np.arange(len(power)) + 0.5) * cell_s, smooth)
+    return [touch.later(from_s) for touch in find_touches(slow, rate_hz, vibration)]
+
+
+def _touched(count: int, cell_s: float, touches: Sequence[Touch]) -> NDArray[np.bool_]:
+    """Return which of `count` cells lie in a contact."""
+    middle = (np.arange(count) + 0.5) * cell_s
+    inside = [(middle > touch.begins_s) & (middle < touch.ends_s) for touch in touches]
+    return np.any(inside, axis=0) if inside else np.zeros(count, dtype=bool)
+
+
+def _unchanged(count: int, cell_s: float, touches: Sequence[Touch], press_s: float) -> NDArray[np.bool_]:
+    """Return which of `count` cells hold no knock of a changing load."""
+    middle = (np.arange(count) + 0.5) * cell_s
+    sure = np.ones(count, dtype=bool)
+    for touch in touches:
+        pressed_s = max(touch.pressed_s, touch.begins_s + press_s)
+        free_s = max(touch.ends_s, touch.falls_s + press_s)
+        for first_s, last_s in ((touch.begins_s, pressed_s), (touch.falls_s, free_s)):
+            sure &= (middle < first_s - 0.5 * SMOOTH_S) | (middle > last_s + SMOOTH_S)
+    return sure
+
+
+def _steady(run: tuple[int, int], touches: Sequence[Touch], cell_s: float) -> tuple[Touch, slice]:
+    """Return the contact in which the cells of a run lie, and the middle half of what they share with it."""
+    first, last = run
+    middle_s = 0.5 * (first + last) * cell_s
+    touch = next((touch for touch in touches if touch.pressed_s <= middle_s <= touch.falls_s), UNTOUCHED)
+    begin = max(first, math.floor(max(touch.pressed_s, 0.0) / cell_s))
+    end = min(last, math.ceil(min(touch.falls_s, last * cell_s) / cell_s))
+    quarter = (end - begin) // 4
+    return touch, slice(begin + quarter, end - quarter)
+
+
+def _refined(
+    power: Array,
+    cell_s: float,
+    run: tuple[int, int],
+    *,
+    touch: Touch,
+    steady: slice,
+    grows: Array,
+    params: SegmentParams,
+) -> Sliding:
+    """Return the sliding whose power stands out in the cells of `run`; NaN in a cell of which nothing is known."""
+    first, last = run
+    ramp = params.ramp_s / cell_s
+    moving_s = cell_s * _onset(power, power[steady], first, ramp, grows)
+    start_s = max(moving_s + params.ramp_s, touch.pressed_s, 0.0)
+    if touch.falls_s < last * cell_s + params.ramp_s + params.bridge_s:
+        end_s = touch.falls_s
+    elif last >= len(power):
+        end_s = len(power) * cell_s
+    else:
+        end_s = (
+            cell_s * (len(power) - _onset(power[::-1], power[steady], len(power) - last, ramp, grows)) - params.ramp_s
+        )
+    return Sliding(moving_s, start_s, end_s)
+
+
+def _onset(power: Array, steady: Array, near: int, ramp: float, grows: Array) -> float:
+    """Return where the power begins to grow, in cells: the mean over what is likely.
+
+    The power of a cell is taken to be gamma distributed about 1 + level · g(t), where g rises over the ramp as the
+    power of the vibration does at growing speed. All onsets and ways to grow are equally likely beforehand.
+
+    Parameters
+    ----------
+    power : (n_cells,)
+        In that of rest; NaN if unknown.
+    steady
+        That of the cells at steady speed.
+    near
+        Where it is seen to stand out first.
+    ramp
+        Length of the growth, in cells.
+    grows : (n_ways, n_speeds)
+        See `cell_power.growth`.
+    """
+    around = math.ceil(ramp) + NEAR_CELLS
+    begin = max(0, near - around)
+    cells = power[begin : near + around]
+    known = np.isfinite(cells)
+    earliest = near - around - begin
+    onsets = np.arange(earliest * ONSETS_A_CELL, (near - begin + NEAR_CELLS) * ONSETS_A_CELL) / ONSETS_A_CELL
+    speed = np.clip((np.flatnonzero(known) + 0.5 - onsets[:, None]) / max(ramp, 1e-9), 0.0, 1.0)
+    level = max(float(np.nanmean(steady)) - 1.0, 0.5)
+    vibration = level * np.stack([np.interp(speed, SPEEDS, way) for way in grows], axis=1)
+    shape = float(np.clip(level**2 / max(float(np.nanvar(steady)), TINY), LEAST_SHAPE, REST_SHAPE))
+    fit = _gamma_fit(cells[known], 1.0 + vibration, 1.0 / REST_SHAPE + vibration**2 / shape).sum(axis=-1)
+    likely = np.exp(fit - fit.max()).sum(axis=1)
+    return begin + float(likely @ onsets / likely.sum())
+
+
+def _gamma_fit(values: Array, mean: Array, variance: Array) -> Array:
+    """Return the logarithm of the gamma density of the logarithm of powers, of which a few may be anything."""
+    shape = mean**2 / variance
+    scaled = shape * np.maximum(values, LEAST_POWER) / mean
+    fit: Array = np.logaddexp(shape * np.log(scaled) - scaled - gammaln(shape), ANYTHING)
+    return fit
