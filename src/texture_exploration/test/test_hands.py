@@ -14,7 +14,7 @@ from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.explorer import Explorer
 from texture_exploration.hands.dynamixel import DynamixelHand
-from texture_exploration.hands.dynamixel_bus import signed
+from texture_exploration.hands.dynamixel_bus import DynamixelBus, signed
 from texture_exploration.hands.profile import load_profile
 from texture_exploration.hands.simulated import SimulatedHand
 from texture_exploration.motions.touch import TouchParams
@@ -133,6 +133,16 @@ def test_closing_lets_the_object_go(bus):
     assert bus.motors.forces_n[thumb] == pytest.approx(2.0, rel=0.5)
     arm.close()
     until(lambda: not any(table[64] for table in bus.motors.tables.values()))
+
+
+@needs_sdk
+def test_motors_that_do_not_answer_are_let_go_too(bus):
+    line = DynamixelBus(str(bus.port.link), LEAP)
+    line.start()
+    line.missing = {5}
+    line.torque_off(LEAP.ids)
+    until(lambda: not any(table[64] for table in bus.motors.tables.values()))
+    line.close()
 
 
 @needs_sdk

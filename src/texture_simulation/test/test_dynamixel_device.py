@@ -82,6 +82,16 @@ def test_the_goal_current_bounds_the_force(bus):
     assert read(bus, 1, 126, '<h') == 200
 
 
+def test_a_motor_presses_calmly_however_stiff_the_object():
+    stiff = EmulatedDynamixelBus(Path('/nowhere'), DynamixelMotors([1], {1: Pressing(0.1, 0.01)}, stiffness_n_m=1e5))
+    for address, value, size in ((84, 600, 2), (102, 200, 2), (116, 2048 + 400, 4), (64, 1, 1)):
+        stiff.hear(write(1, address, value, size))
+    stiff.motors.advance(4000)
+    for _ in range(20):
+        stiff.motors.advance(1)
+        assert stiff.motors.forces_n[1] == pytest.approx(0.2 * 0.35 / 0.1, rel=0.01)
+
+
 def test_a_free_motor_goes_to_its_goal(bus):
     for address, value, size in ((84, 600, 2), (102, 300, 2), (116, 1948, 4), (64, 1, 1)):
         bus.hear(write(2, address, value, size))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from texture_core.errors import DeviceError
 from texture_exploration.arms.protocol import ArmCommand
@@ -110,24 +110,23 @@ class DynamixelHand:
         period_s = 1.0 / self.profile.rate_hz
         for finger in self._fingers.values():
             finger.restart()
-        last_s = searched_s = time.monotonic()
+        now_s = stepped_s = searched_s = time.monotonic()
         errors: dict[str, None] = {}
-        while not self._closing.wait(max(0.0, last_s + period_s - time.monotonic())):
+        while not self._closing.wait(max(0.0, now_s + period_s - time.monotonic())):
             now_s = time.monotonic()
-            motors = bus.read()
             if bus.missing and now_s - searched_s > SEARCH_S:
                 searched_s = now_s
                 bus.look_for(min(bus.missing))
-            if motors and (error := bus.next_hardware_error()):
-                errors[error] = None
-            missing = [f'{self.profile.owner(motor)} does not answer' for motor in sorted(bus.missing)]
-            fault = '; '.join([*missing, *errors])
+            motors = bus.read()
             if not motors:
-                if fault and self._fresh.is_set():
-                    self._publish(fault)  # at once: before the others have been read again
+                if bus.missing and self._fresh.is_set():
+                    self._publish(self._fault(bus, errors))  # at once: before the others have been read again
                 continue
-            goals = self._step(motors, min(LONGEST_STEP_S, now_s - last_s), now_s)
-            last_s = now_s
+            if error := bus.next_hardware_error():
+                errors[error] = None
+            fault = self._fault(bus, errors)
+            goals = self._step(motors, min(LONGEST_STEP_S, now_s - stepped_s), now_s)
+            stepped_s = now_s
             self._publish(fault)
             if fault and self._torque_off:
                 bus.torque_off(self.profile.ids)
@@ -145,6 +144,10 @@ class DynamixelHand:
                 command = STANDSTILL
             goals.update(finger.goals(command, dt_s))
         return goals
+
+    def _fault(self, bus: DynamixelBus, errors: Iterable[str]) -> str:
+        missing = [f'{self.profile.owner(motor)} does not answer' for motor in sorted(bus.missing)]
+        return '; '.join([*missing, *errors])
 
     def _publish(self, fault: str) -> None:
         tips = {name: finger.tip for name, finger in self._fingers.items()}

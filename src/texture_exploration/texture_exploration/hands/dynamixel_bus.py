@@ -1,7 +1,7 @@
 """Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
 
-Its reception is a busy loop, and its calls leave `is_using` set when they fail: one thread alone may use a bus, and
-after an error the port is made anew.
+Its calls leave `is_using` set when they fail: one thread alone may use a bus, and after an error the port is made anew.
+Its reception is a busy loop; a port that waits a little for bytes makes it sleep, and leaves Python's lock to others.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ LINE_FAULTS = (serial.SerialException, OSError, termios.error, TypeError, Attrib
 PROTOCOL = 2.0
 SUCCESS = 0
 TRIES = 3
+WAIT_S = 0.001
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
 
 
@@ -61,6 +62,7 @@ class DynamixelBus:
             opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
         if not opened:
             raise DeviceError(f"device '{device}' refuses {profile.baud} baud; correct the profile '{profile.name}'")
+        self._port.ser.timeout = WAIT_S
         first, last = profile.table['present_current'], profile.table['present_position']
         self._block = (first[0], last[0] + last[1] - first[0])
         self._turn = 0
@@ -118,8 +120,10 @@ class DynamixelBus:
         with self._line():
             result = group.txRxPacket() if asked else SUCCESS
         if result != SUCCESS:
-            # One that is silent hides all that come after it: ask each.
-            self.missing |= {motor for motor in asked if not self._answers(motor)}
+            # They answer in turn: the first that is silent hides all that come after it.
+            silent = next(motor for motor in asked if not group.data_dict[motor])
+            if not self._answers(silent):
+                self.missing.add(silent)
             return {}
         return {motor: self._measured(group, motor) for motor in asked}
 
@@ -133,8 +137,8 @@ class DynamixelBus:
         )
 
     def torque_off(self, motors: Iterable[int]) -> None:
-        """Let motors go."""
-        self._sync_write('torque_enable', dict.fromkeys(set(motors) - self.missing, 0))
+        """Let motors go, also those that do not answer: they may hear."""
+        self._sync_write('torque_enable', dict.fromkeys(motors, 0))
 
     def next_hardware_error(self) -> str:
         """Ask one motor after the other, one with each call; return in words what it reports, '' if nothing."""

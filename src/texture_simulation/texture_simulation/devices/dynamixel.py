@@ -32,7 +32,7 @@ MODE, TORQUE, ERROR, P_GAIN, GOAL_CURRENT, GOAL_POSITION, PRESENT = 11, 64, 70, 
 RAD_PER_COUNT, RAD_S_PER_COUNT, A_PER_COUNT = 0.001533981, 0.0239691, 0.001
 TORQUE_NM_A = 0.35
 A_PER_RAD_AND_GAIN = 0.005  # how much current an error makes, per gain
-DAMPING = 0.01  # N·m per rad/s
+DAMPING = 0.012  # N·m per rad/s
 PHYSICS_S = 0.0005
 TURN_S = 0.002
 IDLE_S = 0.0005
@@ -140,8 +140,9 @@ class DynamixelMotors:
         for _ in range(steps):
             self._current = np.where(torque, np.clip(gain * (goal - self._angle), -most, most), 0.0)
             depth = np.maximum(0.0, self._angle * self._lever - self._height)
-            load = self.stiffness_n_m * depth * self._lever
-            self._speed = (self._current * TORQUE_NM_A - load) / (DAMPING + 2e-3)
+            spring = self.stiffness_n_m * self._lever * (depth > 0)
+            # Implicit: the load is that at the end of the step, so no stiffness makes it swing.
+            self._speed = (self._current * TORQUE_NM_A - spring * depth) / (DAMPING + PHYSICS_S * spring * self._lever)
             self._angle = self._angle + self._speed * PHYSICS_S
         self._show()
 
