@@ -62,28 +62,44 @@ def _mixed(random: Random, low: int, share: Array, rows: Array, columns: Array) 
 
 
 def _bilinear(tile: NDArray[np.complex64], rows: Array, columns: Array) -> NDArray[np.complex64]:
-    """Return a tile between its points; rows and columns go on periodically."""
+    """Return a tile, with its first row and column again at its end, between its points; rows and columns go on.
+
+    Written in place, which takes two thirds of the time.
+    """
     row, column = np.floor(rows), np.floor(columns)
     down, right = (rows - row).astype(np.float32), (columns - column).astype(np.float32)
-    up, left = row.astype(np.int32) & (SIDE - 1), column.astype(np.int32) & (SIDE - 1)
-    low, beside = ((up + 1) & (SIDE - 1)) * SIDE, (left + 1) & (SIDE - 1)
-    up = up * SIDE
-    upper, lower = tile.take(up + left), tile.take(low + left)
-    upper += right * (tile.take(up + beside) - upper)
-    lower += right * (tile.take(low + beside) - lower)
-    upper += down * (lower - upper)
+    at = (row.astype(np.intp) & (SIDE - 1)) * (SIDE + 1)
+    at += column.astype(np.intp) & (SIDE - 1)
+    upper = _between(tile, at, right)
+    at += SIDE + 1
+    lower = _between(tile, at, right)
+    lower -= upper
+    lower *= down
+    upper += lower
     return upper
+
+
+def _between(tile: NDArray[np.complex64], at: NDArray[np.intp], share: NDArray[np.float32]) -> NDArray[np.complex64]:
+    """Return values between points and those after them."""
+    value, after = tile.take(at), tile.take(at + 1)
+    after -= value
+    after *= share
+    value += after
+    return value
 
 
 @lru_cache(maxsize=256)
 def _pair(random: Random, low: int) -> NDArray[np.complex64]:
-    """Return the tiles of a blur and of the next blunter one, flat, as real and imaginary part: found at once."""
+    """Return the tiles of a blur and of the next blunter one as real and imaginary part: found at once.
+
+    Flat, ((SIDE + 1)²,), the first row and column again at the end.
+    """
     spectrum, wave_1_m = _spectrum(random)
     sharp, blunt = (
-        np.fft.irfft2(spectrum * np.exp(-0.5 * (2 * np.pi * wave_1_m * blur) ** 2), s=(SIDE, SIDE)).ravel()
+        np.fft.irfft2(spectrum * np.exp(-0.5 * (2 * np.pi * wave_1_m * blur) ** 2), s=(SIDE, SIDE))
         for blur in BLURS_M[low : low + 2]
     )
-    return (sharp + 1j * blunt).astype(np.complex64)
+    return np.pad((sharp + 1j * blunt).astype(np.complex64), ((0, 1), (0, 1)), mode='wrap').ravel()
 
 
 @lru_cache(maxsize=64)
