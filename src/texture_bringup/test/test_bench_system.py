@@ -18,6 +18,7 @@ from texture_core.errors import InvalidParameter, LaunchFailed  # noqa: E402
 from texture_core.exploration import ExplorationRequest  # noqa: E402
 from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
+from texture_evaluation.train_grades import train_grades_from_bags  # noqa: E402
 
 DOMAIN = 61
 DEADLINE_S = 60.0
@@ -46,8 +47,22 @@ def is_running(pid: int) -> bool:
 
 
 @pytest.fixture(scope='module')
-def bench(folder):
-    with launched(folder, surface='ridge_2mm_deep') as launcher:
+def bags(folder):
+    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
+    return write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', 'ridge_2mm_deep'))
+
+
+@pytest.fixture(scope='module')
+def roughness_model(folder, bags):
+    grades = folder / 'grades.csv'
+    grades.write_text('texture,grade\nglass,1\nridge_2mm_deep,5\n', encoding='utf-8')
+    train_grades_from_bags('roughness', bags, grades, out=folder / 'rough')
+    return folder / 'rough.json'
+
+
+@pytest.fixture(scope='module')
+def bench(folder, roughness_model):
+    with launched(folder, surface='ridge_2mm_deep', roughness_model=roughness_model) as launcher:
         yield launcher
 
 
@@ -60,10 +75,8 @@ def operator(bench):
 
 
 @pytest.fixture(scope='module')
-def models(folder):
+def models(folder, bags):
     """Return the paths of a model on the vibration alone and of one with the taxels, both of simulated slides."""
-    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
-    bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', 'ridge_2mm_deep'))
     for recipe in ('default', 'vibration-and-taxels'):
         train_from_bags(recipe, bags, out=folder / recipe)
     return {'vibration': folder / 'default.skops', 'taxels': folder / 'vibration-and-taxels.skops'}
@@ -76,6 +89,13 @@ def test_an_exploration_without_a_model_ends_well_and_says_what_is_missing(opera
     assert 'slide' in seen
     assert explored.texture.final
     assert 'model' in explored.texture.message
+
+
+def test_a_roughness_model_grades_beside_the_classifier(operator) -> None:
+    roughness = operator.explore(SLIDE).roughness
+    assert (roughness.valid, roughness.final, roughness.model) == (True, True, 'rough')
+    assert roughness.grade > 3.0
+    assert roughness.grade_std > 0.0
 
 
 def test_a_model_of_simulated_slides_recognises_the_surface_on_the_bench(operator, models) -> None:
@@ -117,7 +137,8 @@ def test_nothing_moves_when_stopped(operator) -> None:
 
 def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operator, bench) -> None:
     pids = processes(bench)
-    assert set(pids) == {f'left/{name}' for name in ('bench', 'sensor', 'explorer', 'feature_extractor', 'classifier')}
+    names = ('bench', 'sensor', 'explorer', 'feature_extractor', 'classifier')
+    assert set(pids) == {f'left/{name}' for name in (*names, 'roughness_features', 'roughness_estimator')}
     os.kill(pids['left/classifier'], signal.SIGKILL)
     with pytest.raises(LaunchFailed, match='node left/classifier was killed by SIGKILL'):
         for _ in range(1000):

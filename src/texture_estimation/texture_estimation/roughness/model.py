@@ -108,7 +108,7 @@ class RoughnessModel:
         return {
             'format': model_files.FORMAT,
             'name': self.name,
-            'target': 'roughness grade, 1 (smooth) to 5 (rough), as people give it',
+            'target': 'roughness grade, 1 (smooth) to 5 (rough), as people give it: an opinion, not a depth',
             'feature_set': self.feature_set,
             'features': list(self.names),
             'grades': dict(self.grades),
