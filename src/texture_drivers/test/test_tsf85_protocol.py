@@ -59,6 +59,7 @@ def test_a_packet_comes_out_with_its_last_byte_wherever_the_stream_is_cut() -> N
 @pytest.mark.parametrize(
     ('reason', 'packet'),
     [
+        ("one finger's dynamic value twice, the other's with a flipped bit", '9A 00 58 06 20 0102 20 0304'),
         ('no data command', '9A 00 E3 03 20 0102'),
         ('unknown type 0x80', '9A 00 58 03 80 0102'),
         ('index bits', '9A 00 58 03 21 0102'),

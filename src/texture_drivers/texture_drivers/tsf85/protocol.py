@@ -28,8 +28,9 @@ class PacketParser:
     """Turn a byte stream into packets, whatever is lost or added on the way.
 
     The protocol has no checksum, so a packet is believed only if everything about it fits: a data command, known item
-    types, index bits 0, a finger that exists, items that end exactly with the payload, and a start byte after it as
-    far as one has come. A flipped value byte inside such a packet cannot be seen.
+    types, index bits 0, a finger that exists, no item twice (a flipped type or finger would make a sample that never
+    was), items that end exactly with the payload, and a start byte after it as far as one has come. A flipped value
+    byte inside such a packet cannot be seen.
 
     Parameters
     ----------
@@ -102,15 +103,17 @@ def _packet_at(buffer: bytes, start: int, layouts: Mapping[int, Struct]) -> Pack
 def _walk(payload: bytes, timestamp: Struct, layouts: Mapping[int, Struct]) -> tuple[Item, ...] | None:
     """Return the items of a payload, or None if they do not fit it exactly."""
     items = []
+    heads: set[int] = set()
     position = 0
     while position < len(payload):
         head = payload[position]
         kind, finger = head & tables.TYPE_MASK, (head & tables.FINGER_MASK) >> tables.FINGER_SHIFT
         layout = timestamp if kind == tables.TIMESTAMP else layouts.get(kind)
-        if layout is None or head & tables.INDEX_MASK or finger >= tables.FINGERS:
+        if layout is None or head & tables.INDEX_MASK or finger >= tables.FINGERS or head in heads:
             return None
         if position + 1 + layout.size > len(payload):
             return None
+        heads.add(head)
         items.append(Item(kind, finger, layout.unpack_from(payload, position + 1)))
         position += 1 + layout.size
     return tuple(items)
