@@ -15,6 +15,7 @@ def test_force_speed_and_circle_are_kept_and_the_border_is_foretold(tmp_path: Pa
     numbers, targets = result.numbers, result.numbers['targets']
     assert path.is_file()
     assert all(chart.is_file() for chart in result.charts)
+    assert '| emulated rails | 2000 N/m | circular |' in (tmp_path / 'motion.md').read_text()
     assert {'simulated, force mode', 'simulated, velocities only'} < set(numbers['robots'])
     rows = [row for robot in numbers['robots'].values() for both in robot.values() for row in both.values()]
     assert all(row['success'] for row in rows), rows

@@ -1,8 +1,8 @@
-"""Charts of force control: what is kept on which surface, and where it is stable."""
+"""Charts and tables of force control: what is kept on which surface, and where it is stable."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,36 +13,74 @@ from texture_evaluation.charts import COLOURS, chart
 from texture_exploration.force_trials import Trial
 
 MARKERS = 'o^vsD'
+TICKS = (0.2, 2, 20)
 
+STRAIGHT = ('linear_slide', 'in_hand_sliding')
 
-# What is drawn of each robot: motion, number, what it is called, and in what unit times how much.
+# What is drawn of each robot: motions (the first that it does), number, what it is called, in what unit times how much.
 PANELS = (
-    ('linear_slide', 'force_rms', 'force error, rms (%)', 100),
-    ('linear_slide', 'overshoot', 'overshoot of the force (%)', 100),
-    ('circular', 'speed_error', 'largest speed error on the circle (%)', 100),
-    ('circular', 'radius_error_m', 'largest error of the radius (mm)', 1000),
+    (STRAIGHT, 'force_rms', 'force error, rms (%)', 100),
+    (STRAIGHT, 'overshoot', 'overshoot of the force (%)', 100),
+    (('circular',), 'speed_error', 'largest speed error on the circle (%)', 100),
+    (('circular',), 'radius_error_m', 'largest error of the radius (mm)', 1000),
 )
+# The same as columns of a table.
+COLUMNS = (
+    ('force_rms', 'force error, rms (%)', 100),
+    ('overshoot', 'overshoot (%)', 100),
+    ('speed_error', 'largest speed error (%)', 100),
+    ('mean_speed_error', 'mean speed error (%)', 100),
+    ('radius_error_m', 'error of the radius (mm)', 1000),
+)
+
+
+def robot_table(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, float]) -> str:
+    """Return a Markdown table of what each robot kept; `robots` is as in the JSON of the bench."""
+    asked = [f'{times * targets[name]:g}' if name in targets else '' for name, _, times in COLUMNS]
+    rows = [
+        [robot, stiffness, motion, *(_cell(numbers.get(name), times) for name, _, times in COLUMNS)]
+        for robot, by_stiffness in robots.items()
+        for stiffness, motions in by_stiffness.items()
+        for motion, numbers in motions.items()
+    ]
+    return _table(
+        ['robot', 'stiffness', 'motion', *(title for _, title, _ in COLUMNS)],
+        [['asked: at most', '', '', *asked], *rows],
+    )
+
+
+def surface_table(surfaces: Mapping[str, Mapping[float, Trial]]) -> str:
+    """Return a Markdown table of the error of the force by surface and stiffness, in percent."""
+    stiffnesses = list(next(iter(surfaces.values())))
+    rows = [[name, *(_cell(trial.force_rms, 100) for trial in trials.values())] for name, trials in surfaces.items()]
+    return _table(['force error, rms (%)', *(f'{stiffness:.0f} N/m' for stiffness in stiffnesses)], rows)
 
 
 def robot_chart(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, float], path: str | Path) -> Path:
     """Draw how each robot kept force, speed and circle over the stiffness; `robots` is as in the JSON of the bench."""
     with chart(path, (9.0, 6.4)) as figure:
         figure.suptitle(
-            'Flat surfaces, 1 N: straight at 0.05 m/s, circle of 20 mm at 0.1 m/s', x=0.02, ha='left', fontweight='bold'
-        )
-        for axes, (motion, number, name, times) in zip(figure.subplots(2, 2).flat, PANELS, strict=True):
+            'Flat surfaces, 1 N: straight at 0.05 m/s (the hand 0.02), circle of 20 mm at 0.1 m/s', x=0.02, ha='left',
+            fontweight='bold',
+        )  # fmt: skip
+        panels = list(figure.subplots(2, 2).flat)
+        for axes, (motions, number, name, times) in zip(panels, PANELS, strict=True):
+            highest = times * targets[number]
             for (robot, by_stiffness), colour, marker in zip(robots.items(), COLOURS, MARKERS, strict=False):
                 kilo = [float(stiffness.split()[0]) / 1000 for stiffness in by_stiffness]
-                values = [times * row[motion].get(number, np.nan) for row in by_stiffness.values()]
+                values = [times * _number(row, motions, number) for row in by_stiffness.values()]
                 axes.semilogx(kilo, values, color=colour, marker=marker, label=robot)
+                highest = max(highest, *values) if np.isfinite(values).all() else highest
             axes.axhline(times * targets[number], color='black', linestyle='--', linewidth=1)
-            axes.set(title=name, xlabel='stiffness of the contact (kN/m)')
-            axes.set_ylim(top=1.15 * times * targets[number])
-        figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=len(robots))
+            axes.set(title=name, xlabel='stiffness of the contact (kN/m)', xticks=TICKS, xticklabels=map(str, TICKS))
+            axes.set_ylim(top=1.15 * highest)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc='outside lower center', ncols=3)
     return Path(path)
 
 
-def surface_chart(surfaces: Mapping[str, Mapping[float, Trial]], target: float, path: str | Path) -> Path:
+def surface_chart(
+    surfaces: Mapping[str, Mapping[float, Trial]], targets: Mapping[str, float], path: str | Path
+) -> Path:
     """Draw force and speed errors over stiffness, a line for each surface."""
     with chart(path, (9.0, 4.4)) as figure:
         figure.suptitle(
@@ -56,10 +94,13 @@ def surface_chart(surfaces: Mapping[str, Mapping[float, Trial]], target: float, 
                 (speed, [trial.speed_error for trial in trials.values()]),
             ):
                 axes.semilogx(kilo, 100 * np.array(errors), color=colour, marker=marker, markersize=4, label=name)
-                axes.set_xlabel('stiffness of the contact (kN/m)')
-        force.axhline(100 * target, color='black', linestyle='--', linewidth=1)
-        force.set(title='force error, rms (%)', ylim=(0, None))
-        speed.set(title='largest speed error (%): it follows exactly', ylim=(-0.05, 2.0))
+        for axes, number, title in (
+            (force, 'force_rms', 'force error, rms (%)'),
+            (speed, 'speed_error', 'largest speed error in space (%)'),
+        ):
+            axes.axhline(100 * targets[number], color='black', linestyle='--', linewidth=1)
+            axes.set(title=title, xlabel='stiffness of the contact (kN/m)', ylim=(0, None))
+            axes.set(xticks=TICKS, xticklabels=map(str, TICKS))
         force.legend(loc='best')
     return Path(path)
 
@@ -90,3 +131,17 @@ def border_chart(border: Mapping[str, Array], chosen: Array, path: str | Path) -
         )
         axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), title='stiffness')
     return Path(path)
+
+
+def _number(row: Mapping[str, Mapping[str, float]], motions: Sequence[str], number: str) -> float:
+    """Return a number of the first of the motions that a robot does, NaN if it does none."""
+    return next((row[motion].get(number, np.nan) for motion in motions if motion in row), np.nan)
+
+
+def _cell(value: float | None, times: float) -> str:
+    return '' if value is None else f'{times * value:.2f}'
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ['---'] * len(head), *rows]
+    return ''.join(f'| {" | ".join(cells)} |\n' for cells in lines)

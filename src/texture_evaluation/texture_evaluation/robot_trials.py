@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 import socket
+import statistics
 import tempfile
 import threading
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
 from texture_core.finger import FingerState
+from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.protocol import Arm, ArmState
 from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.arms.ur import UrArm
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.force_trials import Trial, judge
+from texture_exploration.force_trials import CIRCLE, SLIDE, Trial, judge
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
+from texture_simulation.devices.dynamixel import (
+    LEAP_FINGERS,
+    LEAP_IDS,
+    LEAP_PRESSING,
+    DynamixelMotors,
+    EmulatedDynamixelBus,
+)
 from texture_simulation.devices.rails import EmulatedRails, RailsMachine
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
@@ -28,6 +38,9 @@ HEIGHT_M = 0.002
 UR_IP = '127.0.0.61'
 LIMITS = SafetyLimits(stale_s=1.0)  # a busy machine is not what is tried here
 DEADLINE_S = 60.0
+GRIP_S = 20.0
+TOUCH = TouchParams()
+RUB = ExplorationRequest('in_hand_sliding', speed_m_s=0.02, force_n=1.0, distance_m=0.02, duration_s=3.0)
 
 
 class FingerLog:
@@ -88,17 +101,54 @@ def rails(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
         yield RailsArm(RailsParams(device=str(made.port.link), height_m=HEIGHT_M))
 
 
-ROBOTS: Mapping[str, Callable[[float, int], AbstractContextManager[Arm]]] = {'emulated UR': ur, 'emulated rails': rails}
+@contextmanager
+def hand(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
+    """Start an emulated LEAP hand; its index finger is looked at."""
+    motors = DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING, stiffness_n_m)
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        EmulatedDynamixelBus(Path(folder) / 'hand', motors, LEAP_FINGERS['index'], finger_port) as made,
+    ):
+        yield InHandArm(InHandParams(hand='dynamixel', device=str(made.port.link), grip_timeout_s=GRIP_S))
+
+
+@dataclass(frozen=True)
+class Robot:
+    """An emulated robot: how it is started, what it does, how it touches, and the module that it needs."""
+
+    start: Callable[[float, int], AbstractContextManager[Arm]]
+    needs: str
+    requests: tuple[ExplorationRequest, ...] = (SLIDE, CIRCLE)
+    touch: TouchParams = TOUCH
+
+
+ROBOTS: Mapping[str, Robot] = {
+    'emulated UR': Robot(ur, 'rtde_control'),
+    'emulated rails': Robot(rails, 'serial'),
+    # Motors tell their speed and current in coarse steps.
+    'emulated hand': Robot(hand, 'dynamixel_sdk', (RUB,), TouchParams(speed_tolerance=0.3, force_tolerance=0.2)),
+}
+
+
+def typical_trial(name: str, stiffness_n_m: float, request: ExplorationRequest, repeats: int) -> Trial:
+    """Return the median of each number of several trials, or one that failed: the machine may have been busy once."""
+    trials = [robot_trial(name, stiffness_n_m, request) for _ in range(repeats)]
+    failed = [trial for trial in trials if not trial.success]
+    if failed:
+        return failed[0]
+    names = [field.name for field in fields(Trial) if field.name not in ('success', 'message')]
+    medians = {name: statistics.median(getattr(trial, name) for trial in trials) for name in names}
+    return Trial(True, trials[0].message, **medians)
 
 
 def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) -> Trial:
     """Explore once with one of `ROBOTS`, over a surface of that stiffness."""
+    robot = ROBOTS[name]
     states: list[ExplorationState] = []
     with ExitStack() as stack:
         log = stack.enter_context(FingerLog())
-        arm = stack.enter_context(ROBOTS[name](stiffness_n_m, log.port))
-        touch = TouchParams(approach_stiffness_n_m=stiffness_n_m)
-        explorer = Explorer(arm, touch, LIMITS, states.append)
+        arm = stack.enter_context(robot.start(stiffness_n_m, log.port))
+        explorer = Explorer(arm, replace(robot.touch, approach_stiffness_n_m=stiffness_n_m), LIMITS, states.append)
         stack.callback(explorer.close)
         explorer.connect()
         exploration = explorer.begin('trial', request)
@@ -107,13 +157,21 @@ def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) ->
 
 
 def _by_phase(fingers: list[FingerState], states: list[ExplorationState]) -> list[tuple[Phase, ArmState]]:
-    """Return where the finger was in which phase; what it did before the first is left out."""
+    """Return where the finger was in which phase.
+
+    What it did before the first is left out, as is what of a slide was not promised to be steady: turns of strokes.
+    """
     begins = [state.stamp_ns for state in states]
-    return [
-        (states[bisect_right(begins, finger.time_ns) - 1].phase, _arm_state(finger))
-        for finger in fingers
-        if finger.time_ns >= begins[0]
-    ]
+    log = []
+    for finger in fingers:
+        newest = bisect_right(begins, finger.time_ns) - 1
+        if newest >= 0 and (states[newest].phase is not Phase.SLIDE or _promised(states[newest], finger.time_ns)):
+            log.append((states[newest].phase, _arm_state(finger)))
+    return log
+
+
+def _promised(state: ExplorationState, time_ns: int) -> bool:
+    return time_ns <= state.stamp_ns + state.steady_s * 1e9
 
 
 def _arm_state(finger: FingerState) -> ArmState:

@@ -26,15 +26,17 @@ CIRCLE = ExplorationRequest('circular', speed_m_s=0.1, force_n=1.0, radius_m=0.0
 ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, stiffest_n_m=20000.0)
 TOUCH = TouchParams(approach_stiffness_n_m=20000.0)
 LIMITS = SafetyLimits()
+APART_S = 0.05
 
 
 @dataclass(frozen=True)
 class Trial:
     """How an exploration went; shares of the wanted force and speed.
 
-    `overshoot` is the highest force from the approach to the beginning of the slide, above the wanted; `force_rms` and
-    `speed_error` (the largest) are those of the slide, as is `radius_error_m`, the largest distance from the circle,
-    NaN if there was none. All are NaN if it did not come to a slide; `message` says why.
+    `overshoot` is the highest force from the approach to the beginning of the slide, above the wanted; negative if it
+    stayed below. The others are those of the slide: `force_rms`, `speed_error` (the largest), `mean_speed_error`, and
+    `radius_error_m`, the largest distance from the circle, NaN if there was none. The speed is that of the finger in
+    space: on a slope it is higher than along the level. All are NaN if it did not come to a slide; `message` says why.
     """
 
     success: bool
@@ -42,6 +44,7 @@ class Trial:
     overshoot: float = math.nan
     force_rms: float = math.nan
     speed_error: float = math.nan
+    mean_speed_error: float = math.nan
     radius_error_m: float = math.nan
 
 
@@ -87,16 +90,26 @@ def judge(log: Log, request: ExplorationRequest, outcome: Outcome) -> Trial:
     if not sliding:
         return Trial(outcome.success, outcome.message)
     force = np.array([state.force_n for state in sliding]) / request.force_n
-    speed = np.array([math.hypot(*state.velocity[:2]) for state in sliding]) / request.speed_m_s
-    places = np.array([state.position[:2] for state in sliding])
+    speed = np.array([math.hypot(*state.velocity) for state in sliding]) / request.speed_m_s
+    times_s = np.array([state.time_ns for state in sliding]) * 1e-9
+    places = np.array([state.position for state in sliding])
     return Trial(
         success=outcome.success,
         message=outcome.message,
         overshoot=max(before) / request.force_n - 1,
         force_rms=float(np.sqrt(np.mean((force - 1) ** 2))),
         speed_error=float(np.abs(speed - 1).max()),
-        radius_error_m=radius_error_m(places, request.radius_m),
+        mean_speed_error=abs(mean_speed_m_s(times_s, places) / request.speed_m_s - 1),
+        radius_error_m=radius_error_m(places[:, :2], request.radius_m),
     )
+
+
+def mean_speed_m_s(times_s: Array, places: Array) -> float:
+    """Return the way through places, (n, 3), over the time it took; pairs further apart than `APART_S` do not count."""
+    took_s = np.diff(times_s)
+    ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    near = took_s < APART_S
+    return float(ways[near].sum() / took_s[near].sum())
 
 
 def radius_error_m(places: Array, radius_m: float) -> float:

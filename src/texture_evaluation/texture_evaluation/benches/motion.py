@@ -12,8 +12,8 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.motion_charts import border_chart, robot_chart, surface_chart
-from texture_evaluation.robot_trials import ROBOTS, robot_trial
+from texture_evaluation.motion_charts import border_chart, robot_chart, robot_table, surface_chart, surface_table
+from texture_evaluation.robot_trials import ROBOTS, typical_trial
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArmParams
 from texture_exploration.force_control import ForceController, ForceLoopParams
 from texture_exploration.force_trials import ARM, CIRCLE, SLIDE, SURFACES, Trial, slide_trial, surface_trials
@@ -24,8 +24,9 @@ FINE_STIFFNESSES_N_M = tuple(float(k) for k in np.geomspace(200.0, 20000.0, 9))
 BORDER_STIFFNESSES_N_M = (100.0, 1e3, 1e4, 1e5)
 DELAYS_S = tuple(float(delay) for delay in np.linspace(0.0, 0.02, 21))
 QUICK_DELAYS_S = (0.0, 0.008, 0.02)
+QUICK_ROBOTS = ('emulated rails',)
 SPEEDS_M_S = (0.1, 0.07, 0.05, 0.035, 0.025, 0.018, 0.0125, 0.01, 0.007, 0.005)
-NEEDED = {'emulated UR': 'rtde_control', 'emulated rails': 'serial'}
+REPEATS = 3  # of the emulated robots
 SIMULATED: Mapping[str, SimulatedArmParams] = {
     'simulated, force mode': replace(ARM, force_mode=True),
     'simulated, velocities only': ARM,
@@ -46,15 +47,20 @@ def run(bench: Bench) -> BenchResult:
     fine = STIFFNESSES_N_M if bench.quick else FINE_STIFFNESSES_N_M
     surfaces = surface_trials(fine)
     border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if bench.quick else DELAYS_S, _controller)
-    here = [name for name in ROBOTS if importlib.util.find_spec(NEEDED[name])]
     robots = {name: _simulated(arm, stiffnesses) for name, arm in SIMULATED.items()}
-    robots.update({name: _emulated(name, stiffnesses) for name in (here[-1:] if bench.quick else here)})
+    here = [name for name, robot in ROBOTS.items() if importlib.util.find_spec(robot.needs)]
+    for name in QUICK_ROBOTS if bench.quick else here:
+        robots[name] = _emulated(name, stiffnesses, 1 if bench.quick else REPEATS)
+    bench.out.mkdir(parents=True, exist_ok=True)
+    table = bench.out / 'motion.md'
+    table.write_text(robot_table(robots, TARGETS) + '\n' + surface_table(surfaces), encoding='utf-8')
     return BenchResult(
         name='motion',
         measured=(
             'one slide of 60 mm at 0.05 m/s and one of two turns at 0.1 m/s on a circle of 20 mm, with 1 N, for each '
-            'robot and stiffness. Shares of what was asked for: overshoot until the slide begins, force error (root '
-            'mean square) and largest speed error of the slide; largest distance from the circle'
+            'robot and stiffness; in the hand strokes of 20 mm at 0.02 m/s. Shares of what was asked for: overshoot '
+            'until the slide begins, force error (root mean square), largest and mean speed error of the slide; '
+            f'largest distance from the circle. Of emulated robots the median of {REPEATS} slides'
         ),
         data='simulated surfaces; the emulated robots in real time, on the same machine',
         split='none: nothing is trained; the force loop was designed on these surfaces',
@@ -68,7 +74,7 @@ def run(bench: Bench) -> BenchResult:
         },
         charts=(
             robot_chart(robots, TARGETS, bench.out / 'motion_robots.png'),
-            surface_chart(surfaces, TARGETS['force_rms'], bench.out / 'motion_surfaces.png'),
+            surface_chart(surfaces, TARGETS, bench.out / 'motion_surfaces.png'),
             border_chart(border, _defaults(border), bench.out / 'motion_stability.png'),
         ),
     )
@@ -80,15 +86,18 @@ def _controller(loop: Loop) -> ForceController:
 
 def _simulated(arm: SimulatedArmParams, stiffnesses: Sequence[float]) -> dict[str, Any]:
     arms = {k: replace(arm, stiffness_n_m=k) for k in stiffnesses}
-    return {_newtons(k): _both(slide_trial(at, SLIDE), slide_trial(at, CIRCLE)) for k, at in arms.items()}
+    return {
+        _newtons(k): {request.motion: _row(slide_trial(at, request)) for request in (SLIDE, CIRCLE)}
+        for k, at in arms.items()
+    }
 
 
-def _emulated(name: str, stiffnesses: Sequence[float]) -> dict[str, Any]:
-    return {_newtons(k): _both(robot_trial(name, k, SLIDE), robot_trial(name, k, CIRCLE)) for k in stiffnesses}
-
-
-def _both(straight: Trial, circle: Trial) -> dict[str, Any]:
-    return {'linear_slide': _row(straight), 'circular': _row(circle)}
+def _emulated(name: str, stiffnesses: Sequence[float], repeats: int) -> dict[str, Any]:
+    requests = ROBOTS[name].requests
+    return {
+        _newtons(k): {request.motion: _row(typical_trial(name, k, request, repeats)) for request in requests}
+        for k in stiffnesses
+    }
 
 
 def _rows(trials: Mapping[float, Trial]) -> dict[str, Any]:
