@@ -43,6 +43,7 @@ COMMANDS: Mapping[str, Command] = {
     'import': Command('import_recordings', "turn other people's recordings into labelled bags"),
     'segment': Command('segment', 'find the slides in bags that do not tell them'),
     'train': Command('train', 'learn a model from labelled bags'),
+    'optimise': Command('optimise', 'tune a recipe on labelled bags by a genetic search'),
     'evaluate': Command('evaluate', 'say how good a model is on labelled bags'),
     'scene': Command('scene', 'draw a simulated surface, the way over it, the signal and its spectrum'),
     'panel': Command('panel', 'say what a panel of people grades as rough, and how far they agree'),

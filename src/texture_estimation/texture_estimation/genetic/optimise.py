@@ -143,7 +143,8 @@ class _Plan(Generic[R]):
         examples = self._division.examples(self._space.base.training_windows)
         recipe = json.dumps(self._space.base.as_mapping(), sort_keys=True)
         return {
-            'recipe': hashlib.sha256(recipe.encode()).hexdigest()[:8],
+            'recipe': _digest(recipe),
+            'task': _digest(repr(self._task)),
             'variables': {name: repr(axis) for name, axis in self._space.axes.items()},
             'slides': examples.digest,
             'surfaces': list(examples.names),
@@ -184,6 +185,10 @@ class _Plan(Generic[R]):
         n_samples = sum(item.samples[0].size for item in examples.inputs.values())
         n_values = self._features.values(self._task.described(recipe)).shape[1]
         return self._task.cost(recipe, n_samples, n_values, examples)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
 def _one_half(case: tuple[Trial, int]) -> tuple[float, float]:

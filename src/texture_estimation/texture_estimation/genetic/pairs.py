@@ -76,7 +76,7 @@ def optimise_pairs(
             features=features,
             spread=spread,
             checkpoint=checkpoint and beside(checkpoint, pair),
-            resume=resume and beside(resume, pair),
+            resume=_reached(resume, pair),
             tell=lambda generation, pair=pair: tell(pair, generation),  # type: ignore[misc]
         )
         for pair in combinations(names, 2)
@@ -90,6 +90,12 @@ def beside(path: str | Path, pair: Pair) -> Path:
     """Return the path with the pair's name in it: 'best.yaml' → 'best-cork-vs-felt.yaml'."""
     path = Path(path)
     return path.with_name(f'{path.stem}-{pair[0]}-vs-{pair[1]}{path.suffix}')
+
+
+def _reached(resume: str | Path | None, pair: Pair) -> Path | None:
+    """Return the checkpoint of a pair; None if the search that is gone on with had not come to it."""
+    path = resume and beside(resume, pair)
+    return path if path and path.is_file() else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,88 @@
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.errors import TextureError
+from texture_estimation.genetic.search import SearchParams
+from texture_estimation.recipe import load_recipe
+from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
+from texture_evaluation.train import train_from_bags
+
+SMALL = SearchParams(population=5, generations=2, halves=3)
+
+
+def test_what_is_written_is_a_recipe_that_train_uses(simulated: Path, tmp_path: Path) -> None:
+    out = tmp_path / 'best.yaml'
+    said: list[int] = []
+    written = optimise_from_bags(
+        Wanted('ets-linear-svm', (str(simulated),)),
+        SMALL,
+        out,
+        tell=lambda _, generation: said.append(generation.number),
+    )
+    assert said == [1, 2]
+    assert written.files == (out, tmp_path / 'best.search.json', tmp_path / 'best.png')
+    assert all(path.is_file() for path in written.files)
+    first, second, *_ = out.read_text().splitlines()
+    assert 'texture optimise ets-linear-svm' in first
+    assert re.fullmatch(r'# fitness \d+\.\d %: learnt .* over 3 halves\.', second)
+    assert load_recipe(str(out)).learner_name == 'svm_pairs'
+    model = train_from_bags(str(out), [simulated])
+    assert model.labels == ('glass', 'leather', 'ridge_2mm_deep')
+
+
+def test_the_same_seed_writes_the_same_recipe_and_resuming_judges_nothing_again(
+    simulated: Path, tmp_path: Path
+) -> None:
+    texts, halves = [], []
+    for name, resume in (('a', False), ('b', False), ('a', True)):
+        out = tmp_path / f'{name}.yaml'
+        optimise_from_bags(
+            Wanted('ets-linear-svm', (str(simulated),)), SMALL, out,
+            resume=resume, tell=lambda _, generation: halves.append(generation.halves),
+        )  # fmt: skip
+        texts.append(out.read_text())
+    assert texts[0] == texts[1] == texts[2]
+    assert halves[-1] == 0 < halves[0]
+
+
+def test_a_front_is_written_as_one_recipe_for_each_of_its_points(simulated: Path, tmp_path: Path) -> None:
+    params = SearchParams(population=8, generations=2, halves=3, objective='front')
+    written = optimise_from_bags(Wanted('ets-linear-svm', (str(simulated),)), params, tmp_path / 'best.yaml')
+    recipes = [path for path in written.files if path.suffix == '.yaml']
+    assert recipes[0] == tmp_path / 'best.yaml'
+    assert len(recipes) == len(written.lines) >= 1
+    assert all(load_recipe(str(path)).learner_name == 'svm_pairs' for path in recipes)
+
+
+def test_each_pair_of_surfaces_gets_a_recipe(simulated: Path, tmp_path: Path) -> None:
+    wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
+    written = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
+    assert (tmp_path / 'best-glass-vs-leather.yaml').is_file()
+    assert len(written.files) == 4
+    assert written.lines[-1].startswith('all pairs together, most pairs won: learnt ')
+
+
+def test_grades_are_tuned_by_a_roughness_recipe(simulated: Path, tmp_path: Path) -> None:
+    table = tmp_path / 'grades.csv'
+    table.write_text('texture,grade\nglass,1\nleather,3\nridge_2mm_deep,5\n')
+    wanted = Wanted('ets-roughness-svm5', (str(simulated),), grades=str(table))
+    written = optimise_from_bags(wanted, SMALL, tmp_path / 'rough.yaml')
+    assert 'svm5' in written.files[0].read_text()
+
+
+@pytest.mark.parametrize(
+    ('change', 'options', 'sentence'),
+    [
+        ({'recipe': 'hu-pca-svm'}, {}, 'has no search space of its own'),
+        ({'search': 'ets-svn'}, {}, "did you mean 'ets-svm'"),
+        ({}, {'resume': True}, 'there is no checkpoint'),
+    ],
+)
+def test_mistakes_are_named(change, options, sentence, simulated: Path, tmp_path: Path) -> None:
+    wanted = Wanted(**{'recipe': 'ets-linear-svm', 'bags': (str(simulated),), **change})
+    with pytest.raises(TextureError, match=sentence):
+        optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml', **options)
+    assert not np.any([path.exists() for path in (tmp_path / 'best.yaml', checkpoint_of(tmp_path / 'best.yaml'))])

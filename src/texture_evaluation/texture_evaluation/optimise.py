@@ -1,0 +1,260 @@
+"""Tune a recipe on labelled bags by a genetic search, and write what was found as recipe files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_estimation.genetic.division import Division
+from texture_estimation.genetic.examples import Examples
+from texture_estimation.genetic.grading import Grading
+from texture_estimation.genetic.optimise import Finalist, Optimised, optimise
+from texture_estimation.genetic.pairs import OptimisedPairs, beside, optimise_pairs
+from texture_estimation.genetic.recipe_space import RecipeSpace
+from texture_estimation.genetic.search import Generation, SearchParams
+from texture_estimation.genetic.spread import Spread, over_cores, over_dask
+from texture_estimation.genetic.telling_apart import TellingApart
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.roughness.grades import read_grades
+from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
+from texture_evaluation.dataset import cut_slides
+from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
+from texture_evaluation.slides import find_slides
+from texture_evaluation.train import with_channels
+from texture_features.feature_set import FeatureSet
+from texture_features.windows import CutWindow, WindowParams
+
+# The search space of a recipe, or else of its learner.
+OF_RECIPES: Mapping[str, str] = {
+    'ets-linear-ann': 'ets-ann',
+    'ets-linear-ann-vote': 'ets-ann',
+    'ets-linear-svm': 'ets-svm',
+    'ets-linear-svm-vote': 'ets-svm',
+    'ets-circular-ann': 'ets-circular-ann',
+    'ets-circular-svm': 'ets-circular-svm',
+    'ets-fine-ann': 'ets-fine-ann',
+    'ets-fine-svm': 'ets-fine-svm',
+    'ets-roughness-ann1': 'ets-roughness-ann1',
+    'ets-roughness-ann5': 'ets-roughness-ann5',
+    'ets-roughness-svm5': 'ets-roughness-svm5',
+}
+OF_LEARNERS: Mapping[str, str] = {
+    'ann_pairs': 'ann-pairs',
+    'svm_pairs': 'svm-pairs',
+    'svm_rbf': 'svm-rbf',
+    'mlp': 'mlp',
+}
+Tell = Callable[[str, Generation], None]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is tuned, and on which slides.
+
+    Parameters
+    ----------
+    recipe
+        Name of a shipped recipe, or path of any; of a roughness recipe if there are `grades`.
+    bags
+        Bags, or folders of bags.
+    search
+        Name or path of the search space; '' for that of the recipe or its learner.
+    slides
+        Which slides of each surface, such as '1-30'; '' for all.
+    channels
+        'fast' leaves all inputs of the recipe but `signal` out.
+    grades
+        CSV file with the grade of every surface, or the name of a shipped table; '' to tell surfaces apart.
+    per_pair
+        Tune a recipe for each pair of surfaces by itself.
+    """
+
+    recipe: str
+    bags: tuple[str, ...]
+    search: str = ''
+    slides: str = ''
+    channels: str = 'all'
+    grades: str = ''
+    per_pair: bool = False
+
+    def __post_init__(self) -> None:
+        if self.grades and self.per_pair:
+            raise InvalidParameter('grades are not told pair by pair; leave --per-pair or --grades out')
+
+
+@dataclass(frozen=True)
+class Written:
+    """The files that a search has written, and what it found in lines for people."""
+
+    files: tuple[Path, ...]
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class BagSlides:
+    """The labelled slides of bags; called with window parameters it gives their windows."""
+
+    bags: Sequence[str]
+    slides: str
+    feature_set: FeatureSet
+    _known: dict[WindowParams, Examples] = field(default_factory=dict, repr=False)
+
+    def __call__(self, windows: WindowParams) -> Examples:
+        """Return the windows of all slides; each length is cut once."""
+        if windows not in self._known:
+            self._known[windows] = Examples.from_pieces(self._pieces(windows), self.feature_set.topics)
+        return self._known[windows]
+
+    def _pieces(self, windows: WindowParams) -> Iterator[CutWindow]:
+        plan = replace(self.feature_set, windows=windows, _layouts={})
+        for slide, pieces in cut_slides(find_slides(self.bags, self.slides), plan):
+            for piece in pieces:
+                if isinstance(piece, CutWindow):
+                    # unlike ids of explorations, names of slides are unique over all bags
+                    yield replace(piece, exploration_id=slide.name)
+
+
+def optimise_from_bags(
+    wanted: Wanted,
+    params: SearchParams,
+    out: str | Path,
+    *,
+    over: Callable[[], AbstractContextManager[Spread]] = over_cores,
+    resume: bool = False,
+    tell: Tell = lambda *_: None,
+) -> Written:
+    """Tune a recipe and write it as `out`, with checkpoint and chart beside it.
+
+    Parameters
+    ----------
+    wanted
+        Recipe and slides.
+    params
+        Population, generations and so on.
+    out
+        Path of the recipe that is written, such as 'best.yaml'.
+    over
+        Gives what the work is spread over.
+    resume
+        Go on from the checkpoint beside `out`.
+    tell
+        Called after each generation with the pair of surfaces ('' for all) and what it brought.
+
+    Raises
+    ------
+    TextureError
+        With one sentence, if recipe, bags, search space or checkpoint are wrong.
+    """
+    target = Path(out).expanduser()
+    if not target.parent.is_dir():
+        raise InvalidParameter(f"there is no folder '{target.parent}' for '{target.name}'; name another place")
+    space = _space(wanted)
+    division = Division(BagSlides(wanted.bags, wanted.slides, space.base.feature_set), params.halves, params.seed)
+    checkpoint = checkpoint_of(target)
+    if resume and not _checkpoints(checkpoint):
+        raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to begin anew")
+    options: dict[str, Any] = {'checkpoint': checkpoint, 'resume': checkpoint if resume else None}
+    with over() as spread:
+        if wanted.per_pair:
+            pairs = optimise_pairs(
+                space, division, params, spread=spread, tell=lambda pair, said: tell(' – '.join(pair), said), **options
+            )
+            return _write_pairs(pairs, wanted, params, target)
+        task: Any = Grading(read_grades(wanted.grades)) if wanted.grades else TellingApart()
+        found = optimise(space, division, params, task, spread=spread, tell=lambda said: tell('', said), **options)
+    return _write(found, wanted, params, target)
+
+
+def checkpoint_of(out: str | Path) -> Path:
+    """Return where the scores of a search are kept: 'best.yaml' → 'best.search.json'."""
+    path = Path(out)
+    return path.with_name(f'{path.stem}.search.json')
+
+
+def over_machine(jobs: int, dask: str) -> Callable[[], AbstractContextManager[Spread]]:
+    """Return what spreads over so many cores (-1: all), or over a Dask cluster if its address is given."""
+    return (lambda: over_dask(dask)) if dask else (lambda: over_cores(jobs))
+
+
+def _space(wanted: Wanted) -> RecipeSpace[Any]:
+    recipe: Recipe | RoughnessRecipe
+    if wanted.grades:
+        recipe = load_roughness_recipe(wanted.recipe)
+        learner = recipe.head_name
+    else:
+        recipe = with_channels(load_recipe(wanted.recipe), wanted.channels)
+        learner = recipe.learner_name
+    search = wanted.search or OF_RECIPES.get(recipe.name) or OF_LEARNERS.get(learner)
+    if not search:
+        raise InvalidParameter(
+            f"recipe '{recipe.name}' has no search space of its own, nor has '{learner}'; "
+            'say with --search FILE what is to be varied'
+        )
+    return RecipeSpace.load(search, recipe)
+
+
+def _checkpoints(path: Path) -> list[Path]:
+    """Return the checkpoint, or those of the pairs."""
+    return [path] if path.is_file() else sorted(path.parent.glob(f'{path.stem}-*-vs-*{path.suffix}'))
+
+
+def _write(found: Optimised[Any], wanted: Wanted, params: SearchParams, target: Path) -> Written:
+    recipes = {target: found.best}
+    if params.objective == 'front':
+        others = (one for one in found.finalists if one is not found.best)
+        recipes |= {target.with_name(f'{target.stem}-{n}{target.suffix}'): one for n, one in enumerate(others, 2)}
+    for path, finalist in recipes.items():
+        write_recipe(finalist, path, _origin(wanted, params))
+    chart = target.with_suffix('.png')
+    if params.objective == 'front':
+        costs = {f'{one.fitness:.4f}/{n}': (one.searched.cost, one.fitness) for n, one in enumerate(found.finalists)}
+        search_front_chart({wanted.recipe: list(costs.values())}, f'{wanted.recipe}: accuracy and computing', chart)
+    else:
+        convergence_chart({wanted.recipe: found.found.history}, f'{wanted.recipe}: the search', chart)
+    lines = [f'{path}: {_scores(finalist)}' for path, finalist in recipes.items()]
+    return Written((*recipes, checkpoint_of(target), chart), tuple(lines))
+
+
+def _write_pairs(pairs: OptimisedPairs, wanted: Wanted, params: SearchParams, target: Path) -> Written:
+    recipes = {beside(target, pair): found.best for pair, found in pairs.by_pair.items()}
+    for path, finalist in recipes.items():
+        write_recipe(finalist, path, _origin(wanted, params))
+    chart = target.with_suffix('.png')
+    histories = {' – '.join(pair): found.found.history for pair, found in pairs.by_pair.items()}
+    convergence_chart(histories, f'{wanted.recipe}: a search for each pair', chart)
+    together = (
+        f'all pairs together, most pairs won: learnt {100 * pairs.record.learning.mean():.1f} %, '
+        f'tested {100 * pairs.record.test.mean():.1f} %'
+    )
+    lines = [f'{path}: {_scores(finalist)}' for path, finalist in recipes.items()]
+    return Written((*recipes, chart), (*lines, together))
+
+
+def write_recipe(finalist: Finalist[Any], path: Path, origin: str) -> None:
+    """Write a recipe as a file that `texture train` reads; where it comes from stands at the top."""
+    content = yaml.safe_dump(finalist.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
+    try:
+        path.write_text(f'# {origin}\n# {_scores(finalist)}.\n{content}', encoding='utf-8')
+    except OSError as error:
+        raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another place") from error
+
+
+def _origin(wanted: Wanted, params: SearchParams) -> str:
+    return (
+        f'Found by `texture optimise {wanted.recipe}`: {params.population} individuals, {params.generations} '
+        f'generations, {params.halves} halves, seed {params.seed}.'
+    )
+
+
+def _scores(finalist: Finalist[Any]) -> str:
+    record = finalist.record
+    return (
+        f'fitness {100 * finalist.fitness:.1f} %: learnt {100 * record.learning.mean():.1f} %, '
+        f'tested {100 * record.test.mean():.1f} % over {record.halves} halves'
+    )
