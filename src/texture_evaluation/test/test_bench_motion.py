@@ -16,12 +16,17 @@ def test_force_speed_and_circle_are_kept_and_the_border_is_foretold(tmp_path: Pa
     assert path.is_file()
     assert all(chart.is_file() for chart in result.charts)
     assert '| emulated rails | 2000 N/m | circular |' in (tmp_path / 'motion.md').read_text()
-    assert {'simulated, force mode', 'simulated, velocities only'} < set(numbers['robots'])
-    rows = [row for robot in numbers['robots'].values() for both in robot.values() for row in both.values()]
-    assert all(row['success'] for row in rows), rows
-    for row in rows:
+    assert set(numbers['robots']) == {'simulated, force mode', 'simulated, velocities only', 'emulated rails'}
+    rows = {
+        name: [row for both in robot.values() for row in both.values()] for name, robot in numbers['robots'].items()
+    }
+    assert all(row['success'] for robot in rows.values() for row in robot), rows
+    # Those that run in real time are judged on a quiet machine only.
+    for row in rows['simulated, force mode'] + rows['simulated, velocities only']:
         assert row['force_rms'] <= targets['force_rms']
         assert row['overshoot'] <= targets['overshoot']
+        assert row['speed_error'] <= targets['speed_error']
+        assert row.get('radius_error_m', 0.0) <= targets['radius_error_m']
     assert numbers['border_error'] <= targets['border_error']
     assert min(numbers['margin'].values()) >= targets['margin']
 
