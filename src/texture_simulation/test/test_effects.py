@@ -1,0 +1,197 @@
+"""Each effect of the catalogue does what its name says, and nothing else."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.effects.drift import Drift
+from texture_simulation.effects.dropouts import Dropouts
+from texture_simulation.effects.finger_spread import FingerSpread
+from texture_simulation.effects.growth import ForceGain, PatchGrowth
+from texture_simulation.effects.mains_hum import MainsHum
+from texture_simulation.effects.motor_vibration import MotorVibration
+from texture_simulation.effects.noise import Noise
+from texture_simulation.effects.quantisation import Quantisation
+from texture_simulation.effects.skids import Skids
+from texture_simulation.effects.skin import Skin
+from texture_simulation.effects.slide_error import SlideError
+from texture_simulation.effects.stages import ForceEffect, PathEffect, SignalEffect
+from texture_simulation.effects.unevenness import Unevenness
+from texture_simulation.path import Path
+from texture_simulation.scene import scene_from
+from texture_simulation.sensors.catalogue import SENSORS
+
+RATE_HZ = 1000.0
+CUTS = (0, 3, 3, 400, 401, 1000)
+
+
+def rng(seed: int = 0) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+def on_signal(effect: Any, samples: np.ndarray, *, slow: bool = False, seed: int = 0) -> np.ndarray:
+    return effect.start_signal(rng(seed), RATE_HZ, (), samples.shape[-1], slow=slow)(samples)
+
+
+def along_x(speed_m_s: float, count: int = 1000, force_n: float = 1.0) -> Path:
+    x_m = speed_m_s * np.arange(count) / RATE_HZ
+    return Path(x_m, np.zeros_like(x_m), np.full_like(x_m, force_n))
+
+
+def test_noise_has_the_stated_density_at_all_frequencies() -> None:
+    made = on_signal(Noise(fast_count=20.0), np.zeros((200_000, 1)))[:, 0]
+    _, density = signal.welch(made, RATE_HZ, nperseg=64)
+    assert density[2:-2] == pytest.approx(2 * 20.0**2 / RATE_HZ, rel=0.1)
+    assert on_signal(Noise(slow_count=3.0), np.zeros((50_000, 1)), slow=True).std() == pytest.approx(3.0, rel=0.02)
+
+
+def test_hum_is_the_mains_and_its_third_harmonic() -> None:
+    made = on_signal(MainsHum(rms_count=10.0, mains_hz=60.0), np.zeros((1000, 2)))
+    spectrum = np.abs(np.fft.rfft(made[:, 0])) * np.sqrt(2) / 1000
+    assert spectrum[60] == pytest.approx(10.0)
+    assert spectrum[180] == pytest.approx(3.0)
+    assert np.sum(spectrum > 1e-6) == 2
+    assert np.array_equal(made[:, 0], made[:, 1])
+
+
+def test_drift_spreads_with_the_root_of_time() -> None:
+    through = Drift(count_per_sqrt_s=5.0).start_signal(rng(), RATE_HZ, (2000,), 1, slow=False)
+    wandered = through(np.zeros((2000, 400, 1)))[..., 0].std(axis=0)
+    assert wandered[[99, 399]] == pytest.approx([5.0 * np.sqrt(0.1), 5.0 * np.sqrt(0.4)], rel=0.06)
+
+
+def test_quantisation_leaves_whole_steps_and_half_a_step_of_error_at_most() -> None:
+    samples = rng().normal(0, 100, (500, 1))
+    made = on_signal(Quantisation(step_count=16.0), samples)
+    assert not (made % 16.0).any()
+    assert np.abs(made - samples).max() <= 8.0
+
+
+def test_dropouts_repeat_the_last_sample_for_so_long_and_so_often() -> None:
+    samples = np.arange(200_000, dtype=float)[:, None]
+    made = on_signal(Dropouts(per_s=2.0, length_s=0.02), samples)[:, 0]
+    held = np.diff(made) == 0
+    assert held.mean() == pytest.approx(0.04, rel=0.25)  # now and then one begins within another
+    assert (made <= samples[:, 0]).all()
+    runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], held, [0]]))))[::2]
+    assert np.median(runs) == 20
+
+
+def test_a_skid_holds_the_skin_and_lets_it_catch_up() -> None:
+    path = along_x(0.1, 20_000)
+    skin = Skids(per_s=1.0, length_s=0.05).start_path(rng(3), RATE_HZ, ())(path)
+    behind_m = path.x_m - skin.x_m
+    assert behind_m.min() >= -1e-12
+    assert behind_m.max() == pytest.approx(0.1 * 0.05, rel=0.05)
+    assert (np.diff(skin.x_m) == 0).mean() == pytest.approx(0.05, rel=0.5)
+    assert np.median(behind_m) < 1e-5
+    assert (np.diff(skin.x_m) >= -1e-12).all()
+
+
+def test_nothing_skids_in_the_air() -> None:
+    path = along_x(0.1, 5000, force_n=0.0)
+    assert Skids(per_s=20.0).start_path(rng(), RATE_HZ, ())(path) is path
+
+
+def test_the_skin_resonates_where_and_as_much_as_mass_spring_and_damper() -> None:
+    skin = Skin(resonance_hz=100.0, damping=0.2)
+    frequency_hz = np.array([1e-3, 20.0, 100.0, 200.0])
+    _, found = signal.sosfreqz(skin.sections(20_000.0), frequency_hz, fs=20_000.0)
+    ratio = frequency_hz / 100.0
+    assert np.abs(found) == pytest.approx(1 / np.hypot(1 - ratio**2, 2 * 0.2 * ratio), rel=2e-3)
+
+
+def test_the_energy_of_a_struck_skin_never_grows() -> None:
+    skin = Skin(resonance_hz=400.0, damping=0.01).start_force(rng(), RATE_HZ, ())
+    struck = np.zeros(4000)
+    struck[0] = 1.0
+    rung = skin(along_x(0.0, 4000), struck)
+    envelope = np.abs(rung).reshape(-1, 200).max(axis=1)
+    assert (np.diff(envelope) <= 0).all()
+
+
+def test_the_motor_shakes_at_speed_times_steps_and_not_at_rest_or_in_the_air() -> None:
+    shaking = MotorVibration(rms_n=1e-3, steps_1_m=1000.0)
+    felt = shaking.start_force(rng(), RATE_HZ, ())(along_x(0.1), np.zeros(1000))
+    assert np.abs(np.fft.rfft(felt)).argmax() == 100
+    assert felt.std() == pytest.approx(1e-3, rel=0.01)
+    assert np.ptp(shaking.start_force(rng(), RATE_HZ, ())(along_x(0.0), np.zeros(1000))) < 1e-15
+    assert not shaking.start_force(rng(), RATE_HZ, ())(along_x(0.1, force_n=0.0), np.zeros(1000)).any()
+
+
+def test_size_and_stiffness_of_the_contact_grow_with_the_cube_root_of_the_force() -> None:
+    force_n = np.array([0.0, 1.0, 8.0])
+    assert PatchGrowth().blur_growth(force_n) == pytest.approx([0.0, 1.0, 2.0])
+    assert ForceGain().gain_growth(force_n) == pytest.approx([0.0, 1.0, 2.0])
+    assert PatchGrowth().gain_growth(force_n) == ForceGain().blur_growth(force_n) == 1.0
+
+
+def test_unevenness_has_its_spread_and_the_mean_1() -> None:
+    x_m, y_m = np.meshgrid(np.linspace(0, 1, 1000), np.linspace(0, 1, 50))
+    gain = Unevenness(relative=0.2).gain(Path(x_m.ravel(), y_m.ravel(), np.ones(x_m.size)), 0)
+    assert np.mean(gain) == pytest.approx(1.0, abs=0.01)
+    assert np.std(gain) == pytest.approx(0.2, rel=0.05)
+
+
+def test_a_finger_keeps_its_sensitivity_and_another_has_another() -> None:
+    spread = FingerSpread(relative=0.1)
+    gains = [float(spread.gain(along_x(0.1), finger)) for finger in range(500)]
+    assert np.log(gains).std() == pytest.approx(0.1, rel=0.15)
+    assert spread.gain(along_x(0.2), 7) == gains[7]
+
+
+def test_slides_deviate_as_much_as_stated_and_never_turn_round() -> None:
+    speed, force = SlideError(speed=0.02, force=0.5).slide(np.full(20_000, 0.1), np.full(20_000, 2.0), rng())
+    assert speed.std() == pytest.approx(0.002, rel=0.03)
+    assert force.min() > 0
+
+
+SIGNAL = [effect for effect in EFFECTS.values() if issubclass(effect, SignalEffect)]
+SHAKES = [effect for effect in EFFECTS.values() if issubclass(effect, ForceEffect)]
+
+
+@pytest.mark.parametrize('kind', SIGNAL)
+def test_blocks_of_samples_give_the_same_as_the_whole(kind: type) -> None:
+    samples = rng(1).normal(0, 100, (1000, 2))
+    through = kind().start_signal(rng(), RATE_HZ, (), 2, slow=False)
+    pieces = np.concatenate([through(samples[a:b]) for a, b in itertools.pairwise(CUTS)])
+    assert np.allclose(pieces, on_signal(kind(), samples))
+
+
+@pytest.mark.parametrize('kind', SHAKES)
+def test_blocks_of_force_give_the_same_as_the_whole(kind: type) -> None:
+    path, force = along_x(0.1), rng(1).normal(0, 1, 1000)
+    through = kind().start_force(rng(), RATE_HZ, ())
+    pieces = [through(path.at(slice(a, b)), force[a:b]) for a, b in itertools.pairwise(CUTS)]
+    assert np.allclose(np.concatenate(pieces), kind().start_force(rng(), RATE_HZ, ())(path, force))
+
+
+@pytest.mark.parametrize('kind', [effect for effect in EFFECTS.values() if issubclass(effect, PathEffect)])
+def test_blocks_of_a_path_give_the_same_as_the_whole(kind: type) -> None:
+    path = along_x(0.1)
+    through = kind(per_s=5.0).start_path(rng(), RATE_HZ, ())
+    pieces = [through(path.at(slice(a, b))) for a, b in itertools.pairwise(CUTS)]
+    whole = kind(per_s=5.0).start_path(rng(), RATE_HZ, ())(path)
+    assert np.allclose(np.concatenate([piece.x_m for piece in pieces]), whole.x_m)
+
+
+@pytest.mark.parametrize('name', EFFECTS)
+@pytest.mark.parametrize('sensor', SENSORS)
+def test_every_effect_works_with_every_sensor_and_is_off_unless_named(name: str, sensor: str) -> None:
+    surfaces = {'rough': [{'kind': 'self_affine', 'seed': 5}]}
+    bare = scene_from('bare', {'sensor': sensor, 'surfaces': surfaces})
+    named = scene_from('named', {'sensor': sensor, 'surfaces': surfaces, 'effects': {name: {}}})
+    assert not bare.effects
+    assert named.without(name).effects == bare.effects
+    kind = SENSORS[sensor]
+    count = kind.step_points * round(0.2 * kind.path_rate_hz / kind.step_points)
+    x_m = 0.1 * np.arange(count) / kind.path_rate_hz
+    path = Path(x_m, np.zeros_like(x_m), np.full_like(x_m, 2.0))
+    felt = kind.make(named, named.surface('rough'), rng(), settled=True).streams(path)
+    assert all(np.isfinite(samples).all() for samples in felt.values())
