@@ -42,3 +42,9 @@ def straight(start: tuple[float, float, float], end: tuple[float, float, float],
     """Return `n_points` on the way from (x, y, force) to another, the start left out and the end included."""
     shares = np.arange(1, n_points + 1) / n_points
     return Path(*(first + (last - first) * shares for first, last in zip(start, end, strict=True)))
+
+
+def before_first(path: Path) -> tuple[Array, Array]:
+    """Return x and y before the first of at least one point, (..., 1) each: as far from it as the second is."""
+    x_m, y_m = (2 * place[..., :1] - place[..., :2][..., -1:] for place in (path.x_m, path.y_m))
+    return x_m, y_m

@@ -7,7 +7,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_simulation.effects.stages import ForceEffect, GrowthEffect, PathEffect, Scans, TextureEffect
 from texture_simulation.frictions import Drag, follow
-from texture_simulation.path import Path
+from texture_simulation.path import Path, before_first
 from texture_simulation.scene import Scene
 from texture_simulation.surfaces.surface import Surface
 
@@ -147,7 +147,7 @@ class Touch:
 
     def _steps_m(self, placed: Path) -> Array:
         """Return how far it is from point to point, (..., n), or (..., 1) where that hardly matters."""
-        x_m, y_m = self._before or (placed.x_m[..., :1], placed.y_m[..., :1])
+        x_m, y_m = self._before or before_first(placed)
         self._before = placed.x_m[..., -1:], placed.y_m[..., -1:]
         step_x, step_y = np.diff(placed.x_m, prepend=x_m), np.diff(placed.y_m, prepend=y_m)
         longest = np.abs(step_x).max(initial=0.0) + np.abs(step_y).max(initial=0.0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_simulation.path import Path
+from texture_simulation.path import Path, before_first
 from texture_simulation.stick_slip.friction import StickSlip
 from texture_simulation.stick_slip.stribeck import steady_force_n
 
@@ -62,7 +62,7 @@ class SlidingDrag:
         """Return the force that the sensor feels, (..., n) N: of one sign, whichever way the finger goes."""
         if not len(path):
             return np.zeros_like(path.x_m)
-        x_m, y_m = self._before or (_before_first(path.x_m), _before_first(path.y_m))
+        x_m, y_m = self._before or before_first(path)
         self._before = path.x_m[..., -1:], path.y_m[..., -1:]
         speed_m_s = np.hypot(np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)) * self._rate_hz
         built_up = speed_m_s / np.hypot(speed_m_s, CREEP_M_S)
@@ -70,8 +70,3 @@ class SlidingDrag:
             self._felt * np.maximum(path.force_n, 0.0) * built_up * steady_force_n(self._curve, speed_m_s, 1.0)
         )
         return felt
-
-
-def _before_first(place_m: Array) -> Array:
-    """Return the place before the first of a path, (..., 1): as far from it as the second is."""
-    return np.asarray(2 * place_m[..., :1] - place_m[..., :2][..., -1:])
