@@ -6,7 +6,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from texture_core.catalogue import find
-from texture_evaluation.benches import biotac20, clock, latency, load, recipes, sensors, stick_slip
+from texture_evaluation.benches import (
+    biotac20,
+    clock,
+    latency,
+    load,
+    motion,
+    recipes,
+    segmentation,
+    sensors,
+    stick_slip,
+)
 from texture_evaluation.benches.result import Bench, BenchResult
 
 BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
@@ -16,6 +26,8 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates
+    'segmentation': segmentation.run,  # start and end of sliding, found from the signals alone
+    'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'stick_slip': stick_slip.run,  # cost, error and longest step of simulated friction
 }
 

@@ -10,7 +10,7 @@ from scipy.signal import savgol_coeffs, savgol_filter, welch
 
 from texture_core.arrays import Array, Samples
 
-# What follows a cubic over 50 ms is the load, and its leaking away, not vibration.
+# What follows a cubic over the time to smooth over is the load, and its leaking away, not vibration.
 SMOOTH_S, SMOOTH_ORDER = 0.05, 3
 SMOOTHED_CELLS = 11
 REST_QUANTILE = 0.1
@@ -25,13 +25,14 @@ SENSES: Mapping[str, tuple[float, ...]] = {'force': (0.0,), 'change': (1.0,), 'e
 SPEEDS = np.linspace(0.0, 1.0, 41)
 
 
-def cell_power(fast: Samples, rate_hz: float, cell_s: float) -> tuple[float, Array]:
+def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = SMOOTH_S) -> tuple[float, Array]:
     """Return the length of a cell in s, and the power of the vibration in each, (n_cells, n_channels).
 
-    NaN for a cell in which a channel stands at the end of its range; what is not finite has none.
+    What changes over longer than `smooth_s` is no vibration, what is not finite has none, and a cell in which a channel
+    stands at the end of its range is NaN.
     """
     width = max(1, round(cell_s * rate_hz))
-    count, smoothed = len(fast) // width, _smoothed(rate_hz)
+    count, smoothed = len(fast) // width, _smoothed(rate_hz, smooth_s)
     if len(fast) <= smoothed:
         return width / rate_hz, np.empty((0, fast.shape[1]))
     known = np.isfinite(fast)
@@ -58,7 +59,7 @@ def rest_power(powers: Array) -> Array:
     return rest
 
 
-def growth(fast: Samples, rate_hz: float, rest: Array, senses: str = 'either') -> Array:
+def growth(fast: Samples, rate_hz: float, rest: Array, senses: str = 'either', smooth_s: float = SMOOTH_S) -> Array:
     """Return how the power of vibration grows with the speed, from its spectrum at steady speed.
 
     At a share of the speed all frequencies of a texture are lower by that share, and fewer of them are vibration.
@@ -71,6 +72,8 @@ def growth(fast: Samples, rate_hz: float, rest: Array, senses: str = 'either') -
         Power of each channel at rest.
     senses
         One of `SENSES`.
+    smooth_s
+        What changes over longer is no vibration.
 
     Returns
     -------
@@ -79,18 +82,18 @@ def growth(fast: Samples, rate_hz: float, rest: Array, senses: str = 'either') -
     """
     length = min(len(fast), max(2, round(SPECTRUM_S * rate_hz)))
     frequency_hz, density = welch(_centred(fast), rate_hz, nperseg=length, detrend='linear', axis=0)
-    passed = _passed(frequency_hz, rate_hz)
+    passed = _passed(frequency_hz, rate_hz, smooth_s)
     noise = 1.0 / max(float(passed.mean()) * rate_hz / 2, TINY)  # white
     texture = np.maximum(density / rest - noise, 0.0).sum(axis=1)
-    power = _passed(SPEEDS[:, None] * frequency_hz, rate_hz) @ texture
+    power = _passed(SPEEDS[:, None] * frequency_hz, rate_hz, smooth_s) @ texture
     shares = power / power[-1] if power[-1] > 0 else SPEEDS**2
     table: Array = SPEEDS ** (2.0 * np.array(SENSES[senses])[:, None]) * shares
     return table
 
 
-def _smoothed(rate_hz: float) -> int:
+def _smoothed(rate_hz: float, smooth_s: float) -> int:
     """Return over how many samples the smooth part is taken: odd, and enough for its order."""
-    return max(2 * round(0.5 * SMOOTH_S * rate_hz) + 1, SMOOTH_ORDER + 2)
+    return max(2 * round(0.5 * smooth_s * rate_hz) + 1, SMOOTH_ORDER + 2)
 
 
 def _centred(fast: Samples) -> Samples:
@@ -101,9 +104,9 @@ def _centred(fast: Samples) -> Samples:
     return centred
 
 
-def _passed(frequency_hz: Array, rate_hz: float) -> Array:
+def _passed(frequency_hz: Array, rate_hz: float, smooth_s: float) -> Array:
     """Return the share of power at frequencies that is not taken for the smooth part."""
-    kernel = savgol_coeffs(_smoothed(rate_hz), SMOOTH_ORDER)
+    kernel = savgol_coeffs(_smoothed(rate_hz, smooth_s), SMOOTH_ORDER)
     turns = np.arange(len(kernel)) - len(kernel) // 2
     grid_hz = np.linspace(0.0, rate_hz / 2, 512)
     answer = 1.0 - np.cos(2 * np.pi * grid_hz[:, None] * turns / rate_hz) @ kernel

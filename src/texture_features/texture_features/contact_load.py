@@ -13,6 +13,8 @@ from texture_core.arrays import Array, Samples
 LOW, HIGH = 0.2, 0.8
 # A channel follows the load if it changes by such a share of the one that changes most.
 FOLLOWS = 0.1
+# A finger is pressed on, and let go, so much within such a time, or the channels drift.
+CHANGES, CHANGE_S = 0.5, 0.4
 # A load is believed if it changes by so many times its own scatter from sample to sample.
 OVER_SCATTER = 20.0
 
@@ -56,7 +58,12 @@ def find_touches(levels: Samples, rate_hz: float, vibration: Array) -> list[Touc
     if full <= OVER_SCATTER * max(float(np.median(steps[high])), float(np.median(steps[~high]))):
         return []
     edges = np.flatnonzero(np.diff(np.concatenate(([0], high, [0])).astype(int))).reshape(-1, 2)
-    return [_touch(load / full, first, last - 1, rate_hz) for first, last in edges.tolist()]
+    near = max(1, round(0.5 * CHANGE_S * rate_hz))
+    return [
+        _touch(load / full, first, last - 1, rate_hz)
+        for first, last in edges.tolist()
+        if _sudden(load / full, first - 1, near) and _sudden(load / full, last - 1, near)
+    ]
 
 
 def _load(levels: Samples, vibration: Array) -> Array:
@@ -73,6 +80,13 @@ def _load(levels: Samples, vibration: Array) -> Array:
     return load - np.quantile(load, 0.05)
 
 
+def _sudden(load: Array, before: int, near: int) -> bool:
+    """Return whether a load passes one half after sample `before` suddenly, or there is no sample beyond."""
+    if before < 0 or before == len(load) - 1:
+        return True
+    return abs(float(load[min(before + 1 + near, len(load) - 1)] - load[max(before - near, 0)])) > CHANGES
+
+
 def _touch(load: Array, first: int, last: int, rate_hz: float) -> Touch:
     """Return the contact that is above one half from sample `first` to sample `last`."""
     ends = _line(load, last)
@@ -82,7 +96,10 @@ def _touch(load: Array, first: int, last: int, rate_hz: float) -> Touch:
 
 
 def _line(load: Array, last: int) -> tuple[float, float]:
-    """Return where a load that is above one half up to sample `last` begins to fall and is gone, in samples."""
+    """Return where a load that is above one half up to sample `last` begins to fall and is gone, in samples.
+
+    Both infinite if it is so to the end; where it passes one half if it never falls far.
+    """
     if last == len(load) - 1:
         return math.inf, math.inf
     above = np.flatnonzero(load[: last + 1] > HIGH)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,13 @@ class SegmentParams:
     )
     senses: str = param(
         'either', "What the vibration channels feel: the force, its change, or 'either'.", choices=tuple(SENSES)
+    )
+    smooth_s: float = param(
+        SMOOTH_S,
+        'What changes over longer than this is load, not vibration; more for slow slides.',
+        unit='s',
+        low=0.01,
+        high=1.0,
     )
     rest_rms: float = param(
         0.0, "The sensor's noise at rest, in its unit; 0: that of the quietest tenth of the recording.", low=0.0
@@ -110,7 +117,7 @@ def find_sliding(
             f'sliding is looked for in samples of shape {fast.shape} at {rate_hz} Hz; '
             '(n_samples, n_channels) at a rate above 0 is needed, of the slow channels too'
         )
-    cell_s, powers = cell_power(fast, rate_hz, params.cell_s)
+    cell_s, powers = cell_power(fast, rate_hz, params.cell_s, params.smooth_s)
     if len(powers) < SMOOTHED_CELLS:
         return []
     if rest is None:
@@ -121,14 +128,25 @@ def find_sliding(
     if slow is None:
         slow, slow_rate_hz, slow_from_s = levels_of(fast, rate_hz)
     touches = _touches(slow, slow_rate_hz, slow_from_s, power, cell_s)
-    known = np.where(_unchanged(len(power), cell_s, touches, params.press_s), power, np.nan)
+    known = np.where(_unchanged(len(power), cell_s, touches, params), power, np.nan)
     found = []
     for run in active_runs(known, cell_s, touches, params):
         touch, steady = _steady(run, touches, cell_s)
         width = round(cell_s * rate_hz)
-        grows = growth(fast[steady.start * width : steady.stop * width], rate_hz, rest, params.senses)
+        grows = growth(fast[steady.start * width : steady.stop * width], rate_hz, rest, params.senses, params.smooth_s)
         found.append(_refined(known, cell_s, run, touch=touch, steady=steady, grows=grows, params=params))
-    return [sliding for sliding in found if sliding.end_s - sliding.start_s >= params.least_s]
+    return [sliding for sliding in _joined(found) if sliding.end_s - sliding.start_s >= params.least_s]
+
+
+def _joined(found: Sequence[Sliding]) -> list[Sliding]:
+    """Return the stretches with those as one that overlap."""
+    apart: list[Sliding] = []
+    for sliding in found:
+        if apart and sliding.start_s <= apart[-1].end_s:
+            apart[-1] = replace(apart[-1], end_s=max(apart[-1].end_s, sliding.end_s))
+        else:
+            apart.append(sliding)
+    return apart
 
 
 def _mean(ratios: Array) -> Array:
@@ -188,15 +206,15 @@ def _touched(count: int, cell_s: float, touches: Sequence[Touch]) -> NDArray[np.
     return np.any(inside, axis=0) if inside else np.zeros(count, dtype=bool)
 
 
-def _unchanged(count: int, cell_s: float, touches: Sequence[Touch], press_s: float) -> NDArray[np.bool_]:
+def _unchanged(count: int, cell_s: float, touches: Sequence[Touch], params: SegmentParams) -> NDArray[np.bool_]:
     """Return which of `count` cells hold no knock of a changing load."""
     middle = (np.arange(count) + 0.5) * cell_s
     sure = np.ones(count, dtype=bool)
     for touch in touches:
-        pressed_s = max(touch.pressed_s, touch.begins_s + press_s)
-        free_s = max(touch.ends_s, touch.falls_s + press_s)
+        pressed_s = max(touch.pressed_s, touch.begins_s + params.press_s)
+        free_s = max(touch.ends_s, touch.falls_s + params.press_s)
         for first_s, last_s in ((touch.begins_s, pressed_s), (touch.falls_s, free_s)):
-            sure &= (middle < first_s - 0.5 * SMOOTH_S) | (middle > last_s + SMOOTH_S)
+            sure &= (middle < first_s - 0.5 * params.smooth_s) | (middle > last_s + params.smooth_s)
     return sure
 
 

@@ -111,7 +111,7 @@ class SlideSegmenter:
 
     def _find(self, run: Run, begin_ns: int) -> list[Sliding]:
         fast = run.take(run.first_sample, run.next_sample - run.first_sample)
-        _, powers = cell_power(fast, run.rate_hz, self._params.cell_s)
+        _, powers = cell_power(fast, run.rate_hz, self._params.cell_s, self._params.smooth_s)
         if len(powers):
             quiet = rest_power(powers)
             self._rest = np.minimum(self._rest, quiet) if quiet.shape == self._rest.shape else quiet
