@@ -13,6 +13,7 @@ from texture_evaluation.benches import (
     load,
     motion,
     recipes,
+    roughness,
     segmentation,
     sensors,
     stick_slip,
@@ -23,6 +24,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
+    'roughness': roughness.run,  # from window to grade
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates
