@@ -9,6 +9,7 @@ from texture_core.catalogue import find
 from texture_evaluation.benches import (
     biotac20,
     clock,
+    features,
     latency,
     load,
     motion,
@@ -28,6 +29,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates
+    'features': features.run,  # cost of each feature, one window at a time and many at once
     'segmentation': segmentation.run,  # start and end of sliding, found from the signals alone
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'stick_slip': stick_slip.run,  # cost, error and longest step of simulated friction

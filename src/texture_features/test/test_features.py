@@ -60,6 +60,7 @@ SCALING = {
     'integral': SQUARED,
     'region_peaks': SAME,
     'correlation': SAME,
+    'power_echo': SAME,
     'ordinal_patterns': SAME,
     'speed': SAME,
     'force': SAME,
@@ -106,7 +107,17 @@ def test_empty_windows_are_refused(shape):
 
 
 @pytest.mark.parametrize(
-    'name', ['log_bands', 'typical_bands', 'low_lines', 'hjorth', 'log_variance', 'log_slope_variance', 'integral']
+    'name',
+    [
+        'log_bands',
+        'typical_bands',
+        'low_lines',
+        'hjorth',
+        'log_variance',
+        'log_slope_variance',
+        'integral',
+        'power_echo',
+    ],
 )
 def test_an_offset_of_the_sensor_changes_nothing(name):
     feature = FEATURES[name]()
@@ -180,6 +191,19 @@ def test_a_peak_close_to_a_higher_one_is_left_out():
     np.testing.assert_array_equal(bins, [3, 6])
 
 
+def test_of_equally_high_peaks_the_lowest_comes_first():
+    bins, heights = highest_peaks(np.array([0.0, 2.0, 0.0, 2.0, 0.0, 1.0, 0.0]), 3, gap=1.0)
+    np.testing.assert_array_equal(bins, [1, 3, 5])
+    np.testing.assert_array_equal(heights, [2.0, 2.0, 1.0])
+
+
+@EVERY
+@pytest.mark.parametrize('speed_m_s', [0.0, np.nan])
+def test_without_a_speed_what_needs_one_is_not_a_number_and_the_rest_is_as_ever(name, speed_m_s):
+    still, moving = (FEATURES[name]()(windows(noise(500, 2), speed_m_s=speed)) for speed in (speed_m_s, 0.1))
+    assert np.array_equal(still, moving) or np.isnan(still).all() or name == 'speed'
+
+
 def test_integral_and_arc_length_have_their_closed_forms():
     assert FEATURES['integral']()(windows(tone(50.0, amplitude=2.0)))[0, 0] == pytest.approx(2.0, rel=1e-6)
     ramp = np.arange(11.0)[:, None] * 3.0
@@ -190,6 +214,33 @@ def test_integral_and_arc_length_have_their_closed_forms():
 def test_a_ramp_has_no_slope_variance():
     ramp = np.arange(50.0)[:, None]
     assert FEATURES['log_slope_variance'](floor=0.1)(windows(ramp))[0, 0] == pytest.approx(np.log(0.1))
+
+
+def test_moments_of_a_tone_and_of_noise_are_those_of_their_distributions():
+    feature = FEATURES['moments']()
+    sine = dict(zip(feature.names, feature(windows(tone(50.0, amplitude=2.0)))[0], strict=True))
+    assert sine['signal_log_power'] == pytest.approx(np.log(2.0))
+    assert sine['signal_log_amplitude'] == pytest.approx(np.log(4.0 / np.pi), abs=0.02)
+    assert sine['signal_log_kurtosis'] == pytest.approx(np.log(1.5), rel=1e-3)
+    steps = np.log(2.0 * 4.0 * np.sin(np.pi * 50.0 / RATE_HZ) ** 2)
+    assert sine['slope_log_power'] == pytest.approx(steps, rel=1e-2)
+    assert sine['bend_log_power'] == pytest.approx(2.0 * steps - np.log(2.0), rel=1e-2)
+    pushes = np.random.default_rng(0).exponential(size=(100_000, 1))
+    values = dict(zip(feature.names, feature(windows(pushes))[0], strict=True))
+    assert values['signal_skewness'] == pytest.approx(2.0, rel=0.05)
+    assert values['signal_log_kurtosis'] == pytest.approx(np.log(9.0), rel=0.05)
+
+
+def test_bursts_echo_as_long_as_they_last_and_noise_does_not():
+    feature = FEATURES['power_echo']()
+    assert feature.names[:7] == tuple(f'signal_{lag}' for lag in (1, 2, 3, 4, 6, 8, 12))
+    hiss = noise(100_000, 1)
+    np.testing.assert_allclose(feature(windows(hiss))[0, :12], 0.0, atol=0.02)
+    bursts = hiss * (np.arange(100_000) % 128 < 16)[:, None]  # in an eighth of the time: a product is 8 times as large
+    echo = dict(zip(feature.names, feature(windows(bursts))[0], strict=True))
+    assert echo['signal_1'] == pytest.approx(np.log(8.0 * 15 / 16), abs=0.05)
+    assert echo['signal_8'] == pytest.approx(np.log(8.0 * 8 / 16), abs=0.05)
+    assert echo['signal_24'] < np.log(0.01)
 
 
 def test_speed_and_force_pass_through_whatever_they_are():

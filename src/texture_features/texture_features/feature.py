@@ -58,6 +58,12 @@ class Windows:
         """The rows less their mean."""
         return self.shared('centred_rows', lambda: centred(self.rows))
 
+    @property
+    def moving_m_s(self) -> Array:
+        """The speed, (...); NaN where it is unknown or not above 0."""
+        speed_m_s = np.asarray(self.speed_m_s)
+        return np.where(speed_m_s > 0, speed_m_s, np.nan)
+
     def shared(self, key: Hashable, compute: Callable[[], T]) -> T:
         """Return an intermediate result that several features need; it is computed once."""
         if key not in self._memo:

@@ -23,7 +23,7 @@ class SpatialLevel:
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves. Choose waves that the sensor reaches at every speed: from v / high_hz to
-    v / low_hz. Of a band beyond half the sampling rate the nearest line is taken. NaN if the speed is unknown.
+    v / low_hz. Of a band beyond half the sampling rate the nearest line is taken. NaN if the speed is unknown or not above 0.
     """
 
     of_signal: ClassVar[bool] = True
@@ -50,7 +50,7 @@ class SpatialLevel:
     def __call__(self, windows: Windows) -> Array:
         """Return log(mean density + floor) of each band."""
         densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
-        speed = np.asarray(windows.speed_m_s)[..., None, None, None]
+        speed = windows.moving_m_s[..., None, None, None]
         # Line n, from 0, stands for the stretch from n to n + 1; edges are in lines, too.
         edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
         low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)

@@ -19,7 +19,7 @@ class SpatialVariation:
 
     In nerves the rougher surface makes neighbouring fibres differ more; here one channel meets the places one after
     the other, lag_m / speed apart in time. The mean square is 2·∫ S(f)·(1 - cos(2πf·lag_m/speed)) df, so that no lag
-    has to be a whole number of samples. NaN if the speed is unknown.
+    has to be a whole number of samples. NaN if the speed is unknown or not above 0.
 
     Source: Lieber & Bensmaia 2019; Connor & Johnson 1992.
     """
@@ -40,6 +40,6 @@ class SpatialVariation:
     def __call__(self, windows: Windows) -> Array:
         """Return the log mean square difference."""
         densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
-        phase = 2.0 * np.pi * hertz * (self.lag_m / np.asarray(windows.speed_m_s)[..., None, None])
+        phase = 2.0 * np.pi * hertz * (self.lag_m / windows.moving_m_s[..., None, None])
         power = 2.0 * np.add.reduce(densities * (1.0 - np.cos(phase)), axis=-1, keepdims=True) * hertz[0]
         return without_force(np.log(power + self.floor), windows, self.force_exponent)
