@@ -23,7 +23,8 @@ class SpatialLevel:
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves. Choose waves that the sensor reaches at every speed: from v / high_hz to
-    v / low_hz. Of a band beyond half the sampling rate the nearest line is taken. NaN if the speed is unknown or not above 0.
+    v / low_hz. Of a band beyond half the sampling rate the nearest line is taken. NaN if the speed is unknown or not
+    above 0.
     """
 
     of_signal: ClassVar[bool] = True
