@@ -13,6 +13,7 @@ from texture_evaluation.benches import (
     latency,
     load,
     motion,
+    optimise,
     recipes,
     roughness,
     segmentation,
@@ -26,6 +27,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
     'roughness': roughness.run,  # from window to grade
+    'optimise': optimise.run,  # genetic searches of the papers' size: time, convergence, front
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates

@@ -13,15 +13,16 @@ from texture_estimation.learners.learner import Codes
 from texture_estimation.learners.pair_votes import PairVotes
 from texture_estimation.learners.standardisation import standardisation
 
-# Examples of each label that a network learns from.
-EXAMPLES = 32
+# Examples that are learnt from, of all labels: with many labels there are many networks, and time for few each.
+EXAMPLES = 200
 
 
 def ann_pairs(learner: AnnPairs, values: Array, codes: Codes, groups: Codes) -> ScoresOfHalf:
     """Return what judges a half by the pairs won.
 
-    Each network sees 32 learnt examples of each label and makes ten steps of the Levenberg-Marquardt method, without
-    a part held out to stop early; `exact` does what the learner does. Both accuracies are told of the whole half.
+    Each network sees the examples of its pair, of 200 that are drawn from all labels, and makes ten steps of the
+    Levenberg-Marquardt method, without a part held out to stop early; `exact` does what the learner does. Both
+    accuracies are told of the whole half.
     """
     mean, scale = standardisation(values)
     standard = np.ascontiguousarray((values - mean) / scale)
@@ -31,7 +32,7 @@ def ann_pairs(learner: AnnPairs, values: Array, codes: Codes, groups: Codes) -> 
 
     def scores(learnt: Mask) -> Array:
         rng = np.random.default_rng(learner.seed)
-        rows = drawn(codes, learnt, EXAMPLES, rng)
+        rows = drawn(codes, learnt, EXAMPLES // n_labels, rng)
         of_pairs = standard[np.concatenate([rows[first], rows[second]], axis=1)]
         # 1 for the first label of a pair, 0 for the second
         targets = np.tile(np.repeat([1.0, 0.0], rows.shape[1]), (len(first), 1))
