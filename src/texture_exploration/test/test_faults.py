@@ -1,5 +1,6 @@
 """What befalls a robot in the middle of a slide: told in time and in words, and the next exploration works."""
 
+import functools
 import re
 import signal
 import subprocess
@@ -22,6 +23,7 @@ from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
 DEADLINE_S = 30.0
+TRIES = 3  # on a machine so busy that the robot seems silent, it may not come to a slide
 BUSY_S = 0.5  # a machine that stalls tells later; the figures are recorded
 HEIGHT_M = 0.003
 UR = UrControllerParams(ip='127.0.0.56', start_height_m=HEIGHT_M, force_offset_n=0.0, unlock_delay_s=0.2)
@@ -58,15 +60,15 @@ def lose(motor):
 
 # Robot, module it needs, what happens, how it is mended, what is told, and how soon at most.
 FAULTS = {
-    'ur freezes': (ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.thaw, 'silent|not answered', 0.16),
-    'ur dies': (ur, 'rtde_control', ControllerProcess.stop, ControllerProcess.start, 'lost|silent|not answered', 0.16),
+    'ur freezes': (ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.thaw, 'silent|not answered', 0.15),
+    'ur dies': (ur, 'rtde_control', ControllerProcess.stop, ControllerProcess.start, 'lost|silent|not answered', 0.15),
     'ur stops protectively': (
         ur, 'rtde_control', lambda c: c.ask('emulate protective stop'), nothing, 'protective stop', 0.1,
     ),
     'ur is stopped by hand': (ur, 'rtde_control', lambda c: c.ask('stop'), nothing, 'its control program', 0.1),
     'rails lose their cable': (rails, 'serial', EmulatedRails.unplug, EmulatedRails.plug, 'cannot be reached', 0.1),
     'rails fall silent': (
-        rails, 'serial', lambda r: setattr(r, 'mute', True), lambda r: setattr(r, 'mute', False), 'not answered', 0.17,
+        rails, 'serial', lambda r: setattr(r, 'mute', True), lambda r: setattr(r, 'mute', False), 'not answered', 0.15,
     ),
     'rails meet something': (
         rails,
@@ -106,14 +108,17 @@ def test_a_fault_in_the_slide_is_told_in_time_and_the_next_exploration_works(nam
         explorer = Explorer(arm, TOUCH, limits, lambda state: None)
         open_now.callback(explorer.close)
         explorer.connect()
-        exploration, since_ns = explored(explorer, request, lambda: happens(device))
+        happen = functools.partial(happens, device)
+        exploration, since_ns = next(slid for _ in range(TRIES) if (slid := explored(explorer, request, happen))[1])
+        ended_s = (time.monotonic_ns() - exploration.state.stamp_ns) * 1e-9
         outcome = exploration.outcome
         assert (outcome.success, outcome.slid, exploration.state.phase) == (False, True, Phase.ABORTED), outcome
         detected_s = (exploration.state.stamp_ns - since_ns) * 1e-9
         record_property('detected_s', detected_s)
-        print(f'{name}: {detected_s * 1e3:.0f} ms: {outcome.message}')
+        print(f'{name}: {detected_s * 1e3:.0f} ms, ended {ended_s * 1e3:.0f} ms later: {outcome.message}')
         assert re.search(told, outcome.message), outcome.message
         assert detected_s < soon_s + BUSY_S
+        assert ended_s < 0.1 + BUSY_S
         mended(device)
         explorer.limits = SafetyLimits(stale_s=1.0)
         again, _ = explored(explorer, request)
@@ -121,39 +126,74 @@ def test_a_fault_in_the_slide_is_told_in_time_and_the_next_exploration_works(nam
 
 
 KILLED = """
-from texture_exploration.arms.rails import RailsArm, RailsParams
+import sys
+from texture_core.exploration import ExplorationRequest
+from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_core.exploration import ExplorationRequest
-import sys
-explorer = Explorer(RailsArm(RailsParams(device=sys.argv[1])), TouchParams(), SafetyLimits(stale_s=1.0), lambda s: None)
+name, parameters, request = sys.argv[1], eval(sys.argv[2]), eval(sys.argv[3])
+touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.2)
+explorer = Explorer(ARMS[name](ARMS[name].Params(**parameters)), touch, SafetyLimits(stale_s=1.0), lambda state: None)
 explorer.connect()
-explorer.begin('one', ExplorationRequest('linear_slide', speed_m_s=0.05, distance_m=0.15)).ended.wait()
+explorer.begin('one', ExplorationRequest(**request)).ended.wait()
 """
+LONG = {'motion': 'linear_slide', 'speed_m_s': 0.05, 'distance_m': 0.15}
+LONG_RUB = {'motion': 'in_hand_sliding', 'speed_m_s': 0.02, 'duration_s': 20.0}
 
 
-def test_when_the_explorer_is_killed_in_the_slide_the_rails_stop_by_themselves(tmp_path, record_property):
+def rails_parameters(device):
+    return {'device': str(device.port.link), 'height_m': HEIGHT_M}
+
+
+def hand_parameters(bus):
+    return {'hand': 'dynamixel', 'device': str(bus.port.link), 'grip_timeout_s': 20.0}
+
+
+def rails_place(device):
+    return device.firmware.position[0]
+
+
+def hand_place(bus):
+    return bus.motors.angle_rad(0)
+
+
+# Robot, module it needs, its parameters, a long slide, where the finger is, how far it goes before the explorer is
+# killed, and how long it may still move: the rails' watchdog waits for 0.15 s, a motor goes to its last goal.
+KILLINGS = {
+    'rails': (rails, 'serial', rails_parameters, LONG, rails_place, 0.01, 0.2),
+    'hand': (hand, 'dynamixel_sdk', hand_parameters, LONG_RUB, hand_place, 0.03, 0.15),
+}
+
+
+@pytest.mark.parametrize('name', KILLINGS)
+def test_when_the_explorer_is_killed_in_the_slide_the_robot_stops_by_itself(name, tmp_path, record_property):
+    robot, module, parameters, request, place, way, soon_s = KILLINGS[name]
+    pytest.importorskip(module)
+
     def until(condition):
         deadline = time.monotonic() + DEADLINE_S
         while not condition():
             assert time.monotonic() < deadline
             time.sleep(0.002)
 
-    with EmulatedRails(tmp_path / 'rails') as rails_there:
-        firmware = rails_there.firmware
-        with subprocess.Popen([sys.executable, '-c', KILLED, str(rails_there.port.link)]) as explorer:
-            until(lambda: firmware.velocity[0] > 0.045)
+    with robot(tmp_path) as (device, arm, next_request):
+        begin = place(device)
+        command = [sys.executable, '-c', KILLED, name, repr(parameters(device)), repr(request)]
+        with subprocess.Popen(command) as explorer:
+            until(lambda: abs(place(device) - begin) > way)
             explorer.send_signal(signal.SIGKILL)
-            begin_s = time.monotonic()
-        until(lambda: not firmware.velocity.any())
-        stopped_s = time.monotonic() - begin_s
-        record_property('stopped_s', stopped_s)
-        print(f'rails stopped {stopped_s * 1e3:.0f} ms after the death of the explorer')
-        assert firmware.watchdog_stops == 1
-        assert stopped_s < 0.2 + BUSY_S
-        arm = RailsArm(RailsParams(device=str(rails_there.port.link)))
-        explorer = Explorer(arm, TOUCH, SafetyLimits(stale_s=1.0), lambda state: None)
-        explorer.connect()
-        assert explored(explorer, SLIDE)[0].outcome.success
-        explorer.close()
+            begin_s = moved_s = time.monotonic()
+        last = place(device)
+        while time.monotonic() < moved_s + 0.3:
+            if place(device) != pytest.approx(last, abs=1e-6):
+                last, moved_s = place(device), time.monotonic()
+            assert moved_s < begin_s + DEADLINE_S
+            time.sleep(0.002)
+        record_property('stopped_s', moved_s - begin_s)
+        print(f'{name} stopped {1e3 * (moved_s - begin_s):.0f} ms after the death of the explorer')
+        assert moved_s - begin_s < soon_s + BUSY_S
+        again = Explorer(arm, TOUCH, SafetyLimits(stale_s=1.0), lambda state: None)
+        again.connect()
+        assert explored(again, next_request)[0].outcome.success
+        again.close()

@@ -322,6 +322,10 @@ def test_when_the_parent_is_killed_the_arm_stops_and_the_worker_ends(bench, reco
         parent.kill()
     record_property('stopped_s', wait_for(bench.rests))
     wait_for(lambda: not worker.exists())
+    again = UrArm(UrArmParams(ip=bench.ip))
+    again.connect()
+    keep(again, SLIDING, bench.moves)
+    again.close()
 
 
 @needs_ur_rtde

@@ -87,6 +87,7 @@ class Exploration:
         self._stop_reason = ''
         self._finish_reason = ''
         self._slid = False
+        self._entered = False  # the workspace
         self._next_state_ns = 0
         self._last_ns = self._awake_ns = clock()
 
@@ -119,7 +120,7 @@ class Exploration:
         if trouble:
             self._give_up(f'{trouble}; the finger was not lifted')
             return True
-        reason = self._stop_reason or self._limits.violation(arm) or self._silence(self._awake_ns)
+        reason = self._stop_reason or self._violation(arm) or self._silence(self._awake_ns)
         if reason:
             self._motion.abort(reason)
         if self._finish_reason:
@@ -128,6 +129,12 @@ class Exploration:
         self._arm.command(step.command)
         self._tell(now_ns, step, arm)
         return step.phase in ENDED
+
+    def _violation(self, arm: ArmState) -> str:
+        """Return which limit was passed; a finger that was pushed out of the workspace may come home first."""
+        outside = self._limits.outside(arm)
+        self._entered |= not outside
+        return self._limits.too_hard(arm) or (outside if self._entered else '')
 
     def _note_gap(self, now_ns: int) -> None:
         if now_ns - self._last_ns > GAP_NS:

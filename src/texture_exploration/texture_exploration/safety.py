@@ -38,7 +38,7 @@ class SafetyLimits:
     y_high_m: float = param(0.2, 'Highest y the finger may reach.', unit='m', low=-2.0, high=2.0)
     z_low_m: float = param(-0.02, 'Lowest z the finger may reach.', unit='m', low=-2.0, high=2.0)
     z_high_m: float = param(0.2, 'Highest z the finger may reach.', unit='m', low=-2.0, high=2.0)
-    stale_s: float = param(0.15, 'An older arm state aborts.', unit='s', low=0.01, high=2.0)
+    stale_s: float = param(0.13, 'An older arm state aborts.', unit='s', low=0.01, high=2.0)
     approach_timeout_s: float = param(10.0, 'Time to reach the surface.', unit='s', low=0.1)
     contact_timeout_s: float = param(3.0, 'Time to settle the force, and to reach the speed.', unit='s', low=0.1)
     slide_overtime_s: float = param(2.0, 'Time a slide may take beyond its plan.', unit='s', low=0.1)
@@ -106,9 +106,19 @@ class SafetyLimits:
 
     def violation(self, arm: ArmState) -> str:
         """Return in a sentence which limit the finger has passed, '' if none."""
-        # Written so that a force of NaN is a violation too.
+        return self.too_hard(arm) or self.outside(arm)
+
+    def too_hard(self, arm: ArmState) -> str:
+        """Return in a sentence that the force is too high, or that it or the place is unknown; '' if not."""
+        # Written so that NaN is too much too.
         if not arm.force_n <= self.force_limit_n:
             return f'the force of {arm.force_n:.2f} N is above the limit of {self.force_limit_n:g} N'
+        if not all(map(math.isfinite, arm.position)):
+            return f'the place of the finger is unknown: the arm tells {arm.position}'
+        return ''
+
+    def outside(self, arm: ArmState) -> str:
+        """Return in a sentence where the finger has left the workspace, '' if it has not."""
         for at, (axis, (low, high)) in zip(arm.position, self.workspace.items(), strict=True):
             if not low <= at <= high:
                 return f'the finger left the workspace: {axis} is {at:.4f} m, allowed is {low:g} to {high:g} m'

@@ -15,7 +15,8 @@ from texture_exploration.hands.dynamixel import DynamixelHand
 from texture_exploration.hands.protocol import FingerSet, Fingertip, Hand
 from texture_exploration.hands.simulated import SimulatedHand
 
-LOST_SHARE = 0.5  # of the wanted force: a finger that presses less has lost the object
+HELD_SHARE = 0.8  # of the wanted force: a finger that presses with it holds the object
+LOST_SHARE = 0.5  # one that presses less has lost it
 LOOK_S = 0.01
 
 
@@ -63,7 +64,7 @@ class InHandArm:
         self._report.open()
         self.hand.grip(dict.fromkeys(self.fingers.hold, self._params.grip_force_n))
         end_s = time.monotonic() + self._params.grip_timeout_s
-        while weak := self._weak():
+        while weak := self._weak(HELD_SHARE):
             if time.monotonic() > end_s:
                 self.close()
                 raise DeviceError(f'there is nothing to hold: {weak}; give the hand an object')
@@ -81,7 +82,7 @@ class InHandArm:
             raise DeviceError('the hand is not connected; connect it first')
         hand = self.hand.state()
         tips = [hand.fingers[name] for name in self.fingers.slide]
-        weak = self._weak()
+        weak = self._weak(LOST_SHARE)
         state = ArmState(
             time_ns=hand.time_ns,
             position=_mean([tip.position for tip in tips]),
@@ -102,11 +103,11 @@ class InHandArm:
         """Let the sliding fingers stand still; the others hold on."""
         self.command(ArmCommand())
 
-    def _weak(self) -> str:
-        """Return which holding finger does not press, '' if all do."""
+    def _weak(self, share: float) -> str:
+        """Return which holding finger presses with less than a share of the wanted force, '' if none."""
         tips: Mapping[str, Fingertip] = self.hand.state().fingers
         wanted = self._params.grip_force_n
-        weak = [name for name in self.fingers.hold if tips[name].force_n < LOST_SHARE * wanted]
+        weak = [name for name in self.fingers.hold if tips[name].force_n < share * wanted]
         return ', '.join(f'{name} presses with {tips[name].force_n:.2f} N of {wanted:g} N' for name in weak)
 
 

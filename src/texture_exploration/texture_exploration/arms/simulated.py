@@ -133,6 +133,11 @@ class SimulatedArm:
         """Add a force as if somebody pushed the finger, until connected again."""
         self._push_n = force_n
 
+    def shove(self, way_m: Vector) -> None:
+        """Move as if somebody shoved the finger."""
+        x, y, z = (at + way for at, way in zip(self._state.position, way_m, strict=True))
+        self._state = replace(self._state, position=(x, y, z))
+
     def step(self, dt_s: float) -> None:
         """Move for `dt_s` up to the clock's present time, as commanded and as long as the command holds."""
         if self._frozen:

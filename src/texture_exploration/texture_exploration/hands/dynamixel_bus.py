@@ -82,7 +82,7 @@ class DynamixelBus:
         """
         self.missing = set(self._profile.ids)
         for motor in self._profile.ids:
-            self.look_for(motor)
+            any(self.look_for(motor) for _ in range(TRIES))
         if len(self.missing) == len(self._profile.ids):
             raise DeviceError(
                 f"no motor answers on '{self._device}' at {self._profile.baud} baud; check power, baud rate and the "
