@@ -22,8 +22,10 @@ from texture_features.features.mean_amplitude import MeanAmplitude
 from texture_features.features.mean_hjorth import MeanHjorth
 from texture_features.features.mean_shape import MeanShape
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
+from texture_features.features.moments import Moments
 from texture_features.features.ordinal_patterns import OrdinalPatterns
 from texture_features.features.pacinian_power import PacinianPower
+from texture_features.features.power_echo import PowerEcho
 from texture_features.features.region_peaks import RegionPeaks
 from texture_features.features.short_time_fourier import ShortTimeFourier
 from texture_features.features.spatial_bands import SpatialBands
@@ -51,6 +53,8 @@ FEATURES: Mapping[str, type[Feature]] = {
     'log_spectrum': LogSpectrum,  # Hu et al. 2014
     'short_time_fourier': ShortTimeFourier,
     'wavelet_energy': WaveletEnergy,  # Daubechies 1992
+    'moments': Moments,
+    'power_echo': PowerEcho,
     'ordinal_patterns': OrdinalPatterns,  # Bandt & Pompe 2002
     'level': Level,
     'log_variance': LogVariance,

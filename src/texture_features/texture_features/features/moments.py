@@ -1,0 +1,52 @@
+"""Size, lopsidedness and tails of the signal, of its slope and of its bend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.differences import differences, squares
+from texture_features.feature import Windows, shares
+
+VALUES = ('log_power', 'log_amplitude', 'skewness', 'log_kurtosis')
+# Far below any power, far above the smallest number: nothing over nothing becomes 0 or 1.
+TINY = 1e-150
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Log mean square, log mean amplitude, skewness and log kurtosis of the signal, its steps and their steps.
+
+    A spectrum holds the mean squares and nothing of the rest: whether a surface pushes more than it pulls, and whether
+    it hits rarely and hard or often and softly.
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    floor: float = param(1e-10, 'Amplitude, squared for powers, added before a logarithm.', low=1e-140, high=1e100)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Value of the signal, of its slope and of its bend."""
+        return tuple(f'{order}_{value}' for value in VALUES for order in ('signal', 'slope', 'bend'))
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return the values; skewness and log kurtosis of a constant signal are 0."""
+        signals, powers = differences(windows), squares(windows)
+        count = signals.shape[-1]
+        square = powers @ shares(count)
+        amplitude = np.abs(signals) @ shares(count)
+        # Products of vectors: no arrays of cubes, and the same rounding for one window as for many.
+        cube = (powers[..., None, :] @ signals[..., :, None])[..., 0, 0] / count
+        fourth = (powers[..., None, :] @ powers[..., :, None])[..., 0, 0] / count
+        values = (
+            np.log(square + self.floor * self.floor),
+            np.log(amplitude + self.floor),
+            cube / (square * np.sqrt(square) + TINY),
+            np.log((fourth + TINY) / (square * square + TINY)),
+        )
+        return np.concatenate(values, axis=-1)

@@ -1,0 +1,57 @@
+"""How far the power of the signal now tells its power a little later."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.differences import squares
+from texture_features.feature import Windows, shares
+
+# Of a power squared: far below any, far above the smallest number, so that nothing over nothing is 1.
+TINY = 1e-200
+
+
+@dataclass(frozen=True)
+class PowerEcho:
+    """Log of the mean product of the squared signal and itself some samples later, over its mean squared; of steps too.
+
+    0 where the one says nothing of the other, above where bursts last so long, below where they keep such a distance.
+    The gain of the sensor changes nothing.
+    """
+
+    of_signal: ClassVar[bool] = True
+
+    lags: int = param(12, 'How many of the lags of 1, 2, 3, 4, 6, 8, 12, 16, 24 … samples.', low=1, high=24)
+    floor: float = param(1e-3, 'Ratio added before the logarithm.', low=1e-12, high=1.0)
+
+    @cached_property
+    def _lags(self) -> tuple[int, ...]:
+        return (1, *chain.from_iterable((2 << octave, 3 << octave) for octave in range(self.lags // 2)))[: self.lags]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Lag in samples, for the signal and for its steps."""
+        return tuple(f'{what}_{lag}' for what in ('signal', 'slope') for lag in self._lags)
+
+    def __call__(self, windows: Windows) -> Array:
+        """Return the values; 0 for all if the window is not two samples longer than the longest lag."""
+        powers = squares(windows)[..., :2, :-1]  # there is one step less than samples
+        leading = powers.shape[:-2]
+        n_steps = powers.shape[-1]
+        count = n_steps - self._lags[-1]
+        if count < 1:
+            return np.zeros((*leading, len(self.names)))
+        later = np.empty((*leading, 2, len(self._lags), count))
+        for place, lag in enumerate(self._lags):
+            later[..., place, :] = powers[..., lag : lag + count]
+        products = (later @ powers[..., :count, None])[..., 0] / count
+        mean = (powers @ shares(n_steps))[..., None]
+        echoes = np.log((products + TINY) / (mean * mean + TINY) + self.floor)
+        return echoes.reshape(*leading, -1)
