@@ -306,6 +306,12 @@ def test_what_is_found_is_judged_by_the_learner_itself_and_no_worse_than_where_i
     )
 
 
+def test_slides_divided_otherwise_than_the_search_asks_are_refused() -> None:
+    space = RecipeSpace.load('svm-pairs', load_recipe('ets-linear-svm'))
+    with pytest.raises(InvalidParameter, match='20 halves with seed 0, the search asks for 4 with seed 0'):
+        optimise(space, Division(tones()), SMALL, TellingApart())
+
+
 def test_cores_and_a_dask_cluster_find_what_one_core_finds(tmp_path) -> None:
     space = RecipeSpace.load('svm-pairs', load_recipe('ets-linear-svm'))
     division = Division(tones(), SMALL.halves)

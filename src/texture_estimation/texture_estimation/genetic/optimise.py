@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Generic
 
 from texture_core.arrays import Array
+from texture_core.errors import InvalidParameter
 from texture_estimation.genetic.division import Division
 from texture_estimation.genetic.feature_cache import FeatureCache
 from texture_estimation.genetic.fitness import fitness
@@ -101,7 +102,19 @@ def optimise(
         File that is written after each generation, and file that is read first.
     tell
         Called after each generation.
+
+    Raises
+    ------
+    InvalidParameter
+        If the division has other halves than `params`.
+    TextureError
+        If slides, features or checkpoint cannot be used.
     """
+    if (division.n_halves, division.seed) != (params.halves, params.seed):
+        raise InvalidParameter(
+            f'the slides are divided into {division.n_halves} halves with seed {division.seed}, the search asks for '
+            f'{params.halves} with seed {params.seed}; give both the same'
+        )
     plan = _Plan(space, division, task, features or FeatureCache(division.cut), spread)
     memory = Memory(plan.identity)
     if resume:

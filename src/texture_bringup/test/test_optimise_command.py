@@ -1,0 +1,46 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_bringup.command import main
+from texture_bringup.commands.optimise import bar
+from texture_estimation.genetic.search import Generation, Scored
+from texture_estimation.recipe import load_recipe
+from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
+
+
+def test_the_bar_says_how_far_how_good_and_how_long() -> None:
+    generation = Generation(6, 30, Scored((8, 'yes'), 0.8765, 0.0, 20), judged=110, remembered=7, halves=640)
+    said = bar(generation, 12.3, 'cork – felt')
+    assert said == ('cork – felt: [####................] 6/30  best 87.65 %  110 tried, 7 remembered, 640 halves  12 s')
+
+
+def test_a_recipe_is_tuned_from_the_command_line_and_the_search_is_told_line_by_line(tmp_path: Path, capsys) -> None:
+    bags, out = tmp_path / 'bags', tmp_path / 'best.yaml'
+    write_simulated(bags, SlidePlan(slides=4, slide_s=0.8), np.random.default_rng(0), surfaces=('glass', 'leather'))
+    size = ['--population', '4', '--generations', '2', '--halves', '2', '--jobs', '1']
+    assert main(['optimise', 'ets-linear-svm', str(bags), '-o', str(out), *size]) == 0
+    said = capsys.readouterr()
+    assert [line.split('  ')[0] for line in said.err.splitlines()] == [
+        '[##########..........] 1/2',
+        '[####################] 2/2',
+    ]
+    assert said.out.startswith(f'{out}: fitness ')
+    assert load_recipe(str(out)).learner_name == 'svm_pairs'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [
+        (['--population', '1'], 'population'),
+        (['--grades', 'ets_roughness', '--per-pair'], 'leave --per-pair or --grades out'),
+        (['-o', '/nowhere/at/all.yaml'], "there is no folder '/nowhere/at'"),
+        (['--search', 'ets-ann'], "the recipe has no 'learner/ann_pairs/hidden'"),
+    ],
+)
+def test_a_mistake_is_answered_with_one_sentence(arguments, sentence, tmp_path: Path, capsys) -> None:
+    assert main(['optimise', 'ets-linear-svm', str(tmp_path), '-o', str(tmp_path / 'x.yaml'), *arguments]) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count('\n') == 1
