@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 from texture_core.catalogue import find
-from texture_evaluation.experiments import roughness
+from texture_evaluation.experiments import ets_circular, ets_fine, ets_linear, hu, jamali, kaboli, roughness
 from texture_evaluation.experiments.experiment import Experiment, ExperimentResult, Run
+from texture_evaluation.experiments.report import run
+
+PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fine, jamali, kaboli, hu))
 
 EXPERIMENTS: Mapping[str, Run] = {
+    **{protocol.name: partial(run, protocol) for protocol in PROTOCOLS},
     'roughness': roughness.run,  # Rispal et al.: grades of textures never felt
 }
 

@@ -1,0 +1,163 @@
+"""An experiment's result: the paper's table beside ours, and its findings one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import AnyArray
+from texture_evaluation.experiments.check import percent
+from texture_evaluation.experiments.experiment import Experiment, ExperimentResult
+from texture_evaluation.experiments.outcome import Outcome
+from texture_evaluation.experiments.paper_charts import accuracy_chart, confusions_chart
+from texture_evaluation.experiments.protocol import Finding, Method, Outcomes, Protocol, Table
+from texture_evaluation.experiments.trial import outcomes
+from texture_simulation.scene import Scene, load_scene
+
+VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
+
+
+def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
+    """Rebuild a paper's experiment on simulated surfaces."""
+    scene = load_scene(protocol.scene)
+    found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick)
+    checked = protocol.findings(found)
+    slides = {task.name: _slides(found[task.name, task.methods[0].name]) for task in protocol.tasks}
+    return ExperimentResult(
+        name=protocol.name,
+        measured=f'slides recognised, as in {protocol.paper}; intervals of 95 % over slides',
+        data=(
+            f"simulated: scene '{scene.name}' ({scene.about}); "
+            f'slides a surface: {", ".join(f"{count} ({name})" for name, count in slides.items())}'
+        ),
+        split=protocol.split,
+        numbers={
+            'difficulty': _difficulty(protocol, scene, found),
+            'tasks': {task.name: {m.name: _figures(m, found[task.name, m.name]) for m in task.methods}
+                      for task in protocol.tasks},
+            'findings': [_as_json(finding) for finding in checked],
+        },
+        charts=_charts(protocol, found, experiment.out),
+        lines=tuple(_lines(protocol, scene, found, checked)),
+    )  # fmt: skip
+
+
+def _slides(outcome: Outcome) -> int:
+    return len(outcome.codes) // len(outcome.surfaces)
+
+
+def _difficulty(protocol: Protocol, scene: Scene, found: Outcomes) -> dict[str, Any]:
+    anchor = protocol.anchor
+    outcome = found.get((anchor.task, anchor.method)) if not anchor.experiment else None
+    return {
+        'set_by': f'{anchor.experiment or protocol.name}: {anchor.method}, {anchor.task}: {anchor.source}',
+        'paper': anchor.test,
+        'here': outcome and outcome.test.as_json(),
+        'noise_fast_count': scene.effects['noise'].fast_count,
+    }
+
+
+def _figures(method: Method, outcome: Outcome) -> dict[str, Any]:
+    paper = {name: getattr(method.paper, name) for name in ('learning', 'test', 'unclassified')}
+    return {
+        'paper': {name: value for name, value in paper.items() if value is not None},
+        'learning': round(outcome.learning, 4),
+        'test': outcome.test.as_json(),
+        'unclassified': round(outcome.unclassified, 4),
+        'note': outcome.note,
+        'train_s': round(outcome.train_s, 3),
+        'surfaces': list(outcome.surfaces),
+        'confusion_last_unclassified': np.round(outcome.confusion, 3).tolist(),
+    }
+
+
+def _as_json(finding: Finding) -> dict[str, Any]:
+    return {
+        'claim': finding.claim,
+        'here': finding.here,
+        'interval': finding.interval.as_json(),
+        'verdict': VERDICTS[finding.holds],
+    }
+
+
+def _charts(protocol: Protocol, found: Outcomes, out: Path) -> tuple[Path, ...]:
+    stem = f'experiment_{protocol.name.replace("-", "_")}'
+    panels = {
+        task.name: {m.name: (m.paper.test, found[task.name, m.name].test) for m in task.methods}
+        for task in protocol.tasks
+    }
+    charts = [accuracy_chart(panels, f'{protocol.name}: slides recognised, paper and simulation', out / f'{stem}.png')]
+    tables = {
+        method.name: (outcome.surfaces, shares_of(method.confusion), outcome.confusion)
+        for task in protocol.tasks
+        for method in task.methods
+        for outcome in [found[task.name, method.name]]
+        if method.confusion is not None
+    }
+    if tables:
+        path = out / f'{stem}_confusion.png'
+        charts.append(confusions_chart(tables, f'{protocol.name}: what was taken for what, %', path))
+    return tuple(charts)
+
+
+def _lines(protocol: Protocol, scene: Scene, found: Outcomes, checked: Sequence[Finding]) -> Iterator[str]:
+    yield (
+        f'{"%":28}{"paper: learning":>16}{"test":>7}{"unclassified":>14}   '
+        f'{"simulated: learning":>20}{"test":>22}{"unclassified":>14}'
+    )
+    for task in protocol.tasks:
+        yield f'{task.name}:'
+        for method in task.methods:
+            yield _row(method, found[task.name, method.name])
+    anchor = protocol.anchor
+    yield (
+        f'difficulty: noise of {scene.effects["noise"].fast_count:g} counts, set once so that {anchor.method} '
+        f'({anchor.task}{f" of {anchor.experiment}" if anchor.experiment else ""}) recognises '
+        f'{100 * anchor.test:.1f} % ({anchor.source})'
+    )
+    yield 'findings of the paper:'
+    for finding in checked:
+        interval = finding.interval.times(100.0)
+        yield f'  {VERDICTS[finding.holds]:14} {finding.claim}'
+        told = f'{interval.value:+.1f} points ({interval.low:+.1f} to {interval.high:+.1f})'
+        yield f'  {"":14} here {finding.here}; decided by {told}'
+    for task in protocol.tasks:
+        for method in task.methods:
+            if method.confusion is not None:
+                yield from _confusion_lines(method, found[task.name, method.name])
+
+
+def _row(method: Method, outcome: Outcome) -> str:
+    paper = method.paper
+    return (
+        f'  {method.name:26}{_share(paper.learning):>16}{_share(paper.test):>7}{_share(paper.unclassified):>14}   '
+        f'{_share(outcome.learning):>20}{_plain(outcome):>22}{_share(outcome.unclassified):>14}'
+    )
+
+
+def _plain(outcome: Outcome) -> str:
+    return percent(outcome.test).replace(' %', '')
+
+
+def _share(value: float | None) -> str:
+    return '–' if value is None else f'{100 * value:.1f}'
+
+
+def _confusion_lines(method: Method, outcome: Outcome) -> Iterator[str]:
+    yield f'{method.name}: % of the slides over each surface taken for each, paper | simulated (last: unclassified)'
+    width = max(map(len, outcome.surfaces))
+    for name, theirs, ours in zip(outcome.surfaces, shares_of(method.confusion), outcome.confusion, strict=True):
+        left, right = (' '.join(f'{100 * value:3.0f}' for value in row) for row in (theirs, ours))
+        yield f'  {name:{width}}  {left}  | {right}'
+
+
+def shares_of(table: Table | None) -> AnyArray:
+    """Return a paper's table as shares of each row, with a last column for what is unclassified."""
+    counts = np.asarray(table, dtype=np.float64)
+    if counts.shape[1] == counts.shape[0]:
+        counts = np.column_stack((counts, np.zeros(len(counts))))
+    shares: AnyArray = counts / counts.sum(axis=1, keepdims=True)
+    return shares

@@ -1,0 +1,94 @@
+"""Run a protocol: feel the slides, learn from some, judge the others, set it beside the paper."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from texture_estimation.genetic.fitness import decided_by_slide
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_evaluation.experiments.gather import Slides, gather
+from texture_evaluation.experiments.outcome import Outcome
+from texture_evaluation.experiments.protocol import Mask, Method, Outcomes, Protocol, Task
+from texture_features.feature_set import InputFeatures
+from texture_simulation.scene import Scene
+
+SLOW = 'signal_static'
+
+
+def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> Outcomes:
+    """Return what comes out of each method in each task."""
+    return {
+        (task.name, method): outcome
+        for task in protocol.tasks
+        for method, outcome in of_task(protocol, task, scene, seed, quick=quick)
+    }
+
+
+def of_task(protocol: Protocol, task: Task, scene: Scene, seed: int, *, quick: bool) -> Iterator[tuple[str, Outcome]]:
+    """Yield what comes out of each method in one task."""
+    task = reduced(task, protocol.quick_count) if quick else task
+    recipes = [(method, recipe_of(method)) for method in task.methods]
+    slow = any(SLOW in recipe.feature_set.topics for _, recipe in recipes)
+    slides = gather(scene, task, seed, slow=slow)
+    learnt = protocol.divide(slides.codes, slides.conditions, np.random.default_rng(seed), quick)
+    for method, recipe in recipes:
+        yield method.name, judge(recipe, slides, learnt, method.views)
+
+
+def recipe_of(method: Method) -> Recipe:
+    """Return the recipe as the protocol asks for it."""
+    recipe = load_recipe(method.recipe)
+    changes: dict[str, Any] = {}
+    if method.learner:
+        changes['learner'] = replace(recipe.learner, **method.learner)
+    windows = method.windows or recipe.feature_set.windows
+    inputs = tuple(_changed(item, method.features) for item in recipe.feature_set.inputs)
+    changes['feature_set'] = replace(recipe.feature_set, windows=windows, inputs=inputs, _layouts={})
+    if method.windows:
+        changes['training'] = replace(recipe.training, hop_s=method.windows.hop_s)
+    return replace(recipe, **changes)
+
+
+def _changed(item: InputFeatures, parameters: Mapping[str, Mapping[str, Any]]) -> InputFeatures:
+    features: list[tuple[str, Any]] = list(item.features)
+    changed = [(name, replace(feature, **parameters.get(name, {}))) for name, feature in features]
+    return replace(item, features=tuple(changed))
+
+
+def judge(recipe: Recipe, slides: Slides, learnt: Mask, views: Sequence[int] = ()) -> Outcome:
+    """Learn from the slides of each division and judge all.
+
+    Parameters
+    ----------
+    recipe
+        What learns and judges.
+    slides
+        What was felt.
+    learnt : (n_divisions, n_slides)
+        Which are learnt from.
+    """
+    to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+    taught, owner = slides.describe(to_learn, views)
+    asked, slide = slides.describe(recipe.feature_set, views)
+    windows = recipe.feature_set.windows
+    decided = np.empty(learnt.shape, dtype=np.intp)
+    began = time.perf_counter()
+    for number, mask in enumerate(learnt):
+        rows = mask[owner]
+        fitted = recipe.learner.fit(taught[rows], slides.codes[owner[rows]], owner[rows])
+        scores = recipe.learner.array_form(fitted.parts)(asked)
+        decided[number], _ = decided_by_slide(scores, slide, recipe.evidence, windows.hop_s / windows.length_s)
+    taken_s = (time.perf_counter() - began) / len(learnt)
+    return Outcome(slides.surfaces, slides.codes, slides.conditions, decided, learnt, taken_s, fitted.note)
+
+
+def reduced(task: Task, count: int) -> Task:
+    """Return the task with fewer slides: so many over each surface, as equally as may be among the visits."""
+    each = max(1, count // len(task.visits))
+    visits = tuple(replace(visit, count=min(visit.count, each)) for visit in task.visits)
+    return replace(task, visits=visits)
