@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from sklearn.neural_network import MLPClassifier
 
 from texture_estimation.learners.mlp import Mlp, _first_weights, _slopes
 from texture_estimation.log_probabilities import log_loss, log_softmax
@@ -50,3 +51,16 @@ def test_the_same_seed_learns_the_same(examples):
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
     first, again = (Mlp(epochs=2).fit(examples.values, codes, groups).parts for _ in range(2))
     assert all(np.array_equal(first[name], again[name]) for name in first)
+
+
+@pytest.mark.filterwarnings('ignore::sklearn.exceptions.ConvergenceWarning')
+def test_the_array_form_decides_every_window_as_scikit_learn_with_the_same_weights(make_examples):
+    examples, fresh = make_examples(spread=2.0), make_examples(seed=5, spread=3.0).values
+    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+    parts = Mlp(hidden=16, epochs=5).fit(examples.values, codes, groups).parts
+    network = MLPClassifier((16,), max_iter=1, random_state=0).fit(examples.values, codes)
+    network.coefs_ = [parts['hidden'], parts['output']]
+    network.intercepts_ = [parts['hidden_offset'], parts['output_offset']]
+    answers = Mlp.array_form(parts)(fresh)
+    np.testing.assert_array_equal(answers.argmax(axis=1), network.predict(fresh))
+    np.testing.assert_allclose(log_softmax(answers), network.predict_log_proba(fresh), atol=1e-9)
