@@ -30,6 +30,13 @@ def test_ours_grades_textures_never_felt_better_than_the_papers_heads_and_than_a
     assert max(other[f'{speed} m/s, 2.5 N']['error'] for speed in ('0.10', '0.20')) <= 0.9
 
 
+def test_windows_with_skids_are_refused_and_others_are_not(outcome) -> None:
+    skids = outcome[0].numbers['skids']
+    assert skids['without']['refused'] < 0.02
+    assert skids['with']['refused'] > 0.5
+    assert skids['with']['error_of_the_others'] < skids['with']['error_of_all']
+
+
 def test_the_table_names_every_texture_and_the_charts_are_drawn(outcome) -> None:
     result, _ = outcome
     text = '\n'.join(result.lines)

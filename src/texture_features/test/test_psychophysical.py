@@ -117,3 +117,6 @@ def test_a_skid_stands_out_and_an_even_hum_does_not() -> None:
     skid = np.where((times(500) > 0.2) & (times(500) < 0.22), 10.0, 1.0) * hum
     assert abs(value(Bursts(), windows(hum))) < 0.1
     assert value(Bursts(), windows(skid)) > 3.0
+    still = np.where((times(500) > 0.2) & (times(500) < 0.25), 0.01, 1.0) * hum
+    assert value(Bursts(), windows(still)) < 0.2
+    assert value(Bursts(pieces=20, over='weakest'), windows(still)) > 3.0

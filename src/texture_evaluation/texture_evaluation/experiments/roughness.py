@@ -21,6 +21,7 @@ from texture_evaluation.experiments.roughness_report import lines
 from texture_evaluation.experiments.roughness_scans import FORCE_N, SPEED_M_S, USED_S, Felt, Setup
 from texture_evaluation.experiments.roughness_tuning import TARGET_S, Tuned, tune
 from texture_evaluation.grade_latency import times_us
+from texture_simulation.effects.skids import Skids
 from texture_simulation.scene import load_scene
 
 SCENE, GRADES = 'roughness', 'ets_roughness'
@@ -35,6 +36,7 @@ PAPER = {'ANN1': (0.65, 1.13, 0.59, 0.59), 'ANN5': (0.24, 1.02, 0.60, 0.55), 'SV
 COLUMNS = ('seen', 'unseen', 'std_seen', 'std_unseen')
 ONE_PERSON = 0.82  # grades from the mean of the others: 81 materials, 11 people, another study (ViPer)
 SPEEDS_M_S, FORCES_N = (0.10, 0.15, 0.20), (1.0, 2.5, 5.0)
+SKIDS_PER_S = 3.0
 TIMED, QUICK_TIMED = 2000, 50
 NOMINAL = np.array([0.5, 0.6, 0.7, 0.8, 0.9, 0.95])
 TARGETS = {
@@ -73,6 +75,7 @@ def run(experiment: Experiment) -> ExperimentResult:
         'other_conditions_unseen': {
             name: _other_conditions(setup, models[name], recipe, test) for name, recipe in recipes.items()
         },
+        'skids': _skids(setup, models['ours'], test),
         'ours_other_splits': _other_splits(setup, recipes['ours']),
         'window_to_grade_us': _latency(setup, models['ours'], test[0], QUICK_TIMED if experiment.quick else TIMED),
         'tuning': {name: one.figures() for name, one in tuned.items()},
@@ -149,6 +152,27 @@ def _other_conditions(
         f'{speed:.2f} m/s, {force:g} N': setup.ask(model, setup.examples(recipe, textures, speed, force)).figures()
         for speed, force in dict.fromkeys(conditions)
     }
+
+
+def _skids(setup: Setup, model: RoughnessModel, textures: Sequence[str]) -> dict[str, Any]:
+    """Return how many windows are refused, with skids and without, and what the grades are worth that are left."""
+    scene = load_scene(SCENE)
+    skidding = Felt(replace(scene, effects={**scene.effects, 'skids': Skids(SKIDS_PER_S)}), setup.seed)
+    said: dict[str, Any] = {'per_s': SKIDS_PER_S}
+    for name, felt in (('with', skidding), ('without', setup.felt)):
+        one = replace(setup, felt=felt)
+        answers = one.ask(model, one.examples(model.recipe, textures, SPEED_M_S, FORCE_N))
+        vectors = model.recipe.feature_set.describe_many(
+            piece for texture in textures for piece in felt.pieces(texture, setup.scans, SPEED_M_S, FORCE_N)
+        )
+        refused = np.array([bool(model.checks.refusal(vector)) for vector in vectors])
+        errors = np.abs(answers.grades - answers.true)
+        said[name] = {
+            'refused': float(refused.mean()),
+            'error_of_all': float(errors.mean()),
+            'error_of_the_others': float(errors[~refused].mean()) if not refused.all() else None,
+        }
+    return said
 
 
 def _other_splits(setup: Setup, recipe: RoughnessRecipe) -> dict[str, Any]:

@@ -23,6 +23,12 @@ def lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
         f'  ours over {splits["splits"]} random choices of the learnt textures: error {splits["error"]:.2f}, '
         f'90 % intervals hold in {100 * splits["coverage_90"]:.0f} %'
     )
+    skids = numbers['skids']
+    yield (
+        f'  with {skids["per_s"]:g} skids a second {100 * skids["with"]["refused"]:.0f} % of the windows are refused '
+        f'(without, {100 * skids["without"]["refused"]:.1f} %): error of all {number(skids["with"]["error_of_all"])}, '
+        f'of those graded {number(skids["with"]["error_of_the_others"])}'
+    )
     for name, facts in numbers['tuning'].items():
         yield (
             f'  search for {name}: {facts["seconds"]:.0f} s for {facts["generations"]} generations on {facts["scans"]} '

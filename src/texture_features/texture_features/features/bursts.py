@@ -11,17 +11,21 @@ from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
 
+MIDDLE, WEAKEST = 'middle', 'weakest'
+
 
 @dataclass(frozen=True)
 class Bursts:
-    """Logarithm of the power of the strongest piece of the window over that of the middle one.
+    """Logarithm of the power of the strongest piece of the window over that of the middle or of the weakest one.
 
-    A finger that sticks and slips is still and then jumps; over an even texture all pieces are alike.
+    A finger that sticks and slips is still and then jumps; over an even texture all pieces are alike. The weakest piece
+    tells a single skid: being still for a tenth of the window does not move the middle.
     """
 
     of_signal: ClassVar[bool] = True
 
     pieces: int = param(10, 'Number of pieces; fewer if the window has fewer samples.', low=2, high=1000)
+    over: str = param(MIDDLE, 'Piece that the strongest is compared with.', choices=(MIDDLE, WEAKEST))
     floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
 
     @property
@@ -30,11 +34,11 @@ class Bursts:
         return ('',)
 
     def __call__(self, windows: Windows) -> Array:
-        """Return log(strongest / middle)."""
+        """Return log(strongest / other)."""
         rows = windows.centred_rows
         pieces = min(self.pieces, rows.shape[-1])
         length = rows.shape[-1] // pieces
         cut = rows[..., : pieces * length].reshape(*rows.shape[:-1], pieces, length)
         logs = np.sort(np.log(np.add.reduce(cut * cut, axis=-1) / length + self.floor), axis=-1)
-        difference: Array = logs[..., -1] - logs[..., pieces // 2]
+        difference: Array = logs[..., -1] - logs[..., pieces // 2 if self.over == MIDDLE else 0]
         return difference[..., None]
