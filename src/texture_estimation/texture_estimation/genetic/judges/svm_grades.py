@@ -22,17 +22,18 @@ def svm5(head: Svm5, values: Array, grades: Array, textures: Codes) -> GradesOfH
 
     def graded(learnt: Mask) -> Array:
         rows = np.flatnonzero(learnt)
-        known = kernel.take(rows, axis=0).take(rows, axis=1).astype(np.float64)
-        weights = np.zeros((len(values), len(members)), dtype=np.float32)
+        known = kernel.take(rows, axis=0)
+        among_known = known.take(rows, axis=1).astype(np.float64)
+        weights = np.zeros((len(rows), len(members)), dtype=np.float32)
         # A grade that no texture has never fires.
         offsets = np.full(len(members), -1.0, dtype=np.float32)
         for number, member in enumerate(members[:, rows]):
             if member.all():
                 offsets[number] = 1.0
             elif member.any():
-                svc = SVC(C=head.c, kernel='precomputed', tol=TOLERANCE, cache_size=CACHE_MB).fit(known, member)
-                weights[rows[svc.support_], number] = svc.dual_coef_[0]
+                svc = SVC(C=head.c, kernel='precomputed', tol=TOLERANCE, cache_size=CACHE_MB).fit(among_known, member)
+                weights[svc.support_, number] = svc.dual_coef_[0]
                 offsets[number] = svc.intercept_[0]
-        return mean_of_fired(kernel @ weights + offsets > 0)
+        return mean_of_fired(known.T @ weights + offsets > 0)
 
     return graded

@@ -62,13 +62,14 @@ def pair_decisions(kernel: Kernel, codes: Codes, learnt: Mask, box_constraint: f
     from sklearn.svm import SVC  # noqa: PLC0415  # a second, which who only looks up names need not wait for
 
     rows = np.flatnonzero(learnt)
+    known = kernel.take(rows, axis=0)
     svc = SVC(C=box_constraint, kernel='precomputed', tol=TOLERANCE, cache_size=CACHE_MB)
-    svc.fit(kernel.take(rows, axis=0).take(rows, axis=1).astype(np.float64), codes[rows])
+    svc.fit(known.take(rows, axis=1).astype(np.float64), codes[rows])
     coefficients, intercepts = _pair_coefficients(svc)
-    # Zeros for what is no support vector: gathering columns of the kernel would take longer.
-    every = np.zeros((len(codes), coefficients.shape[1]), dtype=np.float32)
-    every[rows[svc.support_]] = coefficients
-    decisions: NDArray[np.float32] = kernel @ every
+    # Zeros for what is no support vector: leaving rows of the kernel out would take longer.
+    every = np.zeros((len(rows), coefficients.shape[1]), dtype=np.float32)
+    every[svc.support_] = coefficients
+    decisions: NDArray[np.float32] = known.T @ every
     decisions += intercepts.astype(np.float32)
     return decisions
 
