@@ -31,8 +31,8 @@ def lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
     )
     for name, facts in numbers['tuning'].items():
         yield (
-            f'  search for {name}: {facts["seconds"]:.0f} s for {facts["generations"]} generations on {facts["scans"]} '
-            f'scans, {facts["individuals_tried"]} individuals tried'
+            f'  search for {name}: {facts["seconds"]:.0f} s, {facts["cpu_seconds"]:.0f} s of one core, for '
+            f'{facts["generations"]} generations on {facts["scans"]} scans, {facts["individuals_tried"]} individuals'
         )
     latency = numbers['window_to_grade_us']
     yield f'  from window to grade: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile'
