@@ -25,7 +25,7 @@ def convergence_chart(searches: Mapping[str, Sequence[Generation]], title: str, 
                 linestyle=('-', '--', ':')[number // len(COLOURS) % 3],
                 label=name if len(searches) <= NAMED else None,
             )
-        axes.set(xlabel='generation', ylabel='fitness of the best (%)')
+        axes.set(xlabel='generation', ylabel='fitness of the best, as the search sees it (%)')
         if len(searches) <= NAMED:
             axes.legend(loc='lower right')
     return Path(path)

@@ -13,6 +13,8 @@ from texture_core.errors import InvalidParameter
 
 In = TypeVar('In')
 Out = TypeVar('Out')
+# For a scheduler to answer, and for its workers to come.
+ANSWER_S, WORKERS_S = 20, 30
 
 
 class Spread(Protocol):
@@ -56,7 +58,7 @@ def over_dask(address: str) -> Iterator[Spread]:
 
     try:
         client: Any = Client(  # type: ignore[no-untyped-call]
-            address, timeout='10s', set_as_default=False
+            address, timeout=ANSWER_S, set_as_default=False
         )
     except (OSError, ValueError, TimeoutError) as error:
         reason = ' '.join(str(error).split()) or type(error).__name__
@@ -64,7 +66,7 @@ def over_dask(address: str) -> Iterator[Spread]:
             f"no Dask scheduler answers at '{address}' ({reason}); "
             "start one with 'dask scheduler', or leave '--dask' out to use this machine's cores"
         ) from error
-    with client, client.as_current(), parallel_config(backend='dask', wait_for_workers_timeout=10):
+    with client, client.as_current(), parallel_config(backend='dask', wait_for_workers_timeout=WORKERS_S):
         yield _Joblib(Parallel())
 
 

@@ -187,14 +187,17 @@ def _charts(found: Mapping[str, Optimised[Any]], out: Path) -> tuple[Path, ...]:
         for name, one in found.items()
         if CASES[name].params.objective == 'front'
     }
-    out.mkdir(parents=True, exist_ok=True)
+    told = {name: history for name, history in single.items() if CASES[name].data != 'roughness'}
+    graded = {name: history for name, history in single.items() if CASES[name].data == 'roughness'}
+    size = '20 individuals, 30 generations, simulated slides'
     return (
         convergence_chart(
-            single,
-            'Searches of 20 individuals over 30 generations (simulated slides)',
-            out / 'optimise_convergence.png',
+            told, f'Searches for recipes that tell surfaces apart ({size})', out / 'optimise_textures.png'
+        ),
+        convergence_chart(
+            graded, f'Searches for recipes that grade roughness ({size})', out / 'optimise_roughness.png'
         ),
         search_front_chart(
-            fronts, 'Fitness and computing of the linear experiment (simulated slides)', out / 'optimise_front.png'
+            fronts, 'The linear experiment: fitness and computing (simulated slides)', out / 'optimise_front.png'
         ),
     )
