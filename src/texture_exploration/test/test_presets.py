@@ -28,6 +28,28 @@ def test_the_first_paper_slid_at_three_speeds_and_three_forces_half_a_second_eac
     assert max(request.distance_m for request in preset.requests) == pytest.approx(0.1)
 
 
+# What the papers tell: speeds, forces, headings, distances or radii or durations, and how often.
+TOLD = {
+    'ets-linear-headings': {'distance_m': {0.05}, 'direction_rad': {0, 30, 45, 90}, 'repeats': 50},
+    'ets-circular': {'radius_m': {0.02}, 'direction_rad': {0, 30, 45, 90}, 'repeats': 50},
+    'ets-ten-textures': {'speed_m_s': {0.125}, 'force_n': {2.0}, 'distance_m': {0.1}, 'repeats': 200},
+    'ets-roughness': {'speed_m_s': {0.15}, 'force_n': {2.5}, 'distance_m': {0.105}, 'repeats': 200},
+    'jamali': {'force_n': {1.0}, 'repeats': 50},
+    'kaboli': {'duration_s': {2.0}, 'repeats': 10},
+    'hu': {'speed_m_s': {0.0255}, 'force_n': {1.5}, 'direction_rad': {0, 90}, 'repeats': 60},
+}
+
+
+@pytest.mark.parametrize('name', TOLD)
+def test_a_preset_holds_what_its_paper_tells(name):
+    preset, told = load_preset(name), dict(TOLD[name])
+    assert preset.repeats == told.pop('repeats')
+    for key, values in told.items():
+        found = {getattr(request, key) for request in preset.requests}
+        shown = {math.degrees(value) for value in found} if key == 'direction_rad' else found
+        assert sorted(shown) == pytest.approx(sorted(values))
+
+
 def test_rounds_go_through_all_headings_before_they_repeat():
     headings = [math.degrees(request.direction_rad) for request in load_preset('ets-circular').all(2)]
     assert headings == pytest.approx([0, 30, 45, 90] * 2)
