@@ -1,0 +1,53 @@
+"""The scenes that the package ships, and what is written about them."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from texture_core.parameters import markdown_table
+from texture_core.resources import folder
+from texture_simulation.bench import BenchParams
+from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.frictions import FRICTIONS
+from texture_simulation.scene import load_scene
+from texture_simulation.sensors.catalogue import SENSORS
+from texture_simulation.surfaces.catalogue import KINDS
+
+PACKAGE = Path(__file__).resolve().parents[1]
+README = (PACKAGE / 'README.md').read_text(encoding='utf-8')
+FILES = sorted(folder('texture_simulation', 'config/scenes').glob('*.yaml'))
+SENSOR_OF = {
+    'ets_linear': 'tsf85_3x4', 'ets_circular': 'tsf85_3x4', 'ets_fine': 'tsf85_3x4', 'roughness': 'tsf85',
+    'jamali': 'daq', 'kaboli': 'biotac', 'hu': 'pvdf',
+}  # fmt: skip
+
+
+def test_the_readme_tells_every_parameter_effect_and_kind_of_surface() -> None:
+    assert markdown_table(BenchParams) in README
+    assert all(f'| `{name}` |' in README for name in (*EFFECTS, *KINDS, *FRICTIONS))
+    assert all(f'`{path.stem}`' in README for path in FILES)
+
+
+@pytest.mark.parametrize('path', FILES, ids=lambda path: path.stem)
+def test_a_scene_says_what_it_is_and_where_its_sizes_come_from(path: Path) -> None:
+    scene, text = load_scene(str(path)), path.read_text(encoding='utf-8')
+    assert scene.sensor in SENSORS
+    assert scene.sensor == SENSOR_OF.get(path.stem, scene.sensor)
+    assert 'All lengths in metres' in text or 'All values are' in text
+    assert 'guess' in text or 'printed' in text
+    assert ('Experiment:' in text) == (path.stem in SENSOR_OF)
+
+
+def test_all_terms_of_the_library_are_used_by_some_scene() -> None:
+    used = {type(term) for path in FILES for s in load_scene(str(path)).surfaces.values() for term in s.terms}
+    assert used == set(KINDS.values())
+
+
+def test_grades_of_people_lie_apart_one_for_each_texture() -> None:
+    with (folder('texture_simulation', 'config/grades') / 'ets_roughness.csv').open(encoding='utf-8') as file:
+        rows = list(csv.DictReader(file))
+    assert {row['texture'] for row in rows} == set(load_scene('roughness').surfaces)
+    assert all(1.0 <= float(row['grade']) <= 5.0 for row in rows)
