@@ -108,4 +108,7 @@ def test_recorded_slides_are_recognised_by_all_and_the_table_is_whole(tmp_path: 
         assert cell['window_accuracy'] > 0.5
         assert 0 < cell['latency_us']['median'] <= cell['latency_us']['p99']
         assert cell['train_s'] > 0
+    head, _, *rows = (tmp_path / 'recipes.md').read_text().splitlines()
+    assert 'biotac20, PAC at 1 kHz, random: window; slide (%)' in head
+    assert {row.split(' | ')[0] for row in rows} == {'| default', '| ets-linear-svm-vote', '| kaboli-pa'}
     assert set(result.numbers['ntp21']) == {'one force out', 'one speed out'}

@@ -64,3 +64,7 @@ def test_the_curve_ends_where_the_shortest_slide_ends() -> None:
     seconds, accuracy = metrics.curve([*RESULTS, slide('a', 'aaa')])
     assert seconds == pytest.approx([0.5, 0.6, 0.7])
     assert accuracy == pytest.approx([2 / 3, 1 / 3, 2 / 3])
+
+
+def test_at_the_end_all_slides_count_however_short() -> None:
+    assert metrics.accuracy_at_end([*RESULTS, slide('c', 'a')]) == pytest.approx(2 / 3)

@@ -65,6 +65,11 @@ def accuracy_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | No
     return {f'{seconds:.1f}': accuracy_at(results, seconds) for seconds in TIMES_S}
 
 
+def accuracy_at_end(results: Sequence[SlideResult]) -> float:
+    """Return the share of slides that are recognised from all their windows, however long they are."""
+    return float(np.mean([result.estimates[-1].label == result.surface for result in results]))
+
+
 def unclassified_windows(results: Sequence[SlideResult]) -> float:
     """Return the share of windows that alone are taken for nothing."""
     return float(np.mean([not label for result in results for label in result.window_labels]))

@@ -84,6 +84,7 @@ class Outcome:
         return {
             'window_accuracy': metrics.window_accuracy(self.results),
             'accuracy_at_s': metrics.accuracy_at_times(self.results),
+            'accuracy_at_end': metrics.accuracy_at_end(self.results),
             'unclassified_windows': metrics.unclassified_windows(self.results),
             'unclassified_at_s': metrics.unclassified_at_times(self.results),
             'train_s': round(float(np.mean(self.train_s)), 2),

@@ -24,6 +24,7 @@ from texture_evaluation.charts import front_chart
 from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.datasets.ntp21 import import_ntp21
 from texture_evaluation.evaluate import judge
+from texture_evaluation.recipe_table import recipe_table
 from texture_evaluation.recipe_trials import (
     LENGTH_S,
     Division,
@@ -44,6 +45,7 @@ DATA = {
 }
 RATE_HZ, FOLDS, LAST_LEARNT = 1000.0, 5, 30
 QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_LEARNT = ('material01', 'material02', 'material03'), '1-6', 2, 4
+QUICK_FASTER_M_S = 0.05
 QUICK_RECIPES = ('default', 'ets-linear-svm-vote', 'kaboli-pa')
 TIMED_SLIDES = 40
 # They describe what only an array of taxels feels.
@@ -116,7 +118,14 @@ def run(bench: Bench) -> BenchResult:
         numbers[job.setting][job.split][job.recipe] = {**cell.figures, 'latency_us': latency}
     if not bench.quick:
         _add_minirocket(numbers, settings, bench.seed)
-    sets = {name.partition(',')[0] for name in settings}
+    return result_of(numbers, bench)
+
+
+def result_of(numbers: Mapping[str, Any], bench: Bench) -> BenchResult:
+    """Write table and chart of the figures by setting, split and recipe, and return all as a result."""
+    sets = {name.partition(',')[0] for name in numbers}
+    bench.out.mkdir(parents=True, exist_ok=True)
+    (bench.out / 'recipes.md').write_text(recipe_table(numbers), encoding='utf-8')
     return BenchResult(
         name='recipes',
         measured=(
@@ -168,6 +177,8 @@ def _ntp21(source: Path, bench: Bench) -> dict[str, Setting]:
     with tempfile.TemporaryDirectory() as bags:
         paths = import_ntp21(source, Path(bags))
         recorded = read_recorded(paths[:3] if bench.quick else paths)
+    if bench.quick:  # fast slides are the short ones
+        recorded = [item for item in recorded if item.states[0].speed_m_s > QUICK_FASTER_M_S]
     first = {item.slide.name: item.states[0] for item in recorded}
     splits = {
         'one force out': divisions_by({name: state.force_n for name, state in first.items()}),
