@@ -1,3 +1,4 @@
+import dataclasses
 import time
 
 import numpy as np
@@ -5,13 +6,15 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from texture_msgs import msg
+from std_srvs.srv import Trigger
+from texture_msgs import msg, srv
 
 from texture_core.errors import ModelMismatch
 from texture_core.features import FeatureVector
 from texture_core.ros.conversions import from_msg, to_msg
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
 from texture_estimation.evidence import Evidence
+from texture_estimation.model import load_model
 from texture_estimation.nodes.classifier import Classifier
 
 pytestmark = pytest.mark.ros
@@ -51,6 +54,13 @@ class Bench:
     def set_model(self, path):
         [result] = self.node.set_parameters([Parameter('model', value=str(path))])
         return result
+
+    def call(self, kind, name, **fields):
+        client = self.peer.create_client(kind, name)
+        self.spin_until(client.service_is_ready)
+        future = client.call_async(kind.Request(**fields))
+        self.spin_until(future.done)
+        return future.result()
 
     def close(self):
         self.executor.shutdown()
@@ -122,3 +132,32 @@ def test_broken_messages_are_counted_and_survived(ros, model, vectors, tmp_path)
 def test_a_wrong_model_at_the_start_is_an_error(ros, tmp_path):
     with pytest.raises(ModelMismatch, match='cannot be read'):
         ros(f'model:={tmp_path / "none.skops"}')
+
+
+def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(ros, model, vectors, tmp_path):
+    path = model.save(tmp_path / 'm')
+    bench = ros(f'model:={path}')
+    moved = [dataclasses.replace(v, values=v.values + (0.0 if v.last else 9.0), exploration_id='e7') for v in vectors]
+    assert bench.ask(moved)[-1].label != 'silk'
+    answer = bench.call(srv.LearnTexture, 'learn_texture', label='silk')
+    assert (answer.success, answer.examples) == (True, len(vectors) - 1)
+    assert '5 textures known' in answer.message
+    assert bench.ask(moved)[-1].label == 'silk'
+    assert bench.ask(vectors)[-1].label == 'felt'
+    assert load_model(path).labels[-1] == 'silk'
+    assert bench.set_model(path).successful  # as after a restart
+    assert bench.ask(moved)[-1].label == 'silk'
+    assert bench.call(Trigger, 'undo_learning').success
+    assert bench.ask(moved)[-1].label != 'silk'
+    assert not bench.call(Trigger, 'undo_learning').success
+
+
+def test_what_cannot_be_learnt_is_answered_with_a_sentence(ros, model, tmp_path):
+    bench = ros()
+    assert 'no model is loaded' in bench.call(srv.LearnTexture, 'learn_texture', label='silk').message
+    bench.set_model(model.save(tmp_path / 'm'))
+    answer = bench.call(srv.LearnTexture, 'learn_texture', label='silk', exploration_id='e1')
+    assert not answer.success
+    assert 'explore first' in answer.message
+    bench.set_model(dataclasses.replace(model, examples=None).save(tmp_path / 'old'))
+    assert 'train it again' in bench.call(Trigger, 'undo_learning').message

@@ -1,10 +1,13 @@
-"""A trained model, and the two files that hold it: NAME.skops and the card NAME.json."""
+"""A trained model, and the files that hold it: NAME.skops, the card NAME.json, and what it was taught since.
+
+What a model is taught after its training stands in the folder NAME.lessons; the two files stay as they are.
+"""
 
 from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,10 +17,14 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch, TextureError
 from texture_estimation import model_files
+from texture_estimation.examples import Examples
 from texture_estimation.learners.learner import LogProbabilities
+from texture_estimation.lessons import Lesson, read_lessons
 from texture_estimation.log_probabilities import log_softmax, undecided
 from texture_estimation.recipe import Recipe
+from texture_estimation.taught_head import TaughtHead
 
+EXAMPLES = 'examples'  # name of their part in the file
 # What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
 TRUSTED = ('sklearn.preprocessing._data.StandardScaler', 'sklearn.svm._classes.SVC')
 
@@ -31,7 +38,7 @@ class Model:
     name
         Of the model.
     labels
-        Textures it knows, in the order of the probabilities.
+        Textures it knows, in the order of the probabilities; those it was taught last.
     names, feature_set
         Features it expects, and their fingerprint.
     recipe
@@ -42,6 +49,12 @@ class Model:
         Exponent with which the evidence of a slide grows, 0 to 1.
     training
         Facts about the training, for the card.
+    examples
+        Windows it was trained on, to learn more beside them; None if it holds none.
+    lessons
+        What it was taught after the training.
+    taught
+        What judges since then; None if nothing was taught.
     """
 
     name: str
@@ -52,10 +65,15 @@ class Model:
     parts: Mapping[str, Any]
     growth: float
     training: Mapping[str, Any] = field(default_factory=dict)
+    examples: Examples | None = None
+    lessons: tuple[Lesson, ...] = ()
+    taught: LogProbabilities | None = None
 
     @cached_property
     def judge(self) -> LogProbabilities:
-        """The learner as plain arrays."""
+        """The learner as plain arrays, or what judges since the model was taught."""
+        if self.taught is not None:
+            return self.taught
         return self.recipe.learner.array_form(self.parts)
 
     def predict_log_proba(self, values: Array) -> Array:
@@ -69,13 +87,46 @@ class Model:
         none = undecided(log_probabilities).tolist()
         return ['' if tied else self.labels[index] for index, tied in zip(best, none, strict=True)]
 
+    def with_lessons(self, lessons: tuple[Lesson, ...]) -> Model:
+        """Return the model with these lessons instead of its own; it judges as before until `taught` is set anew."""
+        new = dict.fromkeys(lesson.label for lesson in lessons if lesson.label not in self.trained_labels)
+        return replace(self, labels=(*self.trained_labels, *new), lessons=lessons)
+
+    @property
+    def trained_labels(self) -> tuple[str, ...]:
+        """Textures known from the training."""
+        return self.labels[: int(self.examples.codes.max()) + 1] if self.examples else self.labels
+
+    def examples_of(self, label: str) -> Array:
+        """Return what is known of a label from training and lessons, (n, n_features)."""
+        known = self.examples.of_label(self.labels.index(label)) if self.examples and label in self.labels else None
+        own = [lesson.values for lesson in self.lessons if lesson.label == label]
+        return np.concatenate([np.empty((0, len(self.names))) if known is None else known, *own])
+
+    def taught_head(self) -> TaughtHead:
+        """Return what can be taught more, knowing what the model was trained on and taught.
+
+        Raises
+        ------
+        ModelMismatch
+            If the model holds no examples to learn beside.
+        """
+        if self.examples is None:
+            raise ModelMismatch(f"model '{self.name}' holds no examples to learn beside; train it again")
+        network = self.parts if self.recipe.learner_name == 'mlp' else None
+        known = self.examples
+        head = TaughtHead(known.values.astype(np.float64), known.codes, known.slides, network)
+        for label in dict.fromkeys(lesson.label for lesson in self.lessons):
+            head.set_examples(self.labels.index(label), self.examples_of(label))
+        return head
+
     @property
     def card(self) -> dict[str, Any]:
         """What the card says, in the form of JSON."""
         return {
             'format': model_files.FORMAT,
             'name': self.name,
-            'labels': list(self.labels),
+            'labels': list(self.trained_labels),
             'feature_set': self.feature_set,
             'features': list(self.names),
             'growth': self.growth,
@@ -85,12 +136,21 @@ class Model:
         }
 
     def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
-        """Write NAME.skops and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.skops."""
-        return model_files.write(path, self.parts, {**self.card, **(facts or {})})
+        """Write NAME.skops and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.skops.
+
+        Lessons are not written: they stand beside the model that was taught.
+        """
+        examples = {EXAMPLES: self.examples.as_parts()} if self.examples else {}
+        return model_files.write(path, {**self.parts, **examples}, {**self.card, **(facts or {})})
 
 
 def load_model(path: str | Path) -> Model:
-    """Read a model; `path` is that of either file, or of both without the ending. No code in the file is run.
+    """Read a model with what it was taught. No code in the files is run.
+
+    Parameters
+    ----------
+    path
+        Of either file, or of both without the ending.
 
     Raises
     ------
@@ -103,15 +163,18 @@ def load_model(path: str | Path) -> Model:
         raise ModelMismatch(f"model '{target}' gives grades of roughness; the roughness_estimator takes it")
     try:
         recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
+        parts = model_files.parts_of(content, TRUSTED)
+        examples = parts.pop(EXAMPLES, None)
         model = Model(
             name=str(card['name']),
             labels=tuple(map(str, card['labels'])),
             names=tuple(map(str, card['features'])),
             feature_set=str(card['feature_set']),
             recipe=recipe,
-            parts=model_files.parts_of(content, TRUSTED),
+            parts=parts,
             growth=float(card['growth']),
             training=dict(card['training']),
+            examples=Examples.from_parts(examples) if examples else None,
         )
         answer = model.predict_log_proba(np.zeros(len(model.names)))
     except (KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile, TextureError) as error:
@@ -122,4 +185,8 @@ def load_model(path: str | Path) -> Model:
         raise ModelMismatch(
             f"model '{target}' answers for {answer.shape} labels but its card names {len(model.labels)}; train it again"
         )
-    return model
+    lessons = read_lessons(target, model.feature_set, model.names)
+    if not lessons:
+        return model
+    taught = model.with_lessons(lessons)
+    return replace(taught, taught=taught.taught_head().judge)

@@ -32,8 +32,8 @@ def write(path: str | Path, parts: Mapping[str, Any], card: Mapping[str, Any]) -
     target.parent.mkdir(parents=True, exist_ok=True)
     content = dumps(dict(parts), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
     card = {**card, 'sha256': hashlib.sha256(content).hexdigest()}
-    _replace(target.with_name(f'{target.name}.skops'), content)
-    _replace(target.with_name(f'{target.name}.json'), (json.dumps(card, indent=1) + '\n').encode())
+    replace(target.with_name(f'{target.name}.skops'), content)
+    replace(target.with_name(f'{target.name}.json'), (json.dumps(card, indent=1) + '\n').encode())
     return target.with_name(f'{target.name}.skops')
 
 
@@ -61,6 +61,16 @@ def parts_of(content: bytes, trusted: Sequence[str]) -> dict[str, Any]:
     return dict(parts)
 
 
+def replace(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all."""
+    beside = path.with_name(f'.{path.name}.{os.getpid()}')
+    try:
+        beside.write_bytes(content)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
 def _read_card(path: Path) -> dict[str, Any]:
     try:
         card = json.loads(path.read_text(encoding='utf-8'))
@@ -79,12 +89,3 @@ def _read_parts(path: Path, digest: str) -> bytes:
     if hashlib.sha256(content).hexdigest() != digest:
         raise ModelMismatch(f"model file '{path}' is damaged or of another card; copy both files again or train again")
     return content
-
-
-def _replace(path: Path, content: bytes) -> None:
-    beside = path.with_name(f'.{path.name}.{os.getpid()}')
-    try:
-        beside.write_bytes(content)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)

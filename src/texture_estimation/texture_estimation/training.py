@@ -7,6 +7,7 @@ from scipy.optimize import minimize_scalar
 
 from texture_core.errors import InvalidData
 from texture_estimation.evidence_rules import EvidenceRule
+from texture_estimation.examples import Examples
 from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.log_probabilities import log_loss, undecided
@@ -59,6 +60,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Model:
             'calibration': fitted.note,
             'held_out_window_accuracy': _held_out_accuracy(fitted, codes),
         },
+        examples=Examples.of(examples.values, codes, groups),
     )
 
 

@@ -16,9 +16,9 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.task import Future
 from std_srvs.srv import Trigger
-from texture_msgs import action, msg
+from texture_msgs import action, msg, srv
 
-from texture_core.errors import InvalidParameter, LaunchFailed, MotionAborted
+from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationRequest, ExplorationState
 from texture_core.ros.conversions import from_msg, request_to_msg
@@ -152,6 +152,38 @@ class Operator:
             return str(self._result(client.call_async(Trigger.Request())).message)
         finally:
             self._node.destroy_client(client)
+
+    def learn(self, label: str, exploration_id: str = '', deadline_s: float = 10.0) -> tuple[int, str]:
+        """Teach an exploration, the last one if '', as a texture; return its number of examples and what happened.
+
+        Raises
+        ------
+        LaunchFailed
+            If no classifier answers.
+        InvalidData
+            If it could not be learnt, with the reason.
+        """
+        request = srv.LearnTexture.Request(label=label, exploration_id=exploration_id)
+        answer = self._ask_classifier(srv.LearnTexture, 'learn_texture', request, deadline_s)
+        return int(answer.examples), str(answer.message)
+
+    def undo_learning(self, deadline_s: float = 10.0) -> str:
+        """Let the classifier unlearn the last lesson; return what happened. Raises as `learn` does."""
+        return str(self._ask_classifier(Trigger, 'undo_learning', Trigger.Request(), deadline_s).message)
+
+    def _ask_classifier(self, kind: Any, name: str, request: Any, deadline_s: float) -> Any:
+        """Return the answer of a service of the classifier that succeeded."""
+        client = self._node.create_client(kind, name)
+        try:
+            self._until(client.service_is_ready, deadline_s, 'no classifier answers; is it running?')
+            future = client.call_async(request)
+            self._until(future.done, deadline_s, 'the classifier does not answer; look at its output')
+        finally:
+            self._node.destroy_client(client)
+        answer = future.result()
+        if not answer.success:
+            raise InvalidData(answer.message)
+        return answer
 
     def set_parameters(self, node: str, values: Mapping[str, Any], deadline_s: float = 30.0) -> None:
         """Set parameters of a node.
