@@ -11,7 +11,7 @@ from texture_evaluation.scene_view import SceneView, ViewPlan
 
 MM, UM = 1e3, 1e6
 SHOWN_S = 0.25
-WIDE = 1.5  # times as wide as high
+WIDE = 2.5  # times as wide as high
 LEAST_DENSITY = 1e-6  # of the highest: what lies below is not shown
 RELIEF_COLOURS = 'cividis'
 
@@ -81,6 +81,7 @@ def _relief(axes: Any, view: SceneView) -> Any:
     axes.plot(MM * view.way.x_m, MM * view.way.y_m, color=COLOURS[5], linewidth=1.2)
     axes.plot(MM * view.way.x_m[0], MM * view.way.y_m[0], 'o', color=COLOURS[5], markeredgecolor='white')
     axes.grid(visible=False)
+    axes.set_anchor('W')
     axes.set(xlabel='x (mm)', ylabel='y (mm)')
     return image
 
