@@ -58,6 +58,30 @@ def test_an_arm_that_failed_is_connected_again_by_the_next_request(explorer):
     assert exploration.outcome.success, exploration.outcome.message
 
 
+def test_recovering_frees_a_failed_arm_but_not_in_the_middle_of_an_exploration(explorer):
+    explorer.arm.fail('protective stop')
+    explorer.recover()
+    assert explorer.trouble() == ''
+    explorer.begin('one', SLOW)
+    with pytest.raises(MotionRefused, match="'one' is still running"):
+        explorer.recover()
+
+
+def test_an_arm_recovers_in_its_own_way_if_it_knows_one(explorer):
+    class Wise(SimulatedArm):
+        def recover(self):
+            self.recovered = True
+            self.connect()
+
+    wise = Explorer(Wise(), TouchParams(), SafetyLimits(stale_s=2.0), lambda state: None)
+    wise.connect()
+    wise.arm.fail('protective stop')
+    wise.recover()
+    assert wise.arm.recovered
+    assert wise.trouble() == ''
+    wise.close()
+
+
 def test_closing_while_it_moves_lifts_the_finger_and_ends_the_thread(explorer):
     exploration = explorer.begin('one', SLOW)
     explorer.close()

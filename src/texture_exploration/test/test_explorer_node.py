@@ -173,6 +173,15 @@ def test_stop_works_while_the_service_is_busy(world):
     assert world.client.phases(response.exploration_id)[-2:] == ['lift', 'aborted']
 
 
+def test_an_arm_in_a_protective_stop_is_recovered_by_a_service(world):
+    recover = world.client.create_client(Trigger, 'recover')
+    assert recover.wait_for_service(DEADLINE_S)
+    world.explorer._explorer.arm.fail('protective stop')
+    response = world.result(recover.call_async(Trigger.Request()))
+    assert (response.success, response.message) == (True, 'the arm can move')
+    assert world.result(world.call(**QUICK)).success
+
+
 def test_the_action_tells_how_it_goes(world):
     goal = world.goal(**{**QUICK, 'distance_m': 0.1})
     result = world.result(goal.get_result_async())

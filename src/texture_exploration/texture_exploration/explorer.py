@@ -12,7 +12,7 @@ from collections.abc import Callable
 from texture_core.catalogue import find
 from texture_core.errors import DeviceError, MotionRefused, TextureError
 from texture_core.exploration import ExplorationRequest, ExplorationState
-from texture_exploration.arms.protocol import Arm, Vector
+from texture_exploration.arms.protocol import Arm, Recoverable, Vector
 from texture_exploration.exploration import Exploration, cannot_move, hear_nothing
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.touch import TouchParams
@@ -129,6 +129,24 @@ class Explorer:
         current.stop(reason)
         return True
 
+    def recover(self) -> None:
+        """Free the arm from a fault, as it knows itself or by connecting anew; whoever asks sees that it may move.
+
+        Raises
+        ------
+        MotionRefused
+            If an exploration is running.
+        DeviceError
+            If the arm stays in trouble.
+        """
+        with self._lock:
+            self._refuse_two()
+            if isinstance(self.arm, Recoverable) and self.trouble():
+                with contextlib.suppress(DeviceError):  # connecting anew tells it too
+                    self.arm.recover()
+            if self.trouble():
+                self.connect()
+
     def close(self) -> None:
         """Abort, wait until the finger is lifted, let the arm go."""
         with self._lock:
@@ -141,10 +159,7 @@ class Explorer:
     def _prepare(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
         if self._closed:
             raise MotionRefused('the explorer is shutting down')
-        if self.current is not None:
-            raise MotionRefused(
-                f"exploration '{self.current.exploration_id}' is still running; wait for its end or stop it"
-            )
+        self._refuse_two()
         plan = find(MOTIONS, request.motion, 'motion')
         home = self._ready()
         motion = plan(request, home, self.touch, self.limits)
@@ -158,6 +173,12 @@ class Explorer:
             on_state=self._on_state,
             silence=self._silence,
         )
+
+    def _refuse_two(self) -> None:
+        if self.current is not None:
+            raise MotionRefused(
+                f"exploration '{self.current.exploration_id}' is still running; wait for its end or stop it"
+            )
 
     def _ready(self) -> Vector:
         """Return where explorations begin, once the arm can move."""

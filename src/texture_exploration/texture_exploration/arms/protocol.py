@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 Vector = tuple[float, float, float]  # x, y in the surface, z away from it
 
@@ -57,6 +57,14 @@ class Arm(Protocol):
 
     def stop(self) -> None:
         """Stand still and hold the position, whatever the arm was doing; may be called from any thread."""
+
+
+@runtime_checkable
+class Recoverable(Protocol):
+    """An arm that knows how to come free from a fault without being connected anew."""
+
+    def recover(self) -> None:
+        """Clear the fault; DeviceError if that is not possible. Whoever calls it sees that the arm may move."""
 
 
 class ArmClass(Protocol):

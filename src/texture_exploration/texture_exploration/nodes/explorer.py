@@ -67,6 +67,7 @@ class ExplorerNode(Node):
         group = ReentrantCallbackGroup()  # what waits for an exploration must not keep `stop` waiting
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
         self.create_service(Trigger, 'stop', self._on_stop, callback_group=group)
+        self.create_service(Trigger, 'recover', self._on_recover, callback_group=group)
         ActionServer(
             self, action.Explore, 'explore', self._on_goal, callback_group=group, cancel_callback=_accept_cancel
         )
@@ -160,6 +161,16 @@ class ExplorerNode(Node):
         stopped = self._explorer.stop('stopped on request')
         response.success = True
         response.message = 'stopping; the finger is being lifted' if stopped else 'nothing is moving'
+        return response
+
+    def _on_recover(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            self._explorer.recover()
+        except (DeviceError, MotionRefused) as error:
+            response.message = str(error)
+        else:
+            response.success, response.message = True, 'the arm can move'
+        self.get_logger().info(f'recover: {response.message}')
         return response
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
