@@ -331,6 +331,19 @@ def test_cores_and_a_dask_cluster_find_what_one_core_finds(tmp_path) -> None:
     assert alone.best.recipe == on_cluster.best.recipe
 
 
+@pytest.mark.parametrize('name', ['ets-linear-svm', 'ets-linear-ann'])
+@pytest.mark.parametrize('quick', [True, False])
+def test_a_trial_travels_to_another_machine_and_judges_the_same_there(name, quick) -> None:
+    recipe = load_recipe(name)
+    scans = tones(count=4)
+    division, task = Division(scans, 2), TellingApart()
+    examples, halves = division.examples(recipe.training_windows), division.halves(recipe.training_windows)
+    values = FeatureCache(scans).values(task.described(recipe))
+    trial = task.trial(recipe, values, examples, halves, quick=quick)
+    there = distributed.protocol.deserialize(*distributed.protocol.serialize(trial, on_error='raise'))
+    assert there.start()(1) == trial.start()(1)
+
+
 def test_a_cluster_that_is_not_there_is_named(monkeypatch) -> None:
     def refuse(*_, **__):
         raise OSError('Timed out')
