@@ -90,7 +90,7 @@ def test_an_image_holds_only_what_is_let_through() -> None:
     copied = re.findall(r'^COPY (?!--from)(?:--\S+ )*(.+) \S+$', (ROOT / 'docker' / 'Dockerfile').read_text(), re.M)
     sources = {name for line in copied for name in line.split()}
     assert '*' in ignored
-    assert sources == let_through
+    assert {Path(source).parts[0] for source in sources} == let_through
     assert all((ROOT / source).exists() for source in sources)
 
 
