@@ -153,7 +153,7 @@ class Operator:
         finally:
             self._node.destroy_client(client)
 
-    def learn(self, label: str, exploration_id: str = '', deadline_s: float = 10.0) -> tuple[int, str]:
+    def learn(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
         """Teach an exploration, the last one if '', as a texture; return its number of examples and what happened.
 
         Raises
@@ -167,7 +167,7 @@ class Operator:
         answer = self._ask_classifier(srv.LearnTexture, 'learn_texture', request, deadline_s)
         return int(answer.examples), str(answer.message)
 
-    def undo_learning(self, deadline_s: float = 10.0) -> str:
+    def undo_learning(self, deadline_s: float = 30.0) -> str:
         """Let the classifier unlearn the last lesson; return what happened. Raises as `learn` does."""
         return str(self._ask_classifier(Trigger, 'undo_learning', Trigger.Request(), deadline_s).message)
 
