@@ -14,7 +14,7 @@ from texture_estimation.genetic.examples import Cut
 from texture_estimation.genetic.spread import Spread, in_turn
 from texture_features.feature import Feature, Windows
 from texture_features.feature_set import FeatureSet, InputFeatures
-from texture_features.features.spectral_peaks import SpectralPeaks
+from texture_features.features.spectral_peaks import SpectralPeaks, by_frequency
 from texture_features.stretch import Stretched
 from texture_features.windows import WindowParams
 
@@ -117,10 +117,7 @@ def _derived(block: Array, feature: Feature) -> Array:
     if not isinstance(feature, SpectralPeaks):
         return block
     peaks = block.reshape(*block.shape[:-1], -1, 2)[..., : feature.peaks, :]
-    if feature.order == 'frequency':
-        lacking_last = np.where(peaks[..., 1:] > 0, peaks[..., :1], np.inf)
-        peaks = np.take_along_axis(peaks, np.argsort(lacking_last, axis=-2, kind='stable'), axis=-2)
-    return peaks
+    return by_frequency(peaks) if feature.order == 'frequency' else peaks
 
 
 def _describe(job: tuple[list[Windows], Feature]) -> Array:
