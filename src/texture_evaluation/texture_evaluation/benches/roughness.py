@@ -40,7 +40,10 @@ def run(bench: Bench) -> BenchResult:
     percentiles = {name: np.percentile(values, (50, 99)).tolist() for name, values in times.items()}
     return BenchResult(
         name='roughness-latency',
-        measured=f'features, checks, head and evidence for windows of {USED_S} s at 1 kHz, one by one, in one process',
+        measured=(
+            f'computing time of a core: features, checks, head and evidence for windows of {USED_S} s at 1 kHz, '
+            'one by one, in one process'
+        ),
         data='simulated TSF-85, scene roughness',
         split="by texture, the paper's: 15 learnt, windows of the 10 others timed",
         numbers={
