@@ -139,7 +139,7 @@ def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(ros, model, ve
     bench = ros(f'model:={path}')
     moved = [dataclasses.replace(v, values=v.values + (0.0 if v.last else 9.0), exploration_id='e7') for v in vectors]
     assert bench.ask(moved)[-1].label != 'silk'
-    answer = bench.call(srv.LearnTexture, 'learn_texture', label='silk')
+    answer = bench.call(srv.LearnTexture, 'learn', label='silk')
     assert (answer.success, answer.examples) == (True, len(vectors) - 1)
     assert '5 textures known' in answer.message
     assert bench.ask(moved)[-1].label == 'silk'
@@ -154,9 +154,9 @@ def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(ros, model, ve
 
 def test_what_cannot_be_learnt_is_answered_with_a_sentence(ros, model, tmp_path):
     bench = ros()
-    assert 'no model is loaded' in bench.call(srv.LearnTexture, 'learn_texture', label='silk').message
+    assert 'no model is loaded' in bench.call(srv.LearnTexture, 'learn', label='silk').message
     bench.set_model(model.save(tmp_path / 'm'))
-    answer = bench.call(srv.LearnTexture, 'learn_texture', label='silk', exploration_id='e1')
+    answer = bench.call(srv.LearnTexture, 'learn', label='silk', exploration_id='e1')
     assert not answer.success
     assert 'explore first' in answer.message
     bench.set_model(dataclasses.replace(model, examples=None).save(tmp_path / 'old'))

@@ -164,7 +164,7 @@ class Operator:
             If it could not be learnt, with the reason.
         """
         request = srv.LearnTexture.Request(label=label, exploration_id=exploration_id)
-        answer = self._ask_classifier(srv.LearnTexture, 'learn_texture', request, deadline_s)
+        answer = self._ask_classifier(srv.LearnTexture, 'learn', request, deadline_s)
         return int(answer.examples), str(answer.message)
 
     def undo_learning(self, deadline_s: float = 30.0) -> str:

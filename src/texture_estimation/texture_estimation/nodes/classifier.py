@@ -45,7 +45,7 @@ class Classifier(Node):
         self._processing_s = 0.0
         self._publisher = self.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
         self.create_subscription(msg.FeatureVector, 'features', self._on_features, FEATURE_QOS)
-        self.create_service(srv.LearnTexture, 'learn_texture', self._on_learn)
+        self.create_service(srv.LearnTexture, 'learn', self._on_learn)
         self.create_service(Trigger, 'undo_learning', self._on_undo)
         self._diagnostics = Diagnostics(self, self._report)
 
