@@ -2,6 +2,8 @@ import pytest
 
 from texture_bringup.command import COMMANDS, main
 
+pytestmark = pytest.mark.ros  # some sub-commands are nodes
+
 
 def test_without_a_sub_command_the_help_is_printed(capsys) -> None:
     assert main([]) == 0

@@ -60,4 +60,5 @@ def test_many_slides_at_once_are_joined_as_one_by_one(name):
     assert np.isfinite(together).all()
     np.testing.assert_allclose(np.exp(together).sum(axis=1), 1.0)
     for mean, windows, expected in zip(means, worth[:, 0], together, strict=True):
-        np.testing.assert_array_equal(rule.log_posterior(mean, windows, 0.7), expected)
+        alone = rule.log_posterior(mean, windows, 0.7)
+        np.testing.assert_allclose(alone, expected, rtol=1e-12)  # sums may be ordered otherwise
