@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 
-from texture_bringup.ros.operator import Operator
+from texture_bringup.ros.operator import Explored, Operator
 from texture_core.errors import MotionRefused
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationRequest, ExplorationState
@@ -18,12 +19,6 @@ NUMBERS = (
     ('radius', 'radius_m', 'm', 'radius of a circular motion'),
     ('turns', 'turns', '', 'turns of a circular motion'),
     ('duration', 'duration_s', 's', 'duration of an in-hand slide'),
-    (
-        'direction',
-        'direction_rad',
-        'rad',
-        'direction of travel, from +x towards +y; of a circular motion, the angle at which the slide begins',
-    ),
 )
 BAR = 24
 
@@ -34,6 +29,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     for option, _, unit, meaning in NUMBERS:
         shown = f'{meaning}, {unit}' if unit else meaning
         parser.add_argument(f'--{option}', type=float, default=0.0, help=f'{shown}; 0: the default of the motion')
+    parser.add_argument(
+        '--direction',
+        type=float,
+        nargs='+',
+        default=[0.0],
+        help='direction of travel, from +x towards +y; of a circular motion, the angle at which the slide begins, rad; '
+        'several: one exploration after the other',
+    )
     parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
     parser.add_argument(
         '--stop-when-certain', action='store_true', help='end the slide as soon as the texture is certain'
@@ -42,10 +45,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Explore once; return 1 if it was ended early by a fault or a stop."""
+    """Explore once in each direction; return 1 as soon as one was ended early by a fault or a stop."""
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(deadline_s=10.0)
-        explored = operator.explore(request_of(options), show_progress)
+        succeeded = all(tell(operator.explore(request, show_progress)) for request in requests_of(options))
+    return 0 if succeeded else 1
+
+
+def tell(explored: Explored) -> bool:
+    """Print how an exploration ended; return whether it succeeded."""
     if sys.stderr.isatty():
         print(file=sys.stderr)
     if not explored.exploration_id:
@@ -53,15 +61,16 @@ def run(options: argparse.Namespace) -> int:
     print(f'{explored.exploration_id}: {explored.message}')
     print(f'texture:   {texture_text(explored.texture)}')
     print(f'roughness: {roughness_text(explored.roughness)}')
-    return 0 if explored.success else 1
+    return bool(explored.success)
 
 
-def request_of(options: argparse.Namespace) -> ExplorationRequest:
-    """Return the request that the options stand for."""
+def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
+    """Return the requests that the options stand for, one for each direction."""
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
-    return ExplorationRequest(
+    request = ExplorationRequest(
         options.motion, surface=options.surface, stop_when_certain=options.stop_when_certain, **numbers
     )
+    return [replace(request, direction_rad=direction) for direction in options.direction]
 
 
 def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
