@@ -10,6 +10,7 @@ from texture_evaluation.benches import (
     biotac20,
     clock,
     features,
+    frontier,
     latency,
     load,
     motion,
@@ -27,6 +28,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
+    'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
     'roughness': roughness.run,  # from window to grade
     'optimise': optimise.run,  # genetic searches of the papers' size: time, convergence, front
     'clock': clock.run,  # stamps in spite of late arrivals and drift

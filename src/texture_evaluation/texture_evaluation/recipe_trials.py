@@ -24,6 +24,7 @@ from texture_estimation.model import Model
 from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
 from texture_evaluation import metrics
+from texture_evaluation.evaluate import judge
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.slides import Slide, find_slides, read_slides
 from texture_features.feature import Feature
@@ -37,6 +38,7 @@ from texture_features.windows import Piece, cut_recording
 # Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and learns from
 # windows this far apart.
 LENGTH_S = 0.5
+TIMED_SLIDES = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +101,7 @@ def read_recorded(bags: Iterable[str | Path], slides: str = '') -> list[Recorded
     return [_recorded(slide, messages) for slide, messages in read_slides(find_slides(bags, slides))]
 
 
-def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool) -> Recipe:
+def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: float | None = None) -> Recipe:
     """Return a recipe with windows as all others have them.
 
     Parameters
@@ -110,9 +112,13 @@ def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool) -> Recipe:
         Of the signal: a longer power spectrum than a window has points is not asked for.
     of_motion
         Whether speed and force may be used. Where they belong to the recording session, they betray the surface.
+    length_s
+        Of all windows, if given; they begin so far apart, or LENGTH_S if they are longer.
     """
     windows = recipe.feature_set.windows
-    if windows.length_s >= LENGTH_S:
+    if length_s is not None:
+        windows = dataclasses.replace(windows, length_s=length_s, hop_s=min(length_s, LENGTH_S))
+    elif windows.length_s >= LENGTH_S:
         windows = dataclasses.replace(windows, length_s=LENGTH_S, hop_s=LENGTH_S)
     inputs = (_adapted(item, round(windows.length_s * rate_hz), of_motion) for item in recipe.feature_set.inputs)
     inputs = (item for item in inputs if item.features)
@@ -132,6 +138,14 @@ def try_recipe(recipe: Recipe, recorded: Sequence[Recorded], divisions: Sequence
         taken.append(time.perf_counter() - start)
         results += [_judged(model, slide, vectors) for slide, vectors in described.items() if slide.name in tested]
     return Outcome([result for result in results if result.estimates], taken, model)
+
+
+def latency_us(recipe: Recipe, model: Model, recorded: Sequence[Recorded]) -> dict[str, float]:
+    """Return median and 99th percentile of the computing time of windows one by one; the first slide warms up."""
+    cut = [item.cut(recipe) for item in recorded[:: max(1, len(recorded) // TIMED_SLIDES)]]
+    taken = [judge(model, pieces)[2][:-1] for pieces in (cut[0], *cut)][1:]
+    median, p99 = np.percentile(np.concatenate(taken), (50, 99))
+    return {'median': round(float(median), 1), 'p99': round(float(p99), 1)}
 
 
 def random_divisions(slides: Sequence[Slide], count: int, rng: np.random.Generator) -> list[Division]:

@@ -23,7 +23,6 @@ from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import front_chart
 from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.datasets.ntp21 import import_ntp21
-from texture_evaluation.evaluate import judge
 from texture_evaluation.recipe_table import recipe_table
 from texture_evaluation.recipe_trials import (
     LENGTH_S,
@@ -32,6 +31,7 @@ from texture_evaluation.recipe_trials import (
     comparable,
     division_by_time,
     divisions_by,
+    latency_us,
     random_divisions,
     read_recorded,
     try_recipe,
@@ -47,7 +47,6 @@ RATE_HZ, FOLDS, LAST_LEARNT = 1000.0, 5, 30
 QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_LEARNT = ('material01', 'material02', 'material03'), '1-6', 2, 4
 QUICK_FASTER_M_S = 0.05
 QUICK_RECIPES = ('default', 'ets-linear-svm-vote', 'kaboli-pa')
-TIMED_SLIDES = 40
 # They describe what only an array of taxels feels.
 NEEDS_ARRAY = frozenset({'any-speed'})
 # Published with the data, for all of its 50 slides a material: windows of 0.5 s of PAC at 1 kHz, five random folds by
@@ -114,7 +113,8 @@ def run(bench: Bench) -> BenchResult:
     cells = _try_all(settings, _jobs(settings, bench))
     numbers: dict[str, Any] = {name: {split: {} for split in setting.splits} for name, setting in settings.items()}
     for job, cell in cells.items():
-        latency = _latency(settings[job.setting], job.recipe, cell.model)
+        setting = settings[job.setting]
+        latency = latency_us(setting.recipe(job.recipe), cell.model, setting.recorded)
         numbers[job.setting][job.split][job.recipe] = {**cell.figures, 'latency_us': latency}
     if not bench.quick:
         _add_minirocket(numbers, settings, bench.seed)
@@ -146,7 +146,10 @@ def result_of(numbers: Mapping[str, Any], bench: Bench) -> BenchResult:
 
 
 def _settings(bench: Bench) -> dict[str, Setting]:
-    builders: Mapping[str, Callable[[Path, Bench], dict[str, Setting]]] = {'biotac20': _biotac20, 'ntp21': _ntp21}
+    builders: Mapping[str, Callable[[Path, Bench], dict[str, Setting]]] = {
+        'biotac20': biotac20_settings,
+        'ntp21': _ntp21,
+    }
     present = {name: bench.data / name for name in builders if bench.data and (bench.data / name).is_dir()}
     if not present:
         raise InvalidData(
@@ -158,7 +161,8 @@ def _settings(bench: Bench) -> dict[str, Setting]:
     return settings
 
 
-def _biotac20(source: Path, bench: Bench) -> dict[str, Setting]:
+def biotac20_settings(source: Path, bench: Bench) -> dict[str, Setting]:
+    """Return the vibration alone and all channels of the BioTac's slides."""
     chosen = {'slides': QUICK_SLIDES, 'materials': QUICK_MATERIALS} if bench.quick else {}
     with tempfile.TemporaryDirectory() as bags:
         recorded = read_recorded(import_biotac20(source, Path(bags), **chosen))  # type: ignore[arg-type]
@@ -225,16 +229,6 @@ def _try_all(settings: Mapping[str, Setting], jobs: Sequence[_Job]) -> dict[_Job
     context = multiprocessing.get_context('fork')
     with ProcessPoolExecutor(os.cpu_count(), context, _share, (settings,)) as pool:
         return dict(zip(jobs, pool.map(_try, jobs), strict=True))
-
-
-def _latency(setting: Setting, recipe: str, model: Model) -> dict[str, float]:
-    """Return the computing time of windows one by one; the first slide warms up."""
-    cut = [
-        item.cut(setting.recipe(recipe)) for item in setting.recorded[:: max(1, len(setting.recorded) // TIMED_SLIDES)]
-    ]
-    taken = [judge(model, pieces)[2][:-1] for pieces in (cut[0], *cut)][1:]
-    median, p99 = np.percentile(np.concatenate(taken), (50, 99))
-    return {'median': round(float(median), 1), 'p99': round(float(p99), 1)}
 
 
 def _note(bench: Bench) -> str:

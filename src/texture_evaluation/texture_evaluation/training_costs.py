@@ -1,0 +1,76 @@
+"""What a training costs by its size: time and memory, each measured in a process of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+from texture_estimation.learners.catalogue import LEARNERS
+from texture_estimation.learners.learner import Learner
+
+N_FEATURES = 68  # those of the default recipe
+WINDOWS_OF_A_SLIDE = 5
+# Distance of the classes from each other in every feature, in standard deviations within one.
+SPREAD = 0.5
+KIB = 1024.0
+
+
+@dataclass(frozen=True)
+class Size:
+    """Of a training: how many windows, and of how many surfaces."""
+
+    windows: int
+    labels: int
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Computing time (s) of a training, and the memory (MiB) that it took beyond its examples."""
+
+    seconds: float
+    mebibytes: float
+
+
+def costs(learner: str, sizes: Sequence[Size], limit_s: float, seed: int) -> Mapping[Size, Cost]:
+    """Return the costs of rising sizes; those after the first that takes longer than the limit are left out."""
+    found: dict[Size, Cost] = {}
+    for size in sizes:
+        found[size] = cost(LEARNERS[learner](), size, seed)
+        if found[size].seconds > limit_s:
+            break
+    return found
+
+
+def cost(learner: Learner, size: Size, seed: int) -> Cost:
+    """Return what one training on made-up examples costs."""
+    context = multiprocessing.get_context('fork')
+    here, there = context.Pipe()
+    process = context.Process(target=_measure, args=(learner, size, seed, there))
+    process.start()
+    there.close()
+    try:
+        result: Cost = here.recv()
+    finally:
+        process.join()
+    return result
+
+
+def _measure(learner: Learner, size: Size, seed: int, answer: Connection) -> None:
+    rng = np.random.default_rng(seed)
+    codes = np.arange(size.windows) % size.labels
+    groups = codes + size.labels * (np.arange(size.windows) // (size.labels * WINDOWS_OF_A_SLIDE))
+    centres = SPREAD * rng.standard_normal((size.labels, N_FEATURES))
+    values = centres[codes] + rng.standard_normal((size.windows, N_FEATURES))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.process_time()
+    learner.fit(values, codes, groups)
+    taken = time.process_time() - start
+    used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    answer.send(Cost(round(taken, 3), round(used / KIB, 1)))
+    answer.close()
