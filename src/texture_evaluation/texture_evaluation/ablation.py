@@ -89,6 +89,7 @@ TOUCHINGS: Mapping[str, Touching] = {
 
 # Effects that left the scenes because they change no decision there; they are put back to be measured.
 LEFT: Mapping[str, Mapping[str, Any]] = {
+    'bench': {'slide_error': SlideError(0.01, 0.04), 'unevenness': Unevenness(0.15)},
     'ets_circular': {'patch_growth': PatchGrowth(), 'force_gain': ForceGain(), 'unevenness': Unevenness(0.15)},
     'ets_fine': {'patch_growth': PatchGrowth(), 'force_gain': ForceGain(), 'unevenness': Unevenness(0.1)},
     'kaboli': {
