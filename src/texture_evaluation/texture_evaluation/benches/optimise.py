@@ -189,14 +189,9 @@ def _charts(found: Mapping[str, Optimised[Any]], out: Path) -> tuple[Path, ...]:
     }
     told = {name: history for name, history in single.items() if CASES[name].data != 'roughness'}
     graded = {name: history for name, history in single.items() if CASES[name].data == 'roughness'}
-    size = '20 individuals, 30 generations, simulated slides'
     return (
-        convergence_chart(
-            told, f'Searches for recipes that tell surfaces apart ({size})', out / 'optimise_textures.png'
-        ),
-        convergence_chart(
-            graded, f'Searches for recipes that grade roughness ({size})', out / 'optimise_roughness.png'
-        ),
+        convergence_chart(told, 'Searches that tell surfaces apart (simulated slides)', out / 'optimise_textures.png'),
+        convergence_chart(graded, 'Searches that grade roughness (simulated slides)', out / 'optimise_roughness.png'),
         search_front_chart(
             fronts, 'The linear experiment: fitness and computing (simulated slides)', out / 'optimise_front.png'
         ),
