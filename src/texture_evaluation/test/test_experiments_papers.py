@@ -120,5 +120,6 @@ def test_a_method_that_cannot_fail_recognises_all_it_learnt() -> None:
     task = reduced(protocol.tasks[0], 6)
     slides = gather(load_scene(protocol.scene), task, 0, slow=False)
     found = judge(recipe_of(task.methods[2]), slides, np.ones((1, len(slides.codes)), dtype=bool))
+    assert found.learning is not None
     assert found.learning > 0.8
     assert (found.decided != UNDECIDED).all()

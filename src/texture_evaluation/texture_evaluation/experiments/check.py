@@ -16,7 +16,8 @@ Pair = tuple[str, str]
 
 def higher(claim: str, first: Outcome, second: Outcome) -> Finding:
     """Check that one method recognises more than another, slide by slide."""
-    gain = mean(first.right() - second.right())
+    both = first.tested & second.tested
+    gain = mean(first.right(both) - second.right(both))
     return Finding(claim, f'{percent(first.test)} against {percent(second.test)}', gain, gain.above())
 
 

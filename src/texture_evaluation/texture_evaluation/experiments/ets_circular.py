@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from texture_evaluation.experiments.check import higher_elsewhere, lower_in, most_errors
 from texture_evaluation.experiments.interval import apart
 from texture_evaluation.experiments.protocol import (
+    FEW,
     OURS,
     Anchor,
     Figures,
@@ -85,8 +87,8 @@ PROTOCOL = Protocol(
             (
                 Method('ets-circular-ann', Figures(0.846, 0.811, 0.028)),
                 Method('ets-circular-svm', Figures(0.990, 0.867, 0.052), confusion=TABLE_2),
-                OURS,
-                Method('vibration-and-taxels'),
+                replace(OURS, divisions=FEW),
+                Method('vibration-and-taxels', divisions=FEW),
             ),
         ),
         Task(
@@ -95,14 +97,16 @@ PROTOCOL = Protocol(
             (
                 Method('ets-linear-ann', Figures(0.809, 0.715, 0.142)),
                 Method('ets-linear-svm', Figures(0.963, 0.764, 0.134)),
-                OURS,
-                Method('vibration-and-taxels'),
+                replace(OURS, divisions=FEW),
+                Method('vibration-and-taxels', divisions=FEW),
             ),
         ),
     ),
     divide=halves(20),
     split='20 random halves of each texture',
-    anchor=Anchor('linear slides', 'ets-linear-svm', 0.750, 'the same finger and robot', 'ets-linear'),
+    anchor=Anchor(
+        'linear slides', 'ets-linear-svm', 0.750, 'the same finger on the same robot', experiment='ets-linear'
+    ),
     findings=findings,
     quick_count=16,
 )

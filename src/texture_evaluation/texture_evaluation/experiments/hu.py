@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from texture_evaluation.experiments.check import better_on, higher, most_errors
 from texture_evaluation.experiments.protocol import (
+    FEW,
     OURS,
     Anchor,
     Figures,
@@ -53,7 +55,7 @@ PROTOCOL = Protocol(
                 Method('hu-pca-svm', Figures(test=0.92), WHOLE, {'blocks': 2}, POWER),
                 Method('hu-pca-svm', windows=WHOLE, features=POWER, label=X_ONLY, views=(0,)),
                 Method('hu-pca-svm', windows=WHOLE, features=POWER, label=Y_ONLY, views=(1,)),
-                OURS,
+                replace(OURS, divisions=FEW),
             ),
         ),
     ),

@@ -46,6 +46,8 @@ SURFACES = (ROUND, VARIOUS, ROUND + VARIOUS)
 PAPER_SVM, PAPER_EM = (0.97, 0.975, 0.96), (0.8223, 0.835, 0.8058)
 PAPER_PA = 0.87  # t = 10, on average
 SVM, EM = 'kaboli-svm', 'kaboli-em'
+# "Class to clusters" is Weka's word, and Weka's mixture takes the features of a cluster as independent.
+INDEPENDENT = {'covariance': 'diag', 'starts': 5}
 ROUNDS = (1, 2, 5, 10)
 
 
@@ -84,7 +86,7 @@ def _methods(svm: float, em: float) -> tuple[Method, ...]:
     return (
         Method(SVM, Figures(test=svm), WHOLE),
         *online,
-        Method(EM, Figures(test=em), WHOLE),
+        Method(EM, Figures(test=em), WHOLE, INDEPENDENT),
         OURS,
         Method('vibration-and-taxels'),
     )
@@ -100,7 +102,13 @@ PROTOCOL = Protocol(
     ),
     divide=learnt_in(TRAINED),
     split='learnt: 10 slides with index and middle finger; tested: 20 with thumb and index finger',
-    anchor=Anchor(ALL, SVM, 0.96, 'section V.A'),
+    anchor=Anchor(
+        ALL,
+        SVM,
+        0.96,
+        'section V.A',
+        shortfall='not reached: this is the little noise of a resting BioTac, and less does not help',
+    ),
     findings=findings,
     quick_count=4,
 )

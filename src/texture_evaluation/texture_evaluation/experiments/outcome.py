@@ -44,9 +44,14 @@ class Outcome:
     note: str = ''
 
     @property
-    def learning(self) -> float:
-        """Share of the slides learnt from that are recognised."""
-        return float((self.decided == self.codes)[self.learnt].mean())
+    def learning(self) -> float | None:
+        """Share of the slides learnt from that are recognised; None if none is learnt from as a whole."""
+        return float((self.decided == self.codes)[self.learnt].mean()) if self.learnt.any() else None
+
+    @property
+    def tested(self) -> NDArray[np.bool_]:
+        """Which slides were not learnt from in some division, (n_slides,)."""
+        return np.asarray(~self.learnt.all(axis=0))
 
     @property
     def test(self) -> Interval:
@@ -95,7 +100,7 @@ class Outcome:
         return [(self.surfaces[first], self.surfaces[second]) for first, second in order]
 
     def _tested(self, events: NDArray[np.bool_], of: NDArray[np.bool_] | None = None) -> Array:
-        times = (~self.learnt).sum(axis=0)
-        chosen = (times > 0) if of is None else (times > 0) & of
-        counts: Array = (events & ~self.learnt).sum(axis=0)[chosen] / times[chosen]
-        return counts
+        chosen = self.tested if of is None else self.tested & of
+        times = (~self.learnt).sum(axis=0)[chosen]
+        shares: Array = (events & ~self.learnt).sum(axis=0)[chosen] / times
+        return shares

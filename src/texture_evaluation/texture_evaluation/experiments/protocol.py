@@ -81,6 +81,11 @@ class Method:
         Name in the table; '' for that of the recipe.
     views
         Which views of a slide it is given; () for all.
+    singly
+        Whether the windows are dealt out to learn from one by one, half of them, instead of slide by slide: all slides
+        are then tested though parts of each are learnt. A fault on trial, to see what it would give.
+    divisions
+        It is tried on so many of the divisions; 0 for all.
     confusion : (n_surfaces, n_surfaces) or (n_surfaces, n_surfaces + 1)
         The paper's table; the last column, if there is one more, counts what is unclassified.
     """
@@ -92,6 +97,8 @@ class Method:
     features: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     label: str = ''
     views: tuple[int, ...] = ()
+    singly: bool = False
+    divisions: int = 0
     confusion: Table | None = None
 
     @property
@@ -102,6 +109,7 @@ class Method:
 
 # Decisions do not depend on the calibration, which takes most of the time: two parts will do.
 OURS = Method('default', learner={'folds': 2})
+FEW = 5  # divisions: enough for a method that stands beside the paper's, where it takes long
 
 
 @dataclass(frozen=True)
@@ -157,15 +165,21 @@ class Anchor:
 
     Parameters
     ----------
+    knob
+        What of the scene was set by it.
     experiment
         Whose figure it is, if not of the same experiment.
+    shortfall
+        Why the figure could not be met; '' if it was.
     """
 
     task: str
     method: str
     test: float
     source: str
+    knob: str = 'noise of the fast channels'
     experiment: str = ''
+    shortfall: str = ''
 
 
 @dataclass(frozen=True)

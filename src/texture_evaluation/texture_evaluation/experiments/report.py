@@ -15,7 +15,7 @@ from texture_evaluation.experiments.outcome import Outcome
 from texture_evaluation.experiments.paper_charts import accuracy_chart, confusions_chart
 from texture_evaluation.experiments.protocol import Finding, Method, Outcomes, Protocol, Table
 from texture_evaluation.experiments.trial import outcomes
-from texture_simulation.scene import Scene, load_scene
+from texture_simulation.scene import load_scene
 
 VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 
@@ -35,13 +35,13 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
         ),
         split=protocol.split,
         numbers={
-            'difficulty': _difficulty(protocol, scene, found),
+            'difficulty': _difficulty(protocol, found),
             'tasks': {task.name: {m.name: _figures(m, found[task.name, m.name]) for m in task.methods}
                       for task in protocol.tasks},
             'findings': [_as_json(finding) for finding in checked],
         },
         charts=_charts(protocol, found, experiment.out),
-        lines=tuple(_lines(protocol, scene, found, checked)),
+        lines=tuple(_lines(protocol, found, checked)),
     )  # fmt: skip
 
 
@@ -49,14 +49,15 @@ def _slides(outcome: Outcome) -> int:
     return len(outcome.codes) // len(outcome.surfaces)
 
 
-def _difficulty(protocol: Protocol, scene: Scene, found: Outcomes) -> dict[str, Any]:
+def _difficulty(protocol: Protocol, found: Outcomes) -> dict[str, Any]:
     anchor = protocol.anchor
     outcome = found.get((anchor.task, anchor.method)) if not anchor.experiment else None
     return {
         'set_by': f'{anchor.experiment or protocol.name}: {anchor.method}, {anchor.task}: {anchor.source}',
         'paper': anchor.test,
         'here': outcome and outcome.test.as_json(),
-        'noise_fast_count': scene.effects['noise'].fast_count,
+        'knob': anchor.knob,
+        'shortfall': anchor.shortfall,
     }
 
 
@@ -64,7 +65,7 @@ def _figures(method: Method, outcome: Outcome) -> dict[str, Any]:
     paper = {name: getattr(method.paper, name) for name in ('learning', 'test', 'unclassified')}
     return {
         'paper': {name: value for name, value in paper.items() if value is not None},
-        'learning': round(outcome.learning, 4),
+        'learning': None if outcome.learning is None else round(outcome.learning, 4),
         'test': outcome.test.as_json(),
         'unclassified': round(outcome.unclassified, 4),
         'note': outcome.note,
@@ -103,7 +104,7 @@ def _charts(protocol: Protocol, found: Outcomes, out: Path) -> tuple[Path, ...]:
     return tuple(charts)
 
 
-def _lines(protocol: Protocol, scene: Scene, found: Outcomes, checked: Sequence[Finding]) -> Iterator[str]:
+def _lines(protocol: Protocol, found: Outcomes, checked: Sequence[Finding]) -> Iterator[str]:
     yield (
         f'{"%":28}{"paper: learning":>16}{"test":>7}{"unclassified":>14}   '
         f'{"simulated: learning":>20}{"test":>22}{"unclassified":>14}'
@@ -113,10 +114,10 @@ def _lines(protocol: Protocol, scene: Scene, found: Outcomes, checked: Sequence[
         for method in task.methods:
             yield _row(method, found[task.name, method.name])
     anchor = protocol.anchor
+    where = f'{anchor.task} of {anchor.experiment}' if anchor.experiment else anchor.task
     yield (
-        f'difficulty: noise of {scene.effects["noise"].fast_count:g} counts, set once so that {anchor.method} '
-        f'({anchor.task}{f" of {anchor.experiment}" if anchor.experiment else ""}) recognises '
-        f'{100 * anchor.test:.1f} % ({anchor.source})'
+        f'difficulty: {anchor.knob}, set once so that {anchor.method} ({where}) recognises {100 * anchor.test:.1f} % '
+        f'({anchor.source}){f"; {anchor.shortfall}" if anchor.shortfall else ""}'
     )
     yield 'findings of the paper:'
     for finding in checked:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from texture_estimation.genetic.fitness import decided_by_slide
+from texture_estimation.learners.learner import Codes
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.experiments.gather import Slides, gather
 from texture_evaluation.experiments.outcome import Outcome
@@ -37,7 +38,7 @@ def of_task(protocol: Protocol, task: Task, scene: Scene, seed: int, *, quick: b
     slides = gather(scene, task, seed, slow=slow)
     learnt = protocol.divide(slides.codes, slides.conditions, np.random.default_rng(seed), quick)
     for method, recipe in recipes:
-        yield method.name, judge(recipe, slides, learnt, method.views)
+        yield method.name, judge(recipe, slides, learnt[: method.divisions or None], method.views, singly=method.singly)
 
 
 def recipe_of(method: Method) -> Recipe:
@@ -60,7 +61,7 @@ def _changed(item: InputFeatures, parameters: Mapping[str, Mapping[str, Any]]) -
     return replace(item, features=tuple(changed))
 
 
-def judge(recipe: Recipe, slides: Slides, learnt: Mask, views: Sequence[int] = ()) -> Outcome:
+def judge(recipe: Recipe, slides: Slides, learnt: Mask, views: Sequence[int] = (), *, singly: bool = False) -> Outcome:
     """Learn from the slides of each division and judge all.
 
     Parameters
@@ -71,20 +72,30 @@ def judge(recipe: Recipe, slides: Slides, learnt: Mask, views: Sequence[int] = (
         What was felt.
     learnt : (n_divisions, n_slides)
         Which are learnt from.
+    views
+        Which views of the slides are used; () for all.
+    singly
+        See `Method`.
     """
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
     taught, owner = slides.describe(to_learn, views)
     asked, slide = slides.describe(recipe.feature_set, views)
     windows = recipe.feature_set.windows
     decided = np.empty(learnt.shape, dtype=np.intp)
+    rows_of = _halves_of_windows(owner, len(learnt)) if singly else learnt[:, owner]
     began = time.perf_counter()
-    for number, mask in enumerate(learnt):
-        rows = mask[owner]
+    for number, rows in enumerate(rows_of):
         fitted = recipe.learner.fit(taught[rows], slides.codes[owner[rows]], owner[rows])
         scores = recipe.learner.array_form(fitted.parts)(asked)
         decided[number], _ = decided_by_slide(scores, slide, recipe.evidence, windows.hop_s / windows.length_s)
     taken_s = (time.perf_counter() - began) / len(learnt)
-    return Outcome(slides.surfaces, slides.codes, slides.conditions, decided, learnt, taken_s, fitted.note)
+    known = np.zeros_like(learnt) if singly else learnt
+    return Outcome(slides.surfaces, slides.codes, slides.conditions, decided, known, taken_s, fitted.note)
+
+
+def _halves_of_windows(owner: Codes, count: int) -> Mask:
+    rng = np.random.default_rng(count)
+    return np.stack([rng.permutation(len(owner)) < len(owner) // 2 for _ in range(count)])
 
 
 def reduced(task: Task, count: int) -> Task:
