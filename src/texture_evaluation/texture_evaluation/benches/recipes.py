@@ -129,8 +129,8 @@ def result_of(numbers: Mapping[str, Any], bench: Bench) -> BenchResult:
     return BenchResult(
         name='recipes',
         measured=(
-            'share of single windows recognised; share of slides after so much sliding; share unclassified; mean time '
-            'of a training (s); time from window to estimate (µs). Windows of '
+            'share of single windows recognised; share of slides after so much sliding; share unclassified; mean '
+            'computing time of a training (s); time from window to estimate (µs). Windows of '
             f'{LENGTH_S} s that do not overlap, learnt from as tested; recipes that vote over shorter parts keep '
             f'those, and learn from parts {LENGTH_S} s apart. Recipes as shipped, but on biotac20 without speed, force '
             'and stretching: there they belong to the session and not to the surface'
