@@ -1,0 +1,100 @@
+"""Leave one condition out: learn from the others, choose what is to be chosen among the others alone, then test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import AnyArray, Array
+from texture_estimation.learners.learner import Learner
+
+Mask = NDArray[np.bool_]
+# (which slides train, which are tested) -> whether each test example is recognised
+Trial = Callable[[Mask, Mask], Mask]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What came out, by the condition left out.
+
+    Parameters
+    ----------
+    right
+        Whether each test example was recognised.
+    chosen
+        Which candidate was chosen, where there was a choice.
+    """
+
+    right: Mapping[str, Mask]
+    chosen: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def accuracy(self) -> float:
+        """Mean over the conditions left out of the share recognised: each counts alike."""
+        return float(np.mean([part.mean() for part in self.right.values()]))
+
+    @property
+    def pooled(self) -> float:
+        """Share of all test examples that were recognised."""
+        return float(np.concatenate(list(self.right.values())).mean())
+
+    def numbers(self) -> dict[str, Any]:
+        """Return accuracies as shares."""
+        each = {name: round(float(part.mean()), 4) for name, part in self.right.items()}
+        content = {'accuracy': round(self.accuracy, 4), 'pooled': round(self.pooled, 4), 'left_out': each}
+        examples = {'tested': int(sum(len(part) for part in self.right.values()))}
+        return {**content, **examples, **({'chosen': dict(self.chosen)} if self.chosen else {})}
+
+
+def one_out(conditions: AnyArray, within: Mask | None = None) -> dict[str, tuple[Mask, Mask]]:
+    """Return train and test slides of each condition left out in turn, by its name, among the slides `within`."""
+    among = np.ones(len(conditions), dtype=bool) if within is None else within
+    return {
+        f'{value:g}': (among & (conditions != value), among & (conditions == value))
+        for value in np.unique(conditions[among])
+    }
+
+
+def run(trial: Trial, parts: Mapping[str, tuple[Mask, Mask]]) -> Outcome:
+    """Test each part."""
+    return Outcome({name: trial(train, test) for name, (train, test) in parts.items()})
+
+
+def run_chosen(
+    candidates: Mapping[str, Trial], parts: Mapping[str, tuple[Mask, Mask]], conditions: Sequence[AnyArray]
+) -> Outcome:
+    """Test each part by the candidate that does best within its training slides, each condition there left out in turn.
+
+    Of candidates that do alike, the first is taken.
+    """
+    right, chosen = {}, {}
+    for name, (train, test) in parts.items():
+        inner = [part for values in conditions for part in one_out(values, train).values() if part[0].any()]
+        scores = {key: np.mean([trial(*part).mean() for part in inner]) for key, trial in candidates.items()}
+        best = max(scores, key=lambda key: scores[key])
+        right[name], chosen[name] = candidates[best](train, test), best
+    return Outcome(right, chosen)
+
+
+def recognised(learner: Learner, taught: tuple[Array, AnyArray, AnyArray], tested: tuple[Array, AnyArray]) -> Mask:
+    """Return whether each test example is recognised.
+
+    Parameters
+    ----------
+    learner
+        What learns.
+    taught
+        Values (n, n_features), surfaces (n,) and slides (n,).
+    tested
+        Values (m, n_features) and surfaces (m,).
+    """
+    values, surfaces, slides = taught
+    labels, codes = np.unique(surfaces, return_inverse=True)
+    _, groups = np.unique(slides, return_inverse=True)
+    parts = learner.fit(values, codes, groups).parts
+    answers = labels[learner.array_form(parts)(tested[0]).argmax(axis=-1)]
+    return np.asarray(answers == tested[1])
