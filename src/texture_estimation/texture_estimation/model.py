@@ -113,9 +113,14 @@ class Model:
         """
         if self.examples is None:
             raise ModelMismatch(f"model '{self.name}' holds no examples to learn beside; train it again")
-        network = self.parts if self.recipe.learner_name == 'mlp' else None
         known = self.examples
-        head = TaughtHead(known.values.astype(np.float64), known.codes, known.slides, network)
+        head = TaughtHead(
+            known.values.astype(np.float64),
+            known.codes,
+            known.slides,
+            parts=self.parts if self.recipe.learner_name == 'mlp' else None,
+            trained=self.recipe.learner.array_form(self.parts),
+        )
         for label in dict.fromkeys(lesson.label for lesson in self.lessons):
             head.set_examples(self.labels.index(label), self.examples_of(label))
         return head

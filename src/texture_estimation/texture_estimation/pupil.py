@@ -96,5 +96,6 @@ class Pupil:
         """Let the model know these lessons, of which only those of one label differ from before."""
         taught = self.model.with_lessons(lessons)
         labels = taught.labels if label in taught.labels else self.model.labels
-        self._head.set_examples(labels.index(label), taught.examples_of(label))
+        as_trained = label in taught.trained_labels and all(lesson.label != label for lesson in lessons)
+        self._head.set_examples(labels.index(label), taught.examples_of(label), as_trained=as_trained)
         self.model = dataclasses.replace(taught, taught=self._head.judge if lessons else None)

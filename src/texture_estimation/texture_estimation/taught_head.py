@@ -6,6 +6,9 @@ ridge regression to 1 for the own texture and 0 for the others, every texture co
 has. It depends on the examples of a texture through their mean and their second moments alone: teaching one changes
 these, and a linear system is solved anew. So nothing is forgotten, and the order of the lessons does not matter.
 
+Among the textures of the training that were taught nothing since, the trained learner and the layer have half the say
+each.
+
 Source: Rahimi & Recht 2007 for the random features.
 """
 
@@ -21,11 +24,11 @@ from scipy.linalg import solve
 from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
-from texture_estimation.learners.learner import Codes
+from texture_estimation.learners.learner import Codes, LogProbabilities
 from texture_estimation.learners.standardisation import standardisation
 from texture_estimation.log_probabilities import log_loss, log_softmax
 
-# Chosen on slides 1 to 30 of recorded materials: as many cosines again change no accuracy by more than a point.
+# Chosen on slides 1 to 30 of recorded materials: more cosines hardly help with many slides, and harm with one.
 COSINES = 384
 WIDTH = 1.0  # of the kernel, in the root mean square distance of a standardised feature vector from the mean
 HIDDEN_WEIGHT = 0.3
@@ -81,14 +84,33 @@ class Lift:
 
 @dataclass(frozen=True, eq=False)
 class TaughtJudge:
-    """The linear layer over the fixed features, (n_lifted, n_labels)."""
+    """The linear layer over the fixed features, and what judges the labels of the training.
+
+    Parameters
+    ----------
+    lift
+        The fixed features.
+    weights : (n_lifted, n_labels)
+    trained
+        What was trained, which knows the first labels.
+    kept : (n_kept,)
+        Numbers of the labels among which it has a say.
+    """
 
     lift: Lift
     weights: Array
+    trained: LogProbabilities
+    kept: Codes
 
     def __call__(self, values: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
         scores: Array = self.lift(values) @ self.weights
+        if len(self.kept) > 1:
+            own = scores[..., self.kept]
+            both = log_softmax(0.5 * (log_softmax(own) + log_softmax(self.trained(values)[..., self.kept])))
+            highest = np.maximum.reduce(own, axis=-1, keepdims=True)
+            any_of_them = highest + np.log(np.add.reduce(np.exp(own - highest), axis=-1, keepdims=True))
+            scores[..., self.kept] = any_of_them + both
         return scores
 
 
@@ -100,11 +122,23 @@ class TaughtHead:
     values : (n, n_features)
     codes, slides : (n,)
         Number of the label, 0…, and of the slide of each example.
+    trained
+        What judges their labels since the training.
     parts
         Of the network that was trained on them, or None.
     """
 
-    def __init__(self, values: Array, codes: Codes, slides: Codes, parts: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self,
+        values: Array,
+        codes: Codes,
+        slides: Codes,
+        *,
+        trained: LogProbabilities,
+        parts: Mapping[str, Any] | None = None,
+    ) -> None:
+        self._trained = trained
+        self._kept = set(range(int(codes.max()) + 1))
         self._lift = Lift.over(values, parts)
         self._rows: list[Array] = [values[codes == code] for code in range(int(codes.max()) + 1)]
         lifted = self._lift(values)
@@ -121,17 +155,19 @@ class TaughtHead:
     @property
     def judge(self) -> TaughtJudge:
         """What judges by all that is known now."""
-        return TaughtJudge(self._lift, self._sharpness * _solve(self._squares, self._means))
+        weights = self._sharpness * _solve(self._squares, self._means)
+        return TaughtJudge(self._lift, weights, self._trained, np.array(sorted(self._kept), dtype=np.intp))
 
     def examples_of(self, code: int) -> Array:
         """Return the examples of a label, (n, n_features)."""
         return self._rows[code]
 
-    def set_examples(self, code: int, rows: Array) -> None:
+    def set_examples(self, code: int, rows: Array, *, as_trained: bool = False) -> None:
         """Let `rows`, (n, n_features), be the examples of a label; of the next new one if `code` is their number.
 
-        None at all make the last label unknown.
+        None at all make the last label unknown. `as_trained`: they are those of the training, nothing was taught.
         """
+        (self._kept.add if as_trained else self._kept.discard)(code)
         if code == len(self._rows):
             self._rows.append(rows[:0])
             self._means.append(np.zeros(len(self._squares)))
