@@ -12,6 +12,7 @@ from texture_evaluation.benches import (
     features,
     frontier,
     latency,
+    learning,
     load,
     motion,
     optimise,
@@ -31,6 +32,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
     'roughness': roughness.run,  # from window to grade
     'optimise': optimise.run,  # genetic searches of the papers' size: time, convergence, front
+    'learning': learning.run,  # taught slide by slide against trained anew on the same slides
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates
