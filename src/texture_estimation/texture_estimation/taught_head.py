@@ -171,12 +171,12 @@ class TaughtHead:
         if code == len(self._rows):
             self._rows.append(rows[:0])
             self._means.append(np.zeros(len(self._squares)))
-        else:
-            self._squares -= _Moments.of(self._lift(self._rows[code])).square
-        self._rows[code] = thinned(rows)
-        moments = _Moments.of(self._lift(self._rows[code]))
-        self._squares += moments.square
-        self._means[code] = moments.mean
+        before, after = self._rows[code], thinned(rows)
+        old = _Moments.of(self._lift(before))
+        more = len(after) > len(before) and np.array_equal(after[: len(before)], before)
+        new = old.with_(_Moments.of(self._lift(after[len(before) :]))) if more else _Moments.of(self._lift(after))
+        self._squares += new.square - old.square
+        self._rows[code], self._means[code] = after, new.mean
         if not len(rows):
             del self._rows[code], self._means[code]
 
