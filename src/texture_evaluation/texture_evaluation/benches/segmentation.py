@@ -23,7 +23,7 @@ SCENES = ('ets_linear', 'ets_circular', 'ets_fine', 'jamali', 'kaboli', 'hu', 'r
 SPEEDS_M_S = (0.05, 0.1, 0.15, 0.2)
 REPEATS, SLIDE_S = 3, 1.0
 TARGET_S = 0.02
-STRONG = 10.0
+STRONG, FAST_M_S = 10.0, 0.1
 MATERIALS = ('material01', 'material02', 'material03', 'material09', 'material14', 'material20')
 SHOWN_SLIDE = '5'
 # At 20 mm/s most of the vibration lies below 20 Hz, and it comes in longer bursts.
@@ -53,6 +53,9 @@ def run(bench: Bench) -> BenchResult:
             'target_ms': 1000 * TARGET_S,
             'all': _numbers(everything),
             'strong': _numbers([trial for trial in everything if trial.strength >= STRONG]),
+            f'strong, from {FAST_M_S:g} m/s on': _numbers(
+                [trial for trial in everything if trial.strength >= STRONG and trial.speed_m_s >= FAST_M_S]
+            ),
             'scenes': {
                 name: {f'{speed:g} m/s': _numbers([t for t in listed if t.speed_m_s == speed]) for speed in speeds}
                 for name, listed in trials.items()
