@@ -61,7 +61,7 @@ PROTOCOL = Protocol(
     ),
     divide=drawn(2 / 3, 20),
     split='20 random draws of 200 of the 300 places to learn from',
-    anchor=Anchor(TASK, BOTH, 0.92, 'table 1'),
+    anchor=Anchor(TASK, BOTH, 0.92, 'table 1', knob='how near linen 4 is to linen 3'),
     findings=findings,
     quick_count=10,
 )

@@ -107,7 +107,7 @@ PROTOCOL = Protocol(
         SVM,
         0.96,
         'section V.A',
-        shortfall='not reached: this is the little noise of a resting BioTac, and less does not help',
+        shortfall='reached within the interval: this is the noise of a resting BioTac, and less does not help',
     ),
     findings=findings,
     quick_count=4,

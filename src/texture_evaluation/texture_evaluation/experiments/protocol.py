@@ -77,6 +77,8 @@ class Method:
         Parameters of the learner that this experiment changes.
     features
         Parameters of features, by the feature's name, that it changes.
+    stretch_to_m_s, also
+        Speed to which the vibration is stretched, and features of it beside those of the recipe.
     label
         Name in the table; '' for that of the recipe.
     views
@@ -95,6 +97,8 @@ class Method:
     windows: WindowParams | None = None
     learner: Mapping[str, Any] = field(default_factory=dict)
     features: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    stretch_to_m_s: float = 0.0
+    also: tuple[str, ...] = ()
     label: str = ''
     views: tuple[int, ...] = ()
     singly: bool = False

@@ -106,7 +106,7 @@ def _charts(protocol: Protocol, found: Outcomes, out: Path) -> tuple[Path, ...]:
 
 def _lines(protocol: Protocol, found: Outcomes, checked: Sequence[Finding]) -> Iterator[str]:
     yield (
-        f'{"%":28}{"paper: learning":>16}{"test":>7}{"unclassified":>14}   '
+        f'{"%":38}{"paper: learning":>16}{"test":>7}{"unclassified":>14}   '
         f'{"simulated: learning":>20}{"test":>22}{"unclassified":>14}'
     )
     for task in protocol.tasks:
@@ -134,7 +134,7 @@ def _lines(protocol: Protocol, found: Outcomes, checked: Sequence[Finding]) -> I
 def _row(method: Method, outcome: Outcome) -> str:
     paper = method.paper
     return (
-        f'  {method.name:26}{_share(paper.learning):>16}{_share(paper.test):>7}{_share(paper.unclassified):>14}   '
+        f'  {method.name:36}{_share(paper.learning):>16}{_share(paper.test):>7}{_share(paper.unclassified):>14}   '
         f'{_share(outcome.learning):>20}{_plain(outcome):>22}{_share(outcome.unclassified):>14}'
     )
 

@@ -18,7 +18,7 @@ from texture_evaluation.experiments.protocol import Mask, Method, Outcomes, Prot
 from texture_features.feature_set import InputFeatures
 from texture_simulation.scene import Scene
 
-SLOW = 'signal_static'
+FAST, SLOW = 'signal', 'signal_static'
 
 
 def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> Outcomes:
@@ -44,15 +44,25 @@ def of_task(protocol: Protocol, task: Task, scene: Scene, seed: int, *, quick: b
 def recipe_of(method: Method) -> Recipe:
     """Return the recipe as the protocol asks for it."""
     recipe = load_recipe(method.recipe)
-    changes: dict[str, Any] = {}
-    if method.learner:
-        changes['learner'] = replace(recipe.learner, **method.learner)
+    if method.stretch_to_m_s or method.also:
+        recipe = _with_motion(recipe, method)
     windows = method.windows or recipe.feature_set.windows
     inputs = tuple(_changed(item, method.features) for item in recipe.feature_set.inputs)
-    changes['feature_set'] = replace(recipe.feature_set, windows=windows, inputs=inputs, _layouts={})
-    if method.windows:
-        changes['training'] = replace(recipe.training, hop_s=method.windows.hop_s)
-    return replace(recipe, **changes)
+    learner: Any = recipe.learner
+    return replace(
+        recipe,
+        feature_set=replace(recipe.feature_set, windows=windows, inputs=inputs, _layouts={}),
+        learner=replace(learner, **method.learner),
+        training=replace(recipe.training, hop_s=method.windows.hop_s) if method.windows else recipe.training,
+    )
+
+
+def _with_motion(recipe: Recipe, method: Method) -> Recipe:
+    content = recipe.as_mapping()
+    vibration = content['inputs'][FAST]
+    features = [*vibration['features'], *method.also]
+    content['inputs'][FAST] = {'stretch_to_m_s': method.stretch_to_m_s, 'features': features}
+    return Recipe.from_mapping(content, recipe.name)
 
 
 def _changed(item: InputFeatures, parameters: Mapping[str, Mapping[str, Any]]) -> InputFeatures:
