@@ -51,3 +51,13 @@ def test_one_window_gets_the_same_numbers_as_in_a_batch(model, examples):
 
 def test_a_window_far_from_all_examples_has_finite_log_probabilities(model):
     assert np.isfinite(model.predict_log_proba(np.full(6, 1e6))).all()
+
+
+def test_with_a_common_scale_what_hardly_varies_stays_small():
+    values = np.random.default_rng(0).normal(size=(40, 2)) * (1.0, 1e-3)
+    codes = np.arange(40) % 2
+    scaler, _ = SvmRbf(common_scale=True)._fit_svc(values, codes)
+    deviations = scaler.transform(values).std(axis=0)
+    assert deviations[1] / deviations[0] == pytest.approx(values[:, 1].std() / values[:, 0].std())
+    assert np.mean(deviations**2) == pytest.approx(1.0)
+    assert SvmRbf(common_scale=True)._fit_svc(np.ones((4, 2)), np.arange(4) % 2)[0].scale_[0] == 1.0

@@ -41,6 +41,19 @@ def test_what_is_chosen_never_sees_the_slides_that_are_tested() -> None:
     assert outcome.accuracy == 0.0
 
 
+def test_a_rehearsal_judges_in_the_training_and_the_candidate_is_tested() -> None:
+    def wrong(train: Mask, test: Mask) -> Mask:
+        return np.zeros(test.sum(), dtype=bool)
+
+    def right(train: Mask, test: Mask) -> Mask:
+        return np.ones(test.sum(), dtype=bool)
+
+    rehearsals = {'first': wrong, 'second': right}
+    outcome = run_chosen({'first': right, 'second': wrong}, one_out(SPEEDS), [SPEEDS], rehearsals)
+    assert set(outcome.chosen.values()) == {'second'}
+    assert outcome.pooled == 0.0
+
+
 def test_what_lies_apart_is_recognised() -> None:
     rng = np.random.default_rng(0)
     surfaces = np.tile(['rough', 'smooth', 'wavy'], 8)
@@ -80,3 +93,4 @@ def test_what_a_turn_does_to_the_load_is_taken_out_and_the_rest_stays() -> None:
     steady = starts + rng.uniform(0.5, 1.0, (30, 1)) * turn
     free = TurnFree.learnt(starts, steady)
     np.testing.assert_allclose(free(steady), starts, atol=1e-12)
+    np.testing.assert_array_equal(TurnFree.learnt(starts, steady, energy=0.0)(steady), steady)

@@ -65,16 +65,31 @@ def run(trial: Trial, parts: Mapping[str, tuple[Mask, Mask]]) -> Outcome:
 
 
 def run_chosen(
-    candidates: Mapping[str, Trial], parts: Mapping[str, tuple[Mask, Mask]], conditions: Sequence[AnyArray]
+    candidates: Mapping[str, Trial],
+    parts: Mapping[str, tuple[Mask, Mask]],
+    conditions: Sequence[AnyArray],
+    rehearsals: Mapping[str, Trial] | None = None,
 ) -> Outcome:
     """Test each part by the candidate that does best within its training slides, each condition there left out in turn.
 
     Of candidates that do alike, the first is taken.
+
+    Parameters
+    ----------
+    candidates
+        Trials by name.
+    parts
+        Train and test slides by what is left out.
+    conditions
+        What is left out in turn within the training.
+    rehearsals
+        Trials of the same names that judge the candidates there, if something else is to be tested than at the end.
     """
+    judges = candidates if rehearsals is None else rehearsals
     right, chosen = {}, {}
     for name, (train, test) in parts.items():
         inner = [part for values in conditions for part in one_out(values, train).values() if part[0].any()]
-        scores = {key: np.mean([trial(*part).mean() for part in inner]) for key, trial in candidates.items()}
+        scores = {key: np.mean([trial(*part).mean() for part in inner]) for key, trial in judges.items()}
         best = max(scores, key=lambda key: scores[key])
         right[name], chosen[name] = candidates[best](train, test), best
     return Outcome(right, chosen)

@@ -38,11 +38,12 @@ class TurnFree:
         starts, steady : (n, n_taxels)
             The load, as `level_share` gives it, when the finger is about to slide and while it slides.
         energy
-            As many directions are taken out as hold this share of the squared differences.
+            As many directions are taken out as hold this share of the squared differences; none for 0.
         """
         _, strength, directions = np.linalg.svd(steady - starts, full_matrices=False)
         held = np.cumsum(strength**2) / np.sum(strength**2)
-        main = directions[: int(np.searchsorted(held, energy)) + 1]
+        count = int(np.searchsorted(held, energy)) + 1 if energy > 0.0 else 0
+        main = directions[:count]
         return cls(np.eye(steady.shape[1]) - main.T @ main)
 
     def __call__(self, loads: Array) -> Array:

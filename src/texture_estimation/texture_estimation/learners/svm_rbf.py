@@ -29,6 +29,9 @@ class SvmRbf:
     gamma: float = param(
         0.0, 'Width of the kernel exp(-gamma d²); 0 means 1 / (n_features · variance).', low=0.0, high=1e9
     )
+    common_scale: bool = param(
+        False, 'One scale for all features, for values of one kind such as taxel levels; else each has its own.'
+    )
     folds: int = param(5, 'Parts into which the slides are divided to calibrate.', low=2, high=50)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
@@ -72,6 +75,8 @@ class SvmRbf:
         from sklearn.svm import SVC  # noqa: PLC0415
 
         scaler = StandardScaler().fit(values)
+        if self.common_scale:
+            scaler.scale_ = np.full(values.shape[1], float(np.sqrt(scaler.var_.mean())) or 1.0)
         gamma = self.gamma or 1.0 / (values.shape[1] * max(float(scaler.transform(values).var()), 1e-12))
         svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(scaler.transform(values), codes)
         return scaler, svc

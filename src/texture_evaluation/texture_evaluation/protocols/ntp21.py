@@ -1,0 +1,205 @@
+"""Textures under a taxel array at speeds and forces that were not taught.
+
+Each texture lies in one place and every slide begins there: a whole slide shows the same stretch each time. What is
+recognised there is this stretch of the texture; single windows start anywhere on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import AnyArray, Array
+from texture_estimation.learners.learner import Learner
+from texture_estimation.learners.svm_rbf import SvmRbf
+from texture_estimation.recipe import load_recipe
+from texture_evaluation.held_out import Mask, Outcome, Trial, one_out, recognised, run, run_chosen
+from texture_evaluation.protocols.conditions import Conditions, described
+from texture_features.array_speed import ArraySpeed
+from texture_features.feature import Feature, Windows
+from texture_features.features.level_share import LevelShare
+from texture_features.features.mean_spatial_bands import MeanSpatialBands
+from texture_features.features.spatial_bands import SpatialBands
+
+SLOW_MM_S = 60.0  # "slow" is taught, faster is tested
+CANDIDATES = [(bands, floor) for bands in (16, 32, 64) for floor in (1e-7, 1e-9)]
+SPEEDS_M_S: Array = np.geomspace(0.005, 0.5, 300, dtype=np.float64)  # among which the array looks for its own
+SPANNED, MISTAKES = 0.95, 9  # how much of the error of the array's speed is taught, in how many steps
+RECIPE = 'any-speed'
+# A window of 0.6 s does not quite fit into a slide of 0.6 s: it starts with its first sample and ends with its last.
+WINDOW_S, HOP_S = 0.59, 0.1
+TAUGHT_HOP_M = 3e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Ntp21:
+    """The protocols on one set of slides.
+
+    Parameters
+    ----------
+    conditions
+        The slides.
+    learner
+        What learns.
+    """
+
+    conditions: Conditions
+    learner: Learner = field(default_factory=SvmRbf)
+
+    def splits(self) -> dict[str, dict[str, tuple[Mask, Mask]]]:
+        """Return train and test slides by protocol and by what is left out."""
+        speed, force = self.conditions.speed_mm_s, self.conditions.force_n
+        slow = speed <= SLOW_MM_S
+        return {
+            'one speed out': one_out(speed),
+            'one force out': one_out(force),
+            'slow to fast': {f'over {SLOW_MM_S:g}': (slow, ~slow)},
+        }
+
+    def whole(self) -> dict[str, Outcome]:
+        """Return how whole slides are recognised from the mean over the taxels, with the bands chosen in training."""
+        windows = [slide.windows() for slide in self.conditions.slides]
+        trials = {
+            f'{bands} bands, floor {floor:g}': self._trial([MeanSpatialBands(bands=bands, floor=floor)], windows)
+            for bands, floor in CANDIDATES
+        }
+        inner = {'one force out': [self.conditions.force_n]}
+        return {
+            name: run_chosen(trials, parts, inner.get(name, [self.conditions.speed_mm_s]))
+            for name, parts in self.splits().items()
+        }
+
+    def whole_with(self, features: Sequence[Feature]) -> dict[str, Outcome]:
+        """Return how whole slides are recognised by features as they are."""
+        trial = self._trial(features, [slide.windows() for slide in self.conditions.slides])
+        return {name: run(trial, parts) for name, parts in self.splits().items()}
+
+    def whole_with_pattern(self) -> dict[str, Outcome]:
+        """Return the same if each taxel counts by itself: the pattern knows how a texture was mounted."""
+        return self.whole_with([SpatialBands(), LevelShare()])
+
+    def whole_over_time(self) -> dict[str, Outcome]:
+        """Return the same by bands of frequency instead of waves per metre: all slides as if at one speed."""
+        slides = self.conditions.slides
+        middle_m_s = float(np.sqrt(SPEEDS_M_S[0] * SPEEDS_M_S[-1]))
+        trial = self._trial([MeanSpatialBands()], [slide.windows(speed_m_s=middle_m_s) for slide in slides])
+        return {name: run(trial, parts) for name, parts in self.splits().items()}
+
+    def whole_without_speed(self) -> tuple[dict[str, Outcome], dict[str, Any]]:
+        """Return the same if the speed of the tested slides is estimated by the array, and how well that is done.
+
+        Speeds are known in the training. Each slide there is taught at its speed and as if the array had mistaken it,
+        by up to the error that 95 % of the training slides stay below.
+        """
+        errors: list[Array] = []
+
+        def trial(train: Mask, test: Mask) -> Mask:
+            known = np.array([slide.speed_m_s for slide in self.conditions.slides])
+            estimated = self._estimated(train)
+            wrong = np.abs(np.log(estimated / known))
+            errors.append(np.expm1(wrong[test]))
+            most = float(np.quantile(wrong[train], SPANNED))
+            taught = [self._described_at(known * factor) for factor in np.exp(np.linspace(-most, most, MISTAKES))]
+            names, surfaces = (np.tile(of[train], MISTAKES) for of in (self.conditions.names, self.conditions.surfaces))
+            return recognised(
+                self.learner,
+                (np.concatenate([values[train] for values in taught]), surfaces, names),
+                (self._described_at(estimated)[test], self.conditions.surfaces[test]),
+            )
+
+        outcomes = {name: run(trial, parts) for name, parts in self.splits().items()}
+        share = np.concatenate(errors)
+        return outcomes, {
+            'median_error': round(float(np.median(share)), 4),
+            'share_within_10_percent': round(float((share < 0.1).mean()), 4),
+        }
+
+    def windows(self, features: Sequence[Feature], taught: str = 'same distance') -> Outcome:
+        """Return how single windows are recognised, one speed left out.
+
+        Parameters
+        ----------
+        features
+            What describes them.
+        taught
+            'same distance': a model for the tested speed, taught windows of the distance that is slid at it in 0.59 s;
+            'all distances': one model, taught windows of the distances of all speeds; 'same time': windows of 0.59 s.
+        """
+        speed = self.conditions.speed_mm_s
+        return Outcome(
+            {
+                name: self._window_trial(features, train, test, TAUGHT[taught](np.unique(speed), float(name)))
+                for name, (train, test) in one_out(speed).items()
+            }
+        )
+
+    def recipe_features(self) -> list[Feature]:
+        """Return the features of the recipe any-speed."""
+        return [feature for item in load_recipe(RECIPE).feature_set.inputs for _, feature in item.features]
+
+    def _trial(self, features: Sequence[Feature], windows: Sequence[Windows]) -> Trial:
+        return self.conditions.trial(described(features, windows), self.learner)
+
+    def _described_at(self, speeds_m_s: Array) -> Array:
+        """Return mean spatial bands of all slides as if at these speeds, (n, n_bands)."""
+        pairs = zip(self.conditions.slides, speeds_m_s, strict=True)
+        return described([MeanSpatialBands()], [slide.windows(speed_m_s=float(speed)) for slide, speed in pairs])
+
+    def _estimated(self, train: Mask) -> Array:
+        """Return the speed of each slide as the array feels it, the places of its taxels learnt in training, (n,)."""
+        slides = self.conditions.slides
+        array = ArraySpeed.learnt(
+            [(slide.samples, slide.rate_hz, slide.speed_m_s) for slide, use in zip(slides, train, strict=True) if use]
+        )
+        return np.array([array(slide.samples, slide.rate_hz, SPEEDS_M_S) for slide in slides])
+
+    def _window_trial(self, features: Sequence[Feature], train: Mask, test: Mask, distances_m: Sequence[float]) -> Mask:
+        """Teach windows of these distances (of 0.59 s if there is none), test windows of 0.59 s."""
+        taught = [self._cut(train, _steps(distance, TAUGHT_HOP_M)) for distance in distances_m]
+        taught = taught or [self._cut(train, _even)]
+        windows = [window for part, _ in taught for window in part]
+        owners = np.concatenate([owner for _, owner in taught])
+        tested, tested_owners = self._cut(test, _even)
+        surfaces, names = self.conditions.surfaces, self.conditions.names
+        return recognised(
+            self.learner,
+            (described(features, windows), surfaces[owners], names[owners]),
+            (described(features, tested), surfaces[tested_owners]),
+        )
+
+    def _cut(self, use: Mask, steps: Any) -> tuple[list[Windows], AnyArray]:
+        """Return windows of the slides in use, and the number of the slide of each."""
+        windows, owners = [], []
+        for number in np.flatnonzero(use):
+            slide = self.conditions.slides[number]
+            length, hop = steps(slide.rate_hz, slide.speed_m_s)
+            length = min(length, len(slide.samples))
+            for start in range(0, len(slide.samples) - length + 1, hop):
+                windows.append(slide.windows(start, length))
+                owners.append(number)
+        return windows, np.array(owners)
+
+
+def _even(rate_hz: float, speed_m_s: float) -> tuple[int, int]:
+    """Return length and hop of a window of 0.59 s, in samples."""
+    return round(WINDOW_S * rate_hz), round(HOP_S * rate_hz)
+
+
+def _steps(distance_m: float, hop_m: float) -> Any:
+    """Return what gives length and hop, in samples, of windows of one distance."""
+
+    def steps(rate_hz: float, speed_m_s: float) -> tuple[int, int]:
+        return max(2, round(distance_m / speed_m_s * rate_hz)), max(1, round(hop_m / speed_m_s * rate_hz))
+
+    return steps
+
+
+# Which distances (m) are taught, given all speeds and the tested one (mm/s).
+TAUGHT: Mapping[str, Callable[[AnyArray, float], list[float]]] = {
+    'same distance': lambda speeds, tested: [tested / 1000.0 * WINDOW_S],
+    'all distances': lambda speeds, tested: [speed / 1000.0 * WINDOW_S for speed in speeds],
+    'same time': lambda speeds, tested: [],
+}
