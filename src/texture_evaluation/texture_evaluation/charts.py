@@ -181,7 +181,7 @@ def front_chart(
         rows = figure.subplots(1, len(panels) + 1, squeeze=False, width_ratios=[4.2] * len(panels) + [2.0])[0]
         for axes, (name, points) in zip(rows, panels.items(), strict=False):
             _front(axes, points, names)
-            axes.set(xlabel=axis_labels[0], title=name, xscale='log')
+            axes.set(xlabel=axis_labels[0], title=name, xscale='log', ylim=(0, 101))
         rows[0].set_ylabel(axis_labels[1])
         listed = '\n'.join(f'{number}  {name}' for number, name in enumerate(names, 1))
         rows[-1].text(0.0, 1.0, listed, va='top', fontsize=8)
