@@ -107,7 +107,7 @@ class TaughtJudge:
         scores: Array = self.lift(values) @ self.weights
         if len(self.kept) > 1:
             own = scores[..., self.kept]
-            both = log_softmax(0.5 * (log_softmax(own) + log_softmax(self.trained(values)[..., self.kept])))
+            both = log_softmax(0.5 * (own + self.trained(values)[..., self.kept]))
             highest = np.maximum.reduce(own, axis=-1, keepdims=True)
             any_of_them = highest + np.log(np.add.reduce(np.exp(own - highest), axis=-1, keepdims=True))
             scores[..., self.kept] = any_of_them + both
