@@ -27,7 +27,9 @@ EXAMPLES = [
     ExplorationState(STAMP, 'e-1', 'linear_slide', Phase.SLIDE, 0.1, 0.05, 1.0, math.pi / 4, 0.5, 'felt'),
     FeatureVector(STAMP, 'e-1', 0.5, 0.1, ('a', 'b'), np.array([0.1, math.nan]), 0.05, 1.0, 'f', False, 3),
     FeatureVector(STAMP, 'e-1', 0.0, 0.1, last=True),
-    TextureEstimate(STAMP, 'e-1', 'felt', True, 0.9, ('felt', 'wool'), (0.9, 0.1), 4, 0.8, True, 1e-4, 'm', 'ok'),
+    TextureEstimate(
+        STAMP, 'e-1', 'felt', True, 0.9, ('felt', 'wool'), (0.9, 0.1), True, ('felt',), 4, 0.8, True, 1e-4, 'm', 'ok'
+    ),
     RoughnessEstimate(STAMP, 'e-1', True, 3.5, 0.4, 4, 0.8, True, 1e-4, 'm', 'ok'),
 ]
 

@@ -20,6 +20,8 @@ class TextureEstimate:
     confidence: float = math.nan
     labels: tuple[str, ...] = ()
     probabilities: tuple[float, ...] = ()
+    certain: bool = False
+    candidates: tuple[str, ...] = ()
     windows: int = 0
     evidence_s: float = 0.0
     final: bool = False

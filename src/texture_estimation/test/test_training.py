@@ -97,3 +97,26 @@ def test_vectors_are_gathered_with_their_surfaces():
     assert examples.values.tolist() == [[0.0], [1.0], [4.0], [5.0]]
     with pytest.raises(InvalidData, match='no window of a labelled surface'):
         LabelledFeatures.from_vectors(vectors, {})
+
+
+def test_the_start_of_a_slide_counts_as_often_as_asked_and_is_judged_once(examples):
+    recipes = [
+        dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, start_weight=weight))
+        for weight in (1, 3)
+    ]
+    once, often = (train(recipe, examples) for recipe in recipes)
+    assert once.training['windows'] == often.training['windows'] == len(examples.labels)
+    assert often.training['held_out_window_accuracy'] is not None
+    assert not np.array_equal(once.predict_log_proba(examples.values), often.predict_log_proba(examples.values))
+
+
+def test_unknown_surfaces_are_told_only_if_asked_for(make_examples):
+    examples = make_examples()
+    trusting, strict = (
+        dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejections=share))
+        for share in (0.0, 0.1)
+    )
+    assert train(trusting, examples).familiarity is None
+    familiarity = train(strict, examples).familiarity
+    assert familiarity is not None
+    assert not familiarity.knows(examples.values.mean(axis=0) + 50.0, 3.0)

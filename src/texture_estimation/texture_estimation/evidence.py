@@ -6,9 +6,11 @@ import math
 
 import numpy as np
 
+from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
+from texture_estimation.familiarity import WORTHS
 from texture_estimation.fingerprint import difference
 from texture_estimation.model import Model
 
@@ -19,8 +21,9 @@ NO_WINDOW = 'no window could be used: the slide was too short, or its samples we
 class Evidence:
     """Join the judgements of the windows of one slide; the same code on the robot and on recordings.
 
-    A new exploration id, or a vector after the `last` one, begins anew. `known` is set whenever there is a label:
-    unknown surfaces are not rejected yet. Where several labels are equally probable there is none: unclassified.
+    A new exploration id, or a vector after the `last` one, begins anew. Whether the surface is a known one is looked at
+    once the label is certain, and at the end; until then a label counts as known. Where several labels are equally
+    probable there is none: unclassified.
 
     Parameters
     ----------
@@ -56,6 +59,9 @@ class Evidence:
         self._message = '' if self.model else NO_MODEL
         self._sum = np.zeros(len(self.model.labels) if self.model else 0)
         self._zeros = np.zeros(len(self.model.names) if self.model else 0)
+        self._values = self._zeros.copy()
+        self._familiar_windows = 0
+        self._known: bool | None = None  # not looked at yet
 
     def _judge(self, vector: FeatureVector, model: Model) -> None:
         if vector.feature_set != model.feature_set:
@@ -73,6 +79,9 @@ class Evidence:
         end = vector.start_ns + self._window_ns
         self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
         self._end_ns = max(end, self._end_ns)
+        if self._evidence_ns <= WORTHS[-1] * self._window_ns:
+            self._values += vector.values
+            self._familiar_windows += 1
 
     def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
         model = self.model
@@ -91,17 +100,27 @@ class Evidence:
         best = int(posterior.argmax())
         decided = np.count_nonzero(posterior == posterior[best]) == 1
         probabilities = np.exp(posterior)
+        confidence = float(probabilities[best])
+        certain = decided and model.stopping.certain(confidence, worth)
+        if (certain and not self._known) or final:
+            self._known = model.familiar is None or model.familiar.knows(self._values / self._familiar_windows, worth)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
             label=model.labels[best] if decided else '',
-            known=decided,
-            confidence=float(probabilities[best]),
+            known=decided and self._known is not False,
+            confidence=confidence,
             labels=model.labels,
             probabilities=tuple(probabilities.tolist()),
+            certain=certain,
+            candidates=self._candidates(model, probabilities, worth) if certain or final else (),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
             model=model.name,
             message=self._message,
         )
+
+    @staticmethod
+    def _candidates(model: Model, probabilities: Array, worth: float) -> tuple[str, ...]:
+        return tuple(model.labels[number] for number in model.sets.members(probabilities, worth))

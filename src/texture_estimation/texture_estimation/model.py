@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,16 @@ from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch, TextureError
 from texture_estimation import model_files
 from texture_estimation.examples import Examples
+from texture_estimation.familiarity import Familiarity
 from texture_estimation.learners.learner import LogProbabilities
 from texture_estimation.lessons import Lesson, read_lessons
 from texture_estimation.log_probabilities import log_softmax, undecided
+from texture_estimation.prediction_sets import PredictionSets
 from texture_estimation.recipe import Recipe
+from texture_estimation.stopping import Stopping
 from texture_estimation.taught_head import TaughtHead
 
-EXAMPLES = 'examples'  # name of their part in the file
+EXAMPLES, FAMILIARITY = 'examples', 'familiarity'  # names of their parts in the file
 # What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
 TRUSTED = ('sklearn.preprocessing._data.StandardScaler', 'sklearn.svm._classes.SVC')
 
@@ -49,6 +52,12 @@ class Model:
         Exponent with which the evidence of a slide grows, 0 to 1.
     training
         Facts about the training, for the card.
+    stopping
+        When a slide may end.
+    sets
+        Which textures are candidates.
+    familiarity
+        Tells unknown surfaces; None takes all for known.
     examples
         Windows it was trained on, to learn more beside them; None if it holds none.
     lessons
@@ -65,6 +74,9 @@ class Model:
     parts: Mapping[str, Any]
     growth: float
     training: Mapping[str, Any] = field(default_factory=dict)
+    stopping: Stopping = field(default_factory=Stopping)
+    sets: PredictionSets = field(default_factory=PredictionSets)
+    familiarity: Familiarity | None = None
     examples: Examples | None = None
     lessons: tuple[Lesson, ...] = ()
     taught: LogProbabilities | None = None
@@ -75,6 +87,15 @@ class Model:
         if self.taught is not None:
             return self.taught
         return self.recipe.learner.array_form(self.parts)
+
+    @cached_property
+    def familiar(self) -> Familiarity | None:
+        """What tells unknown surfaces, knowing the slides of the lessons, too."""
+        if self.familiarity is None or not self.lessons:
+            return self.familiarity
+        windows = self.recipe.feature_set.windows
+        overlap = min(windows.hop_s / windows.length_s, 1.0)
+        return self.familiarity.with_slides([lesson.values for lesson in self.lessons], overlap)
 
     def predict_log_proba(self, values: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
@@ -135,6 +156,8 @@ class Model:
             'feature_set': self.feature_set,
             'features': list(self.names),
             'growth': self.growth,
+            'stopping': asdict(self.stopping),
+            'sets': asdict(self.sets),
             'training': dict(self.training),
             'recipe': self.recipe.as_mapping(),
             'recipe_name': self.recipe.name,
@@ -145,8 +168,9 @@ class Model:
 
         Lessons are not written: they stand beside the model that was taught.
         """
-        examples = {EXAMPLES: self.examples.as_parts()} if self.examples else {}
-        return model_files.write(path, {**self.parts, **examples}, {**self.card, **(facts or {})})
+        more = {EXAMPLES: self.examples, FAMILIARITY: self.familiarity}
+        kept = {name: part.as_parts() for name, part in more.items() if part}
+        return model_files.write(path, {**self.parts, **kept}, {**self.card, **(facts or {})})
 
 
 def load_model(path: str | Path) -> Model:
@@ -169,7 +193,7 @@ def load_model(path: str | Path) -> Model:
     try:
         recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
         parts = model_files.parts_of(content, TRUSTED)
-        examples = parts.pop(EXAMPLES, None)
+        examples, familiarity = parts.pop(EXAMPLES, None), parts.pop(FAMILIARITY, None)
         model = Model(
             name=str(card['name']),
             labels=tuple(map(str, card['labels'])),
@@ -179,6 +203,9 @@ def load_model(path: str | Path) -> Model:
             parts=parts,
             growth=float(card['growth']),
             training=dict(card['training']),
+            stopping=Stopping(**card['stopping']),
+            sets=PredictionSets(**{name: _tuples(value) for name, value in card['sets'].items()}),
+            familiarity=Familiarity.from_parts(familiarity) if familiarity else None,
             examples=Examples.from_parts(examples) if examples else None,
         )
         answer = model.predict_log_proba(np.zeros(len(model.names)))
@@ -195,3 +222,7 @@ def load_model(path: str | Path) -> Model:
         return model
     taught = model.with_lessons(lessons)
     return replace(taught, taught=taught.taught_head().judge)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(map(float, value)) if isinstance(value, list) else float(value)

@@ -23,7 +23,7 @@ KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
 
 @dataclass(frozen=True)
 class TrainingParams:
-    """How the examples for training are cut."""
+    """How the examples for training are cut, and how rarely decisions made with them may err."""
 
     hop_s: float = param(
         0.25,
@@ -31,6 +31,21 @@ class TrainingParams:
         unit='s',
         low=0.001,
         high=60.0,
+    )
+    start_weight: int = param(
+        1, 'How often the windows at the start of a slide count: friction and sensor settle there.', low=1, high=100
+    )
+    wrong_stops: float = param(
+        0.02, 'Share of the slides that may be decided wrongly by ending them as soon as certain.', low=0.0, high=1.0
+    )
+    coverage: float = param(
+        0.95, 'Share of the slides whose texture is to be among the candidates.', low=0.5, high=0.999
+    )
+    false_rejections: float = param(
+        0.0,
+        'Share of the slides over known textures that may be taken for unknown; 0: all are known.',
+        low=0.0,
+        high=0.5,
     )
 
 

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from texture_core.arrays import Array
 from texture_core.errors import InvalidData
+from texture_estimation import prediction_sets, stopping
 from texture_estimation.evidence_rules import EvidenceRule
 from texture_estimation.examples import Examples
+from texture_estimation.familiarity import Familiarity
 from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.log_probabilities import log_loss, undecided
@@ -16,14 +23,16 @@ from texture_estimation.recipe import Recipe
 
 # Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
 DEFAULT_GROWTH = 0.5
+LEAST_SLIDES = 2
 
 
 def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Model:
     """Return a model that knows the labels of the examples.
 
-    Probabilities, and how fast evidence grows within a slide, are calibrated on slides held out of the training in
-    turn. With a single slide of a label, windows of that slide are held out instead, and the confidence comes out too
-    high; with a single window nothing is calibrated. The model's card says which.
+    Probabilities, how fast evidence grows within a slide, when a slide may end and which textures are candidates are
+    learnt from slides held out of the training in turn. With a single slide of a label, windows of that slide are held
+    out instead, and the confidence comes out too high; with a single window nothing is calibrated. The model's card
+    says which.
 
     Parameters
     ----------
@@ -42,8 +51,11 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Model:
     _check(examples)
     labels, codes = np.unique(examples.labels, return_inverse=True)
     slides, groups = np.unique(examples.groups, return_inverse=True)
-    fitted = recipe.learner.fit(examples.values, codes, groups)
-    growth = _fit_growth(fitted, codes, groups, recipe.evidence, examples.hop_s / examples.window_s)
+    fitted = _fit(recipe, examples, codes, groups)
+    overlap = min(examples.hop_s / examples.window_s, 1.0)
+    slides_held_out = _held_out_slides(fitted, codes, groups, recipe.evidence, overlap)
+    growth = _fit_growth(slides_held_out, recipe.evidence)
+    strictness = recipe.training
     return Model(
         name=name or recipe.name,
         labels=tuple(labels.tolist()),
@@ -52,6 +64,11 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Model:
         recipe=recipe,
         parts=fitted.parts,
         growth=growth,
+        stopping=_fit_stopping(slides_held_out, recipe.evidence, growth, strictness.wrong_stops),
+        sets=_fit_sets(slides_held_out, recipe.evidence, growth, strictness.coverage),
+        familiarity=Familiarity.learnt(examples.values, codes, groups, overlap, strictness.false_rejections)
+        if strictness.false_rejections
+        else None,
         training={
             'windows': len(codes),
             'slides': len(slides),
@@ -80,24 +97,91 @@ def _check(examples: LabelledFeatures) -> None:
         )
 
 
-def _fit_growth(fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, overlap: float) -> float:
-    """Return the exponent with which evidence grows that makes held-out slides most probable, whenever one looks."""
+def _fit(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes) -> Fitted:
+    """Let the learner learn, the windows that begin within the length of one counting more often.
+
+    Not where a label has a single slide: its windows are held out one by one, and must not be there twice.
+    """
+    if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < LEAST_SLIDES:
+        return recipe.learner.fit(examples.values, codes, groups)
+    starting = max(1, round(examples.window_s / examples.hop_s))
+    times = np.ones(len(codes), dtype=np.intp)
+    for group in np.unique(groups):
+        times[np.flatnonzero(groups == group)[:starting]] = recipe.training.start_weight
+    rows = np.repeat(np.arange(len(codes)), times)
+    fitted = recipe.learner.fit(examples.values[rows], codes[rows], groups[rows])
     if fitted.held_out is None:
-        return DEFAULT_GROWTH
+        return fitted
+    return replace(fitted, held_out=fitted.held_out[np.cumsum(times) - times])
+
+
+@dataclass(frozen=True, eq=False)
+class _HeldOut:
+    """One slide as a learner that has not seen it judges it: mean voice and worth after each window."""
+
+    truth: int
+    means: Array
+    worths: Array
+
+    def posterior(self, rule: EvidenceRule, growth: float) -> Array:
+        """Return the log-probabilities after each window, (n_windows, n_labels)."""
+        return rule.log_posterior(self.means, self.worths[:, None], growth)
+
+
+def _held_out_slides(
+    fitted: Fitted, codes: Codes, groups: Codes, rule: EvidenceRule, overlap: float
+) -> Sequence[_HeldOut]:
+    """Return the slides, as judged when they were held out; none if nothing was."""
+    if fitted.held_out is None:
+        return []
     voices = rule.voice(fitted.held_out)
-    means, worth, truth = [], [], []
+    slides = []
     for group in np.unique(groups):
         rows = np.flatnonzero(groups == group)
         count = np.arange(1, len(rows) + 1)
-        means.append(np.cumsum(voices[rows], axis=0) / count[:, None])
-        worth.append(1.0 + (count - 1) * min(overlap, 1.0))
-        truth.append(codes[rows])
-    mean, windows, true = np.concatenate(means), np.concatenate(worth)[:, None], np.concatenate(truth)
+        means = np.cumsum(voices[rows], axis=0) / count[:, None]
+        worths = np.asarray(1.0 + (count - 1) * overlap, dtype=np.float64)
+        slides.append(_HeldOut(int(codes[rows[0]]), means, worths))
+    return slides
+
+
+def _fit_growth(slides: Sequence[_HeldOut], rule: EvidenceRule) -> float:
+    """Return the exponent with which evidence grows that makes held-out slides most probable, whenever one looks."""
+    if not slides:
+        return DEFAULT_GROWTH
+    mean = np.concatenate([slide.means for slide in slides])
+    worths = np.concatenate([slide.worths for slide in slides])[:, None]
+    truth = np.concatenate([np.full(len(slide.worths), slide.truth) for slide in slides])
 
     def loss(growth: float) -> float:
-        return log_loss(rule.log_posterior(mean, windows, growth), true)
+        return log_loss(rule.log_posterior(mean, worths, growth), truth)
 
     return float(minimize_scalar(loss, bounds=(0.0, 1.0), method='bounded').x)
+
+
+def _fit_stopping(slides: Sequence[_HeldOut], rule: EvidenceRule, growth: float, wrong: float) -> stopping.Stopping:
+    """Return when a slide may end."""
+    if not slides:
+        return stopping.Stopping()
+    posteriors = [slide.posterior(rule, growth) for slide in slides]
+    right: list[NDArray[np.bool_]] = [
+        (posterior.argmax(axis=1) == slide.truth) & ~undecided(posterior)
+        for slide, posterior in zip(slides, posteriors, strict=True)
+    ]
+    confidences = [np.exp(posterior.max(axis=1)) for posterior in posteriors]
+    return stopping.learnt(confidences, right, [slide.worths for slide in slides], wrong)
+
+
+def _fit_sets(
+    slides: Sequence[_HeldOut], rule: EvidenceRule, growth: float, coverage: float
+) -> prediction_sets.PredictionSets:
+    """Return which textures are candidates."""
+    if not slides:
+        return prediction_sets.PredictionSets(coverage)
+    posteriors = [slide.posterior(rule, growth) for slide in slides]
+    return prediction_sets.learnt(
+        posteriors, [slide.truth for slide in slides], [slide.worths for slide in slides], coverage
+    )
 
 
 def _held_out_accuracy(fitted: Fitted, codes: Codes) -> float | None:

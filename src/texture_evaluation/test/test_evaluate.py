@@ -21,8 +21,8 @@ def model(simulated: Path) -> Model:
 def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(model: Model, simulated: Path) -> None:
     figures = evaluate(model, [simulated], '5-6').as_json()
     assert list(figures) == [
-        'window_accuracy', 'accuracy_at_s', 'early', 'unknown_accepted', 'labels', 'confusion', 'latency_us',
-        'unclassified',
+        'window_accuracy', 'accuracy_at_s', 'early', 'calibration_error', 'candidates', 'falsely_rejected',
+        'unknown_accepted', 'labels', 'confusion', 'latency_us', 'unclassified',
     ]  # fmt: skip
     table = np.array(figures['confusion'])
     assert figures['window_accuracy'] == pytest.approx(np.trace(table) / table.sum())

@@ -6,11 +6,15 @@ from texture_evaluation import metrics
 from texture_evaluation.metrics import SlideResult
 
 
-def slide(surface: str, decisions: str, *, confidences: tuple[float, ...] = (), known: bool = True) -> SlideResult:
+def slide(
+    surface: str, decisions: str, *, confidences: tuple[float, ...] = (), known: bool = True, certain_from: int = 99
+) -> SlideResult:
     """Return a slide whose windows of 0.5 s every 0.1 s decide letter by letter, each alone as with the evidence."""
     sure = confidences or (0.5,) * len(decisions)
     estimates = [
-        TextureEstimate(0, 'e', label, known, sure[k], windows=k + 1, evidence_s=0.5 + 0.1 * k)
+        TextureEstimate(
+            0, 'e', label, known, sure[k], certain=k >= certain_from, windows=k + 1, evidence_s=0.5 + 0.1 * k
+        )
         for k, label in enumerate(decisions)
     ]
     return SlideResult(surface, list(decisions), estimates)
@@ -34,10 +38,12 @@ def test_slides_that_are_too_short_are_left_out_and_without_any_there_is_no_accu
     assert metrics.accuracy_at(RESULTS, 0.3) is None
 
 
-def test_a_decision_is_early_when_certain_but_not_before_three_windows() -> None:
-    sure_at_once = slide('a', 'bbaa', confidences=(0.99, 0.99, 0.96, 0.5))
+def test_a_decision_is_early_when_it_is_certain_of_a_known_surface() -> None:
+    sure = slide('a', 'bbaa', certain_from=2)
+    strange = slide('a', 'aab', certain_from=0, known=False)
     never_sure = slide('a', 'aaab')
-    assert metrics.early_decision([sure_at_once]) == {'accuracy': 1.0, 'mean_s': pytest.approx(0.7)}
+    assert metrics.early_decision([strange]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.7)}
+    assert metrics.early_decision([sure]) == {'accuracy': 1.0, 'mean_s': pytest.approx(0.7)}
     assert metrics.early_decision([never_sure]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.8)}
 
 
@@ -68,3 +74,15 @@ def test_the_curve_ends_where_the_shortest_slide_ends() -> None:
 
 def test_at_the_end_all_slides_count_however_short() -> None:
     assert metrics.accuracy_at_end([*RESULTS, slide('c', 'a')]) == pytest.approx(2 / 3)
+
+
+def test_confidence_that_is_right_as_often_as_it_says_has_no_calibration_error() -> None:
+    honest = [slide('a', 'aaab', confidences=(0.75,) * 4)]
+    assert metrics.calibration_error(honest) == pytest.approx(0.0)
+    assert metrics.calibration_error([slide('a', 'bbbb', confidences=(0.9,) * 4)]) == pytest.approx(0.9)
+
+
+def test_candidates_are_counted_at_the_end_where_there_are_any() -> None:
+    ends = [TextureEstimate(0, 'e', 'a', candidates=names) for names in (('a',), ('b', 'a'), ('b',), ())]
+    results = [SlideResult('a', [], [end]) for end in ends]
+    assert metrics.candidates(results) == {'coverage': pytest.approx(2 / 3), 'mean_size': pytest.approx(4 / 3)}

@@ -60,6 +60,9 @@ class Report:
             'window_accuracy': metrics.window_accuracy(self.known) if self.known else None,
             'accuracy_at_s': metrics.accuracy_at_times(self.known),
             'early': metrics.early_decision(self.known) if self.known else nothing,
+            'calibration_error': metrics.calibration_error(self.known),
+            'candidates': metrics.candidates(self.known),
+            'falsely_rejected': metrics.falsely_rejected(self.known),
             'unknown_accepted': metrics.unknown_accepted(self.unknown),
             'labels': list(self.labels),
             'confusion': self.confusion.tolist(),
@@ -149,4 +152,5 @@ def _test(model: Model, slide: Slide, pieces: Sequence[Piece]) -> tuple[SlideRes
             heard.append(estimate)
         before = estimate.windows
     alone = model.decide(np.stack(used)) if used else []
-    return SlideResult(slide.surface, alone, heard), taken_us
+    final = next((estimate for estimate in reversed(estimates) if estimate.final), None)
+    return SlideResult(slide.surface, alone, heard, final), taken_us

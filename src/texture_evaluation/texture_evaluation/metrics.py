@@ -11,8 +11,7 @@ from texture_core.arrays import AnyArray, Array
 from texture_core.estimates import TextureEstimate
 
 TIMES_S = (0.5, 1.0, 2.5, 5.0)
-CONFIDENT = 0.95
-LEAST_WINDOWS = 3
+CALIBRATION_BINS = 15
 TOLERANCE_S = 1e-6  # sums of hops are not exact
 
 
@@ -28,11 +27,19 @@ class SlideResult:
         What each window alone looks like; '' if it cannot be told.
     estimates : (n_windows,)
         The estimate after each window, from all evidence so far.
+    final
+        The estimate at the end of the slide; None takes the last one for it.
     """
 
     surface: str
     window_labels: Sequence[str]
     estimates: Sequence[TextureEstimate]
+    final: TextureEstimate | None = None
+
+    @property
+    def end(self) -> TextureEstimate:
+        """The estimate at the end of the slide."""
+        return self.final or self.estimates[-1]
 
     def after(self, seconds: float) -> TextureEstimate | None:
         """Return the estimate after so much sliding; None if the slide has less or the first window is longer."""
@@ -42,9 +49,8 @@ class SlideResult:
         return heard[-1] if heard else None
 
     def early(self) -> TextureEstimate:
-        """Return the first estimate that is certain, else the last one."""
-        certain = (e for e in self.estimates if e.confidence >= CONFIDENT and e.windows >= LEAST_WINDOWS)
-        return next(certain, self.estimates[-1])
+        """Return the first estimate that is certain of a known texture, else the last one."""
+        return next((e for e in self.estimates if e.certain and e.known), self.estimates[-1])
 
 
 def window_accuracy(results: Sequence[SlideResult]) -> float:
@@ -95,9 +101,40 @@ def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
     }
 
 
+def calibration_error(results: Sequence[SlideResult]) -> float:
+    """Return the expected calibration error of the confidence over all estimates, in bins of equal width.
+
+    Source: Guo et al. 2017, equation 3.
+    """
+    told = [(e.confidence, e.label == result.surface) for result in results for e in result.estimates if e.label]
+    if not told:
+        return 0.0
+    confidence, right = np.array(told, dtype=np.float64).T
+    bins = np.minimum((confidence * CALIBRATION_BINS).astype(int), CALIBRATION_BINS - 1)
+    gaps = np.bincount(bins, confidence - right)
+    return float(np.abs(gaps).sum() / len(right))
+
+
+def candidates(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
+    """Return how often the true texture is among the candidates at the end, and how many these are on average."""
+    ends = [(result.surface, result.end.candidates) for result in results]
+    named = [(surface, names) for surface, names in ends if names]
+    if not named:
+        return {'coverage': None, 'mean_size': None}
+    return {
+        'coverage': float(np.mean([surface in names for surface, names in named])),
+        'mean_size': float(np.mean([len(names) for _, names in named])),
+    }
+
+
+def falsely_rejected(results: Sequence[SlideResult]) -> float | None:
+    """Return the share of slides over known surfaces that were taken for unknown at the end; None without any."""
+    return float(np.mean([not result.end.known for result in results])) if results else None
+
+
 def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
     """Return the share of slides over surfaces the model was never taught that it took for known; None without any."""
-    return float(np.mean([result.estimates[-1].known for result in results])) if results else None
+    return float(np.mean([result.end.known for result in results])) if results else None
 
 
 def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray:

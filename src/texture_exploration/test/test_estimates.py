@@ -8,13 +8,13 @@ def texture(**values):
     return TextureEstimate(**{'stamp_ns': 1, 'exploration_id': 'one', 'label': 'cork', 'known': True, **values})
 
 
-def test_a_known_confident_texture_of_enough_windows_is_certain():
-    params = CertaintyParams(certain_confidence=0.9, certain_windows=3)
-    assert params.certain(texture(confidence=0.95, windows=3))
-    assert not params.certain(texture(confidence=0.95, windows=2))
-    assert not params.certain(texture(confidence=0.85, windows=9))
-    assert not params.certain(texture(confidence=0.95, windows=3, known=False))
-    assert not params.certain(texture(windows=3))  # confidence unknown
+def test_a_known_texture_of_which_its_model_is_certain_ends_the_slide_if_it_is_confident_enough():
+    params = CertaintyParams(certain_confidence=0.9)
+    assert params.certain(texture(confidence=0.95, certain=True))
+    assert not params.certain(texture(confidence=0.95))
+    assert not params.certain(texture(confidence=0.85, certain=True))
+    assert not params.certain(texture(confidence=0.95, certain=True, known=False))
+    assert not params.certain(texture(certain=True))  # confidence unknown
 
 
 def test_the_final_estimate_ends_the_waiting():

@@ -14,16 +14,16 @@ from texture_core.parameters import param
 class CertaintyParams:
     """When a texture is certain, and how long to wait for the last word on it."""
 
-    certain_confidence: float = param(0.95, 'Confidence from which a texture is certain.', low=0.0, high=1.0)
-    certain_windows: int = param(3, 'Windows from which a texture can be certain.', low=1, high=1000)
+    certain_confidence: float = param(
+        0.0, 'Confidence that a texture needs to be certain, besides what its model asks for.', low=0.0, high=1.0
+    )
     estimate_timeout_s: float = param(
         1.0, 'Wait so long after the lift for the final estimates.', unit='s', low=0.0, high=60.0
     )
 
     def certain(self, estimate: TextureEstimate) -> bool:
         """Return whether the texture is certain enough to end the slide."""
-        enough = estimate.windows >= self.certain_windows
-        return estimate.known and enough and estimate.confidence >= self.certain_confidence
+        return estimate.known and estimate.certain and estimate.confidence >= self.certain_confidence
 
 
 class Estimates:
