@@ -21,6 +21,7 @@ from texture_evaluation.benches import (
     scenes,
     segmentation,
     sensors,
+    speed_force,
     stick_slip,
 )
 from texture_evaluation.benches.result import Bench, BenchResult
@@ -30,6 +31,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
+    'speed_force': speed_force.run,  # speeds, forces and directions that were not taught, recorded
     'roughness': roughness.run,  # from window to grade
     'optimise': optimise.run,  # genetic searches of the papers' size: time, convergence, front
     'learning': learning.run,  # taught slide by slide against trained anew on the same slides

@@ -64,5 +64,10 @@ class Conditions:
 
 
 def described(features: Sequence[Feature], windows: Sequence[Windows]) -> Array:
-    """Return the values of features, one row a window, (n, n_features)."""
-    return np.stack([np.concatenate([feature(window).ravel() for feature in features]) for window in windows])
+    """Return the values of features, one row for each window there is, (n, n_features)."""
+    return np.concatenate([_rows(features, window) for window in windows])
+
+
+def _rows(features: Sequence[Feature], windows: Windows) -> Array:
+    values = [feature(windows) for feature in features]
+    return np.atleast_2d(np.concatenate([value.reshape(*value.shape[:-2], -1) for value in values], axis=-1))

@@ -35,10 +35,13 @@ class Fabricslide:
         The slides, with their touch before they begin.
     learner
         What learns the loads; they are of one kind, and what a turn has left of a taxel is not to be blown up.
+    energies
+        How much of the turn is taken out, of which the training chooses.
     """
 
     conditions: Conditions
     learner: Learner = field(default_factory=lambda: SvmRbf(common_scale=True))
+    energies: Sequence[float] = ENERGIES
 
     def splits(self) -> dict[str, dict[str, tuple[Mask, Mask]]]:
         """Return train and test slides by protocol and by what is left out."""
@@ -56,8 +59,8 @@ class Fabricslide:
         direction to learn from.
         """
         starts, steady = self._shares()
-        slides = {f'{energy:.0%}': self._load_trial(starts, steady, energy) for energy in ENERGIES}
-        touches = {f'{energy:.0%}': self._load_trial(starts, steady, energy, starts) for energy in ENERGIES}
+        slides = {f'{energy:.0%}': self._load_trial(starts, steady, energy) for energy in self.energies}
+        touches = {f'{energy:.0%}': self._load_trial(starts, steady, energy, starts) for energy in self.energies}
         force, speed = self.conditions.force_n, self.conditions.speed_mm_s
         inner = {
             'one force out': (slides, [force]),

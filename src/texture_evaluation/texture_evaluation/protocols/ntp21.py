@@ -7,10 +7,12 @@ recognised there is this stretch of the texture; single windows start anywhere o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.learners.learner import Learner
@@ -18,6 +20,7 @@ from texture_estimation.learners.svm_rbf import SvmRbf
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.held_out import Mask, Outcome, Trial, one_out, recognised, run, run_chosen
 from texture_evaluation.protocols.conditions import Conditions, described
+from texture_evaluation.whole_slides import WholeSlide
 from texture_features.array_speed import ArraySpeed
 from texture_features.feature import Feature, Windows
 from texture_features.features.level_share import LevelShare
@@ -25,7 +28,7 @@ from texture_features.features.mean_spatial_bands import MeanSpatialBands
 from texture_features.features.spatial_bands import SpatialBands
 
 SLOW_MM_S = 60.0  # "slow" is taught, faster is tested
-CANDIDATES = [(bands, floor) for bands in (16, 32, 64) for floor in (1e-7, 1e-9)]
+CANDIDATES = tuple((bands, floor) for bands in (16, 32, 64) for floor in (1e-7, 1e-9))
 SPEEDS_M_S: Array = np.geomspace(0.005, 0.5, 300, dtype=np.float64)  # among which the array looks for its own
 SPANNED, MISTAKES = 0.95, 9  # how much of the error of the array's speed is taught, in how many steps
 RECIPE = 'any-speed'
@@ -44,10 +47,13 @@ class Ntp21:
         The slides.
     learner
         What learns.
+    candidates
+        Number of bands and floor, of which the training chooses; without floors for windows.
     """
 
     conditions: Conditions
     learner: Learner = field(default_factory=SvmRbf)
+    candidates: Sequence[tuple[int, float]] = CANDIDATES
 
     def splits(self) -> dict[str, dict[str, tuple[Mask, Mask]]]:
         """Return train and test slides by protocol and by what is left out."""
@@ -64,7 +70,7 @@ class Ntp21:
         windows = [slide.windows() for slide in self.conditions.slides]
         trials = {
             f'{bands} bands, floor {floor:g}': self._trial([MeanSpatialBands(bands=bands, floor=floor)], windows)
-            for bands, floor in CANDIDATES
+            for bands, floor in self.candidates
         }
         inner = {'one force out': [self.conditions.force_n]}
         return {
@@ -117,28 +123,23 @@ class Ntp21:
             'share_within_10_percent': round(float((share < 0.1).mean()), 4),
         }
 
-    def windows(self, features: Sequence[Feature], taught: str = 'same distance') -> Outcome:
-        """Return how single windows are recognised, one speed left out.
+    def windows(self, taught: str = 'same distance') -> Outcome:
+        """Return how single windows are recognised by the recipe any-speed, one speed left out.
+
+        The number of its bands is chosen in the training, where another speed is left out in turn.
 
         Parameters
         ----------
-        features
-            What describes them.
         taught
             'same distance': a model for the tested speed, taught windows of the distance that is slid at it in 0.59 s;
             'all distances': one model, taught windows of the distances of all speeds; 'same time': windows of 0.59 s.
         """
         speed = self.conditions.speed_mm_s
-        return Outcome(
-            {
-                name: self._window_trial(features, train, test, TAUGHT[taught](np.unique(speed), float(name)))
-                for name, (train, test) in one_out(speed).items()
-            }
-        )
-
-    def recipe_features(self) -> list[Feature]:
-        """Return the features of the recipe any-speed."""
-        return [feature for item in load_recipe(RECIPE).feature_set.inputs for _, feature in item.features]
+        trials = {
+            f'{bands} bands': self._window_trial(recipe_features(bands), taught)
+            for bands in sorted({bands for bands, _ in self.candidates})
+        }
+        return run_chosen(trials, one_out(speed), [speed])
 
     def _trial(self, features: Sequence[Feature], windows: Sequence[Windows]) -> Trial:
         return self.conditions.trial(described(features, windows), self.learner)
@@ -156,50 +157,59 @@ class Ntp21:
         )
         return np.array([array(slide.samples, slide.rate_hz, SPEEDS_M_S) for slide in slides])
 
-    def _window_trial(self, features: Sequence[Feature], train: Mask, test: Mask, distances_m: Sequence[float]) -> Mask:
-        """Teach windows of these distances (of 0.59 s if there is none), test windows of 0.59 s."""
-        taught = [self._cut(train, _steps(distance, TAUGHT_HOP_M)) for distance in distances_m]
-        taught = taught or [self._cut(train, _even)]
-        windows = [window for part, _ in taught for window in part]
-        owners = np.concatenate([owner for _, owner in taught])
-        tested, tested_owners = self._cut(test, _even)
-        surfaces, names = self.conditions.surfaces, self.conditions.names
-        return recognised(
-            self.learner,
-            (described(features, windows), surfaces[owners], names[owners]),
-            (described(features, tested), surfaces[tested_owners]),
-        )
+    def _window_trial(self, features: Sequence[Feature], taught: str) -> Trial:
+        """Return what teaches windows of some distances and tests windows of 0.59 s."""
+        speed, surfaces, names = self.conditions.speed_mm_s, self.conditions.surfaces, self.conditions.names
 
-    def _cut(self, use: Mask, steps: Any) -> tuple[list[Windows], AnyArray]:
-        """Return windows of the slides in use, and the number of the slide of each."""
-        windows, owners = [], []
-        for number in np.flatnonzero(use):
-            slide = self.conditions.slides[number]
-            length, hop = steps(slide.rate_hz, slide.speed_m_s)
-            length = min(length, len(slide.samples))
-            for start in range(0, len(slide.samples) - length + 1, hop):
-                windows.append(slide.windows(start, length))
-                owners.append(number)
-        return windows, np.array(owners)
+        @cache
+        def cut(distance_m: float | None) -> tuple[Array, AnyArray]:
+            return self._cut(features, distance_m)
 
+        def trial(train: Mask, test: Mask) -> Mask:
+            distances = TAUGHT[taught](np.unique(speed), float(speed[test][0]))
+            parts = [_of(*cut(distance), train) for distance in distances]
+            values, owners = (np.concatenate(part) for part in zip(*parts, strict=True))
+            tested, tested_owners = _of(*cut(None), test)
+            return recognised(
+                self.learner, (values, surfaces[owners], names[owners]), (tested, surfaces[tested_owners])
+            )
 
-def _even(rate_hz: float, speed_m_s: float) -> tuple[int, int]:
-    """Return length and hop of a window of 0.59 s, in samples."""
-    return round(WINDOW_S * rate_hz), round(HOP_S * rate_hz)
+        return trial
+
+    def _cut(self, features: Sequence[Feature], distance_m: float | None) -> tuple[Array, AnyArray]:
+        """Return windows of all slides, described, (n, n_features), and the number of the slide of each, (n,)."""
+        windows = [_cut(slide, distance_m) for slide in self.conditions.slides]
+        owners = np.repeat(np.arange(len(windows)), [len(window.samples) for window in windows])
+        return described(features, windows), owners
 
 
-def _steps(distance_m: float, hop_m: float) -> Any:
-    """Return what gives length and hop, in samples, of windows of one distance."""
-
-    def steps(rate_hz: float, speed_m_s: float) -> tuple[int, int]:
-        return max(2, round(distance_m / speed_m_s * rate_hz)), max(1, round(hop_m / speed_m_s * rate_hz))
-
-    return steps
+def recipe_features(bands: int) -> list[Feature]:
+    """Return the features of the recipe any-speed, with so many bands."""
+    features = [feature for item in load_recipe(RECIPE).feature_set.inputs for _, feature in item.features]
+    return [replace(item, bands=bands) if isinstance(item, MeanSpatialBands) else item for item in features]
 
 
-# Which distances (m) are taught, given all speeds and the tested one (mm/s).
-TAUGHT: Mapping[str, Callable[[AnyArray, float], list[float]]] = {
+def _cut(slide: WholeSlide, distance_m: float | None) -> Windows:
+    """Return windows of a distance, 3 mm apart, or of 0.59 s, 0.1 s apart; the whole slide if it is shorter."""
+    if distance_m is None:
+        length_s, hop_s = WINDOW_S, HOP_S
+    else:
+        length_s, hop_s = distance_m / slide.speed_m_s, TAUGHT_HOP_M / slide.speed_m_s
+    length = min(max(2, round(length_s * slide.rate_hz)), len(slide.samples))
+    hop = max(1, round(hop_s * slide.rate_hz))
+    samples = sliding_window_view(slide.samples, length, axis=0)[::hop].swapaxes(-1, -2)
+    count = len(samples)
+    return Windows(samples, slide.rate_hz, np.full(count, slide.speed_m_s), np.full(count, slide.force_n))
+
+
+def _of(values: Array, owners: AnyArray, use: Mask) -> tuple[Array, AnyArray]:
+    """Return the windows of the slides in use."""
+    return values[use[owners]], owners[use[owners]]
+
+
+# Which distances (m) are taught, None for 0.59 s, given all speeds and the tested one (mm/s).
+TAUGHT: Mapping[str, Callable[[AnyArray, float], Sequence[float | None]]] = {
     'same distance': lambda speeds, tested: [tested / 1000.0 * WINDOW_S],
     'all distances': lambda speeds, tested: [speed / 1000.0 * WINDOW_S for speed in speeds],
-    'same time': lambda speeds, tested: [],
+    'same time': lambda speeds, tested: [None],
 }
