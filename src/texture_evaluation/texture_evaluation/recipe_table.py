@@ -15,7 +15,7 @@ def recipe_table(settings: Mapping[str, Mapping[str, Cells]]) -> str:
     Parameters
     ----------
     settings
-        Data set → split → recipe → its figures. Unclassified, training and latency are those of the first split.
+        Data set → split → recipe → its figures. The costs are those of the first split that it was tried on.
     """
     columns = [(name, split, cells) for name, splits in settings.items() for split, cells in splits.items()]
     first = columns[0][2]
@@ -29,7 +29,12 @@ def recipe_table(settings: Mapping[str, Mapping[str, Cells]]) -> str:
         'latency (µs)',
     ]
     rows = [
-        [name, *(_accuracy(cells.get(name)) for _, _, cells in columns), *_costs(first.get(name))] for name in names
+        [
+            name,
+            *(_accuracy(cells.get(name)) for _, _, cells in columns),
+            *_costs(next(cells[name] for _, _, cells in columns if name in cells)),
+        ]
+        for name in names
     ]
     return '\n'.join(map(_line, [head, ['---'] * len(head), *rows])) + '\n'
 
@@ -49,9 +54,7 @@ def _accuracy(cell: Mapping[str, Any] | None) -> str:
     return f'{_percent(cell["window_accuracy"])}; {_percent(slide_accuracy(cell))}' if cell else ''
 
 
-def _costs(cell: Mapping[str, Any] | None) -> list[str]:
-    if not cell:
-        return ['', '', '']
+def _costs(cell: Mapping[str, Any]) -> list[str]:
     return [
         _percent(cell['unclassified_windows']),
         f'{cell["train_s"]:.1f}',
