@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from texture_evaluation.experiments.check import higher, most_errors
+from texture_evaluation.experiments.check import at_least, higher, most_errors
 from texture_evaluation.experiments.interval import mean
 from texture_evaluation.experiments.protocol import (
     OURS,
@@ -51,16 +51,17 @@ def findings(outcomes: Outcomes) -> list[Finding]:
     lift_ann, lift_svm = ann_vote.right() - ann.right(), svm_vote.right() - svm.right()
     more = mean(lift_svm - lift_ann)
     return [
-        higher('a vote over five parts lifts the SVM (75.0 to 97.3 %)', svm_vote, svm),
-        higher('a vote over five parts lifts the ANN (78.7 to 84.0 %)', ann_vote, ann),
+        at_least('with a vote over five parts the SVM recognises 97.3 %', svm_vote, 0.973),
+        higher('the vote lifts the SVM (75.0 to 97.3 %)', svm_vote, svm),
+        higher('the vote lifts the ANN (78.7 to 84.0 %)', ann_vote, ann),
         Finding(
-            'the vote lifts the SVM far more than the ANN (22.3 against 5.3 points)',
+            'the vote is worth more to the SVM than to the ANN (22.3 against 5.3 points)',
             f'{100 * lift_svm.mean():+.1f} against {100 * lift_ann.mean():+.1f} points',
             more,
             more.above(),
         ),
         higher(
-            'the vote lifts the SVM, if parts of the slides that are tested were learnt',
+            'not of the paper: the vote lifts the SVM, if parts of the slides that are tested were learnt',
             outcomes[TASK, SVM_SINGLY],
             svm,
         ),

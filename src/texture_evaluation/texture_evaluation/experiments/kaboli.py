@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from texture_evaluation.experiments.check import at_least, higher, most_errors, no_lower
 from texture_evaluation.experiments.protocol import (
     OURS,
@@ -11,6 +15,7 @@ from texture_evaluation.experiments.protocol import (
     Method,
     Outcomes,
     Protocol,
+    Table,
     Task,
     View,
     Visits,
@@ -73,18 +78,51 @@ def findings(outcomes: Outcomes) -> list[Finding]:
     ]  # fmt: skip
 
 
+def _table(surfaces: tuple[str, ...], errors: Mapping[tuple[str, str], int]) -> Table:
+    """Return a table of 20 test slides an object, given how many of an object were taken for another."""
+    counts = 20 * np.eye(len(surfaces))
+    for (true, said), count in errors.items():
+        row = surfaces.index(true)
+        counts[row, row] -= count
+        counts[row, surfaces.index(said)] += count
+    return [tuple(row) for row in counts.tolist()]
+
+
+FIGURE_4 = _table(
+    ROUND,
+    {
+        ('yellow_ball', 'red_ball'): 1,
+        ('yellow_ball', 'colorful_ball'): 1,
+        ('rough_ball', 'sponge_ball'): 2,
+        ('sponge_ball', 'rough_ball'): 1,
+        ('mirror_ball', 'red_ball'): 1,
+    },
+)
+FIGURE_5 = _table(
+    VARIOUS,
+    {
+        ('toothbrush', 'rough_star'): 1,
+        ('rough_star', 'toothbrush'): 1,
+        ('coffee_capsule', 'spray'): 1,
+        ('spray', 'coffee_capsule'): 1,
+        ('baby_feeder', 'cream_tube'): 1,
+    },
+)
+TABLES = (FIGURE_4, FIGURE_5, None)  # that of all 20 is a picture without numbers
+
+
 def pa(rounds: int) -> str:
     """Return the name of online learning after so many slides of each object."""
     return f'kaboli-pa, t = {rounds}'
 
 
-def _methods(svm: float, em: float) -> tuple[Method, ...]:
+def _methods(svm: float, em: float, table: Table | None) -> tuple[Method, ...]:
     online = [
         Method('kaboli-pa', Figures(test=PAPER_PA if n == ROUNDS[-1] else None), WHOLE, {'rounds': n}, label=pa(n))
         for n in ROUNDS
     ]
     return (
-        Method(SVM, Figures(test=svm), WHOLE),
+        Method(SVM, Figures(test=svm), WHOLE, confusion=table),
         *online,
         Method(EM, Figures(test=em), WHOLE, INDEPENDENT),
         OURS,
@@ -97,8 +135,8 @@ PROTOCOL = Protocol(
     scene='kaboli',
     paper='Kaboli et al. 2015, "In-hand object recognition via texture properties", section V',
     tasks=tuple(
-        Task(name, VISITS, _methods(svm, em), surfaces)
-        for name, svm, em, surfaces in zip(TASKS, PAPER_SVM, PAPER_EM, SURFACES, strict=True)
+        Task(name, VISITS, _methods(svm, em, table), surfaces)
+        for name, svm, em, table, surfaces in zip(TASKS, PAPER_SVM, PAPER_EM, TABLES, SURFACES, strict=True)
     ),
     divide=learnt_in(TRAINED),
     split='learnt: 10 slides with index and middle finger; tested: 20 with thumb and index finger',

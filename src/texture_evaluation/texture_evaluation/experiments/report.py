@@ -13,7 +13,7 @@ from texture_evaluation.experiments.check import percent
 from texture_evaluation.experiments.experiment import Experiment, ExperimentResult
 from texture_evaluation.experiments.outcome import Outcome
 from texture_evaluation.experiments.paper_charts import accuracy_chart, confusions_chart
-from texture_evaluation.experiments.protocol import Finding, Method, Outcomes, Protocol, Table
+from texture_evaluation.experiments.protocol import Finding, Method, Outcomes, Protocol, Table, Task
 from texture_evaluation.experiments.trial import outcomes
 from texture_simulation.scene import load_scene
 
@@ -91,8 +91,13 @@ def _charts(protocol: Protocol, found: Outcomes, out: Path) -> tuple[Path, ...]:
         for task in protocol.tasks
     }
     charts = [accuracy_chart(panels, f'{protocol.name}: slides recognised, paper and simulation', out / f'{stem}.png')]
+    several = len(protocol.tasks) > 1
     tables = {
-        method.name: (outcome.surfaces, shares_of(method.confusion), outcome.confusion)
+        f'{method.name}, {task.name}' if several else method.name: (
+            outcome.surfaces,
+            shares_of(method.confusion),
+            outcome.confusion,
+        )
         for task in protocol.tasks
         for method in task.methods
         for outcome in [found[task.name, method.name]]
@@ -128,7 +133,7 @@ def _lines(protocol: Protocol, found: Outcomes, checked: Sequence[Finding]) -> I
     for task in protocol.tasks:
         for method in task.methods:
             if method.confusion is not None:
-                yield from _confusion_lines(method, found[task.name, method.name])
+                yield from _confusion_lines(task, method, found[task.name, method.name])
 
 
 def _row(method: Method, outcome: Outcome) -> str:
@@ -147,8 +152,8 @@ def _share(value: float | None) -> str:
     return '–' if value is None else f'{100 * value:.1f}'
 
 
-def _confusion_lines(method: Method, outcome: Outcome) -> Iterator[str]:
-    yield f'{method.name}: % of the slides over each surface taken for each, paper | simulated (last: unclassified)'
+def _confusion_lines(task: Task, method: Method, outcome: Outcome) -> Iterator[str]:
+    yield f'{method.name}, {task.name}: % of each surface taken for each, paper | simulated (last: none)'
     width = max(map(len, outcome.surfaces))
     for name, theirs, ours in zip(outcome.surfaces, shares_of(method.confusion), outcome.confusion, strict=True):
         left, right = (' '.join(f'{100 * value:3.0f}' for value in row) for row in (theirs, ours))
