@@ -1,0 +1,181 @@
+"""The site builds without a warning, holds what is made from source, and its examples run."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import re
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.exploration import ExplorationRequest
+from texture_core.parameters import parameters_of
+from texture_drivers.catalogue import SENSORS
+from texture_drivers.params import SensorParams
+from texture_estimation.model import load_model
+from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
+from texture_evaluation.evaluate import evaluate
+from texture_evaluation.train import train_from_bags
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.exploration import Exploration
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+from texture_features.feature import Windows
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / 'docs'
+EXAMPLE = re.compile(r'```\w+\n# my_textures/(\S+)\n(.*?)```', re.DOTALL)
+PARAM_FIELD = re.compile(r'^    (\w+): .+ = param\(', re.MULTILINE)
+
+
+@pytest.fixture(scope='module')
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp('site')
+    built = subprocess.run([sys.executable, DOCS / 'build.py', out], capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    assert not built.stderr
+    return out
+
+
+@pytest.mark.ros  # the parameters of nodes are read from the nodes
+def test_every_page_is_in_the_site_and_reached_from_the_first(site: Path) -> None:
+    first = (site / 'docs' / 'index.html').read_text()
+    for page in [*DOCS.glob('*.md'), *DOCS.glob('sensors/*.md'), *DOCS.glob('robots/*.md')]:
+        name = page.relative_to(DOCS).with_suffix('.html')
+        assert (site / 'docs' / name).exists()
+        assert page.stem == 'index' or f'href="{name}"' in first
+
+
+@pytest.mark.ros
+def test_the_site_loads_nothing_from_elsewhere(site: Path) -> None:
+    for page in site.rglob('*.html'):
+        assert not re.findall(r'<(?:script|img|iframe)[^>]+src="(?:https?:)?//[^"]*"', page.read_text()), page
+        assert not re.findall(r'<link[^>]+rel="stylesheet"[^>]+href="(?:https?:)?//[^"]*"', page.read_text()), page
+
+
+@pytest.mark.ros
+def test_the_page_of_messages_has_every_field(site: Path) -> None:
+    page = (site / 'docs' / 'messages.html').read_text()
+    for path in [path for kind in ('msg', 'srv', 'action') for path in (ROOT / 'src/texture_msgs' / kind).iterdir()]:
+        assert f'id="{path.stem.lower()}' in page
+        for field in re.findall(r'^[\w/\[\]]+ (\w+)', path.read_text(), re.MULTILINE):
+            assert field in page
+
+
+@pytest.mark.ros
+def test_the_page_of_parameters_has_every_one_that_the_code_makes(site: Path) -> None:
+    page = (site / 'docs' / 'parameters.html').read_text()
+    missing = [
+        f'{path.name}: {name}'
+        for path in sorted(ROOT.glob('src/*/texture_*/**/*.py'))
+        for name in PARAM_FIELD.findall(path.read_text())
+        if f'<span class="pre">{name}</span>' not in page
+    ]
+    assert missing == []
+
+
+@pytest.mark.ros
+def test_figures_of_the_papers_are_those_of_the_charts(site: Path) -> None:
+    page = (site / 'docs' / 'papers.html').read_text()
+    for path in DOCS.glob('charts/ets-*.json'):
+        assert path.stem in page
+    assert '<!--' not in re.search(r'<article.*</article>', page, re.DOTALL).group()
+
+
+@pytest.fixture
+def examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Write the examples of the page on extending into a package."""
+    folder = tmp_path / 'my_textures'
+    folder.mkdir()
+    for name, text in EXAMPLE.findall((DOCS / 'extending.md').read_text()):
+        (folder / name).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    yield folder
+    for name in [name for name in sys.modules if name.split('.')[0] == 'my_textures']:
+        del sys.modules[name]
+
+
+def test_the_sensor_of_the_page_delivers_and_counts_what_is_lost(examples: Path) -> None:
+    finger_class = importlib.import_module('my_textures.udp_finger').UdpFinger
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.bind(('127.0.0.1', 0))
+        port = sender.getsockname()[1]
+    finger = finger_class(SensorParams(device=str(port)), time.time_ns)
+    finger.open()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for first in (0, 20, 60):
+            samples = np.arange(first, first + 20, dtype='<f4')
+            sender.sendto(first.to_bytes(8, 'little') + samples.tobytes(), ('127.0.0.1', port))
+    batches = [batch for _ in range(3) for batch in finger.read()['signal']]
+    finger.close()
+    assert [batch.first_sample for batch in batches] == [0, 20, 60]
+    assert all(batch.samples[0, 0] == batch.first_sample for batch in batches)
+    assert finger.counts == {'samples': 60, 'lost': 20, 'reopened': 0}
+    assert set(SENSORS['daq'](SensorParams(), time.time_ns).counts) >= set(finger.counts)
+
+
+def test_the_motion_of_the_page_slides_along_its_bows(examples: Path) -> None:
+    snake = importlib.import_module('my_textures.snake').snake
+    now_ns, states, places = 1_000_000_000, [], []
+    arm = SimulatedArm(SimulatedArmParams(), clock=lambda: now_ns, own_thread=False)
+    arm.connect()
+
+    def pace() -> None:
+        nonlocal now_ns
+        for _ in range(2):
+            now_ns += 5_000_000
+            arm.step(0.005)
+
+    def note(state: object) -> None:
+        states.append(state)
+        places.append(arm.state().position)
+
+    request, limits = ExplorationRequest('snake'), SafetyLimits()
+    motion = snake(request, arm.state().position, TouchParams(), limits)
+    exploration = Exploration(
+        'one', request, arm=arm, motion=motion, limits=limits, clock=lambda: now_ns, on_state=note
+    )
+    exploration.run(pace)
+    assert exploration.outcome.success
+    slid = [place for state, place in zip(states, places, strict=True) if state.phase.value == 'slide']
+    assert max(y for _, y, _ in slid) == pytest.approx(0.01, abs=0.001)
+    assert min(y for _, y, _ in slid) == pytest.approx(-0.01, abs=0.001)
+
+
+def test_the_feature_of_the_page_counts_the_crossings_of_a_tone(examples: Path) -> None:
+    crossings = importlib.import_module('my_textures.crossings').Crossings()
+    tone = np.sin(2 * np.pi * 50 * np.arange(1000) / 1000 + 0.1)[:, None]
+    assert crossings(Windows(tone, 1000.0)).shape == (1, 1)
+    assert crossings(Windows(tone, 1000.0)).item() == pytest.approx(100, abs=1)
+    assert [parameter.name for parameter in parameters_of(type(crossings))] == ['level']
+
+
+def test_the_recipe_of_the_page_learns_and_recognises(examples: Path, tmp_path: Path) -> None:
+    plan = SlidePlan(slides=4, slide_s=1.0)
+    bags = write_simulated(tmp_path, plan, np.random.default_rng(0), surfaces=('leather', 'ridge_2mm_deep'))
+    train_from_bags(str(examples / 'my-recipe.yaml'), bags, '1-3', tmp_path / 'model')
+    report = evaluate(load_model(str(tmp_path / 'model')), bags, slides='4')
+    assert report.as_json()['window_accuracy'] == 1.0
+
+
+def said(path: Path) -> Iterator[str]:
+    """Yield every text of a file, with … where something is filled in."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.JoinedStr):
+            yield ''.join(str(part.value) if isinstance(part, ast.Constant) else '…' for part in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value
+
+
+def test_the_sentences_in_troubleshooting_are_those_of_the_programs() -> None:
+    spoken = '\n'.join(text for path in ROOT.glob('src/texture_*/texture_*/**/*.py') for text in said(path))
+    quoted = re.findall(r'^\| `([^`]+)`', (DOCS / 'troubleshooting.md').read_text(), re.MULTILINE)
+    assert len(quoted) > 20
+    assert [sentence for sentence in quoted if sentence not in spoken] == []
