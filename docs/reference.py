@@ -50,12 +50,12 @@ def parameters(root: Path) -> str:
 
 
 def parameter_classes(root: Path) -> Iterator[type]:
-    """Yield every dataclass with a field made by `param`, in the order of packages and files."""
-    for path in sorted(root.glob('src/*/texture_*/**/*.py')):
-        if 'param(' not in path.read_text(encoding='utf-8'):
+    """Yield every dataclass with a field made by `param`: by packages, in each the nodes first."""
+    paths = [path.relative_to(root / 'src') for path in root.glob('src/*/texture_*/**/*.py')]
+    for path in sorted(paths, key=lambda path: (path.parts[0], path.parent.name != 'nodes', path)):
+        if 'param(' not in (root / 'src' / path).read_text(encoding='utf-8'):
             continue
-        inside = path.relative_to(root / 'src' / path.relative_to(root / 'src').parts[0]).with_suffix('')
-        module = importlib.import_module('.'.join(inside.parts))
+        module = importlib.import_module('.'.join(path.with_suffix('').parts[1:]))
         for cls in vars(module).values():
             if inspect.isclass(cls) and cls.__module__ == module.__name__ and _has_parameters(cls):
                 yield cls

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
 import importlib
 import re
+import shlex
 import socket
 import subprocess
 import sys
@@ -15,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_bringup.command import COMMANDS
 from texture_core.exploration import ExplorationRequest
 from texture_core.parameters import parameters_of
 from texture_drivers.catalogue import SENSORS
@@ -179,3 +182,37 @@ def test_the_sentences_in_troubleshooting_are_those_of_the_programs() -> None:
     quoted = re.findall(r'^\| `([^`]+)`', (DOCS / 'troubleshooting.md').read_text(), re.MULTILINE)
     assert len(quoted) > 20
     assert [sentence for sentence in quoted if sentence not in spoken] == []
+
+
+def commands(start: str) -> list[tuple[str, str]]:
+    """Return the lines of the pages that begin with `start`, without comments, each with its page."""
+    pages = [ROOT / 'README.md', *DOCS.glob('**/*.md'), *ROOT.glob('src/*/README.md')]
+    line = re.compile(rf'^ *(?:\.venv/bin/)?({start} [^\n`|]*)$', re.MULTILINE)
+    found = [(page, match) for page in pages for match in line.findall(page.read_text())]
+    return sorted({(str(page.relative_to(ROOT)), re.sub(r'\s+#.*', '', match)) for page, match in found})
+
+
+@pytest.mark.parametrize(('page', 'line'), commands('texture'))
+def test_a_command_of_the_pages_has_the_arguments_that_it_takes(page: str, line: str) -> None:
+    _, name, *rest = shlex.split(line)
+    parser = argparse.ArgumentParser(exit_on_error=False)
+    module = importlib.import_module(f'texture_bringup.commands.{COMMANDS[name].module}')
+    module.configure(parser)
+    options = parser.parse_args(rest)
+    if name == 'launch':
+        given = [text for text in options.arguments if ':=' in text]
+        assert {text.split(':=')[0] for text in given} <= launch_arguments(options.file)
+
+
+def launch_arguments(name: str) -> set[str]:
+    """Return the arguments that a launch file of the suite declares, with those of the files it includes."""
+    text = (ROOT / 'src/texture_bringup/launch' / f'{name}.launch.xml').read_text()
+    own = set(re.findall(r'<arg name="(\w+)" default', text))
+    included = re.findall(r'<include file="\S+ texture_bringup\)/launch/(\w+)\.launch', text)
+    return own.union(*(launch_arguments(name) for name in included))
+
+
+@pytest.mark.parametrize(('page', 'line'), commands('ros2 run'))
+def test_a_node_of_the_pages_exists(page: str, line: str) -> None:
+    package, executable = line.split()[2:4]
+    assert (ROOT / 'src' / package / package / 'nodes' / f'{executable}.py').exists()
