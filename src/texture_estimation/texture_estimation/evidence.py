@@ -113,7 +113,7 @@ class Evidence:
             labels=model.labels,
             probabilities=tuple(probabilities.tolist()),
             certain=certain,
-            candidates=self._candidates(model, probabilities, worth) if certain or final else (),
+            candidates=self._candidates(model, probabilities, worth) if final else (),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
