@@ -86,6 +86,21 @@ def difficulty(chosen: dict[str, Any]) -> str:
     return f'The difficulty of the scene ({chosen["knob"]}) was set by {chosen["set_by"]}.\n' if chosen else ''
 
 
+def grades(root: Path) -> str:
+    """Return the mean error of roughness grades of the paper's heads and ours, on textures learnt and never felt."""
+    content = json.loads((root / CHARTS / 'roughness.json').read_text(encoding='utf-8'))
+    numbers = content['numbers']
+    rows = ['| head | paper: learnt | paper: unseen | here: learnt | here: unseen |', '|---|---|---|---|---|']
+    for head, figures in numbers['heads'].items():
+        told = numbers['paper'].get(head, {})
+        paper = [f'{told[kind]:.2f}' if told else '–' for kind in ('seen', 'unseen')]
+        here = [f'{figures[kind]["error"]:.2f}' for kind in ('seen', 'unseen')]
+        rows.append(f'| {" | ".join([head, *paper, *here])} |')
+    about = f'Mean absolute error in grades from 1 to 5. Data: {content["data"]}. Split: {content["split"]}.'
+    person = f'One person differs from the mean of the others by {numbers["one_person"]:.2f} (another study).'
+    return f'{about} {person}\n\n' + '\n'.join(rows) + '\n'
+
+
 def percent(share: float | list[float] | None) -> str:
     """Return a share in percent, with its interval if it has one."""
     if share is None:
