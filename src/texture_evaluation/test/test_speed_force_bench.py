@@ -26,6 +26,7 @@ def test_few_surfaces_are_recognised_at_speeds_and_forces_that_were_not_taught(t
     assert min(outcome['accuracy'] for outcome in known.values()) > 0.95
     assert min(outcome['accuracy'] for outcome in felt.values()) > 0.9
     assert textures['windows']['same distance']['accuracy'] > 0.85
+    assert textures['windows']['all distances, speed felt']['accuracy'] > 0.7
     assert fabrics['shares of the load, turn taken out']['one speed out']['accuracy'] > 0.9
     assert path.is_file()
     assert all(chart.is_file() for chart in result.charts)

@@ -146,7 +146,7 @@ class Ntp21:
         return run_chosen(trials, one_out(speed), [speed])
 
     def windows_without_speed(self) -> tuple[Outcome, dict[str, float]]:
-        """Return the same if the array feels the speed of each tested window, and its median error by that speed.
+        """Return the same if the array feels the speed, until the end of each tested window, and its median error.
 
         One model, taught windows of the distances of all speeds as if the array had mistaken them, by up to the error
         that 95 % of the training slides stay below in the window in their middle.
@@ -157,7 +157,7 @@ class Ntp21:
 
         def trial(train: Mask, test: Mask) -> Mask:
             array = self._array(train)
-            middle = [_felt(array, _cut(slides[number], None), middle=True) for number in np.flatnonzero(train)]
+            middle = [_felt(array, slides[number], middle=True) for number in np.flatnonzero(train)]
             most = float(np.quantile(np.abs(np.log(np.concatenate(middle))), SPANNED))
             factors = np.exp(np.linspace(-most, most, WINDOW_MISTAKES))
             taught = [(number, way) for number in np.flatnonzero(train) for way in distances]
@@ -166,7 +166,7 @@ class Ntp21:
             owners = np.tile(np.repeat([number for number, _ in taught], counts), WINDOW_MISTAKES)
             values = described(features, [_mistaken(cut, factor) for factor in factors for cut in cuts])
             tested = [_cut(slides[number], None) for number in np.flatnonzero(test)]
-            felt = [_felt(array, cut) for cut in tested]
+            felt = [_felt(array, slides[number]) for number in np.flatnonzero(test)]
             errors[f'{speed[test][0]:g}'] = round(float(np.median(np.abs(np.concatenate(felt) - 1.0))), 4)
             asked = described(features, [_mistaken(cut, ratio) for cut, ratio in zip(tested, felt, strict=True)])
             labels = np.repeat(surfaces[test], [len(cut.samples) for cut in tested])
@@ -219,11 +219,15 @@ def recipe_features(bands: int) -> list[Feature]:
     return [replace(item, bands=bands) if isinstance(item, MeanSpatialBands) else item for item in features]
 
 
-def _felt(array: ArraySpeed, windows: Windows, *, middle: bool = False) -> Array:
-    """Return the speed that the array feels in each window, or in the middle one alone, in that which it has."""
-    each = windows.samples[len(windows.samples) // 2 :][:1] if middle else windows.samples
-    felt = np.array([array(samples, windows.rate_hz, SPEEDS_M_S) for samples in each])
-    ratio: Array = felt / windows.speed_m_s[0]
+def _felt(array: ArraySpeed, slide: WholeSlide, *, middle: bool = False) -> Array:
+    """Return the speed that the array has felt until the end of each window of 0.59 s, in that which the slide has.
+
+    Of the window in the middle alone, if wanted.
+    """
+    windows = _cut(slide, None).samples
+    ends = windows.shape[1] + round(HOP_S * slide.rate_hz) * np.arange(len(windows))
+    asked = ends[len(ends) // 2 :][:1] if middle else ends
+    ratio: Array = np.array([array(slide.samples[:end], slide.rate_hz, SPEEDS_M_S) for end in asked]) / slide.speed_m_s
     return ratio
 
 
