@@ -4,7 +4,7 @@ RUN := .venv/bin/ros-run
 # Public recordings for evaluation, if they lie beside the repository or where the user says.
 export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
-.PHONY: setup demo test lint bench clean
+.PHONY: setup demo test lint bench docs clean
 
 setup:
 	@$(PYTHON) tools/workspace.py
@@ -22,6 +22,9 @@ test: setup lint
 
 bench: setup
 	@.venv/bin/texture bench all
+
+docs: setup
+	@$(RUN) python docs/build.py out/site
 
 clean:
 	rm -rf .venv build install log out .mypy_cache .ruff_cache .pytest_cache

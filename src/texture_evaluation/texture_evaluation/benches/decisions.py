@@ -141,7 +141,10 @@ def _charts(trials: dict[str, _Trial], out: Path) -> tuple[Path, ...]:
             out / 'decisions_early.png',
         ),
         line_chart(
-            {name: _reliability(trial.results) for name, trial in trials.items()},
+            {
+                **{name: _reliability(trial.results) for name, trial in trials.items()},
+                'as right as it says': (np.array([30.0, 100.0]), np.array([30.0, 100.0])),
+            },
             f'Confidence and how often it is right. {where}',
             ('mean confidence (%)', 'right (%)'),
             out / 'decisions_calibration.png',
