@@ -71,6 +71,8 @@ def operator(bench):
     with Operator('left', DOMAIN, bench.check) as operator:
         operator.wait_for_explorer(DEADLINE_S)
         operator.wait_for_signal(DEADLINE_S)
+        operator.wait_for_listeners(('features', 'roughness_features'), 1, bench.check)  # who names and who grades
+        operator.set_parameters('explorer', {'estimate_timeout_s': 10.0})  # this machine may be busy
         yield operator
 
 
