@@ -1,0 +1,154 @@
+import json
+
+import numpy as np
+import pytest
+
+from texture_bringup.dashboard.feed import BINS, POINTS, Feed
+from texture_bringup.dashboard.history import MOST_EXPLORATIONS, MOST_FRAMES, History
+from texture_bringup.dashboard.lights import MOST_LIGHTS, SILENT_S, Lights
+from texture_bringup.dashboard.motions import DEFAULTS, offered
+from texture_bringup.dashboard.ring import Ring, envelope, spectrum_db
+from texture_bringup.dashboard.taxels import places_of
+from texture_core.errors import MotionRefused
+from texture_core.estimates import RoughnessEstimate, TextureEstimate
+from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
+from texture_core.signal import TactileSignal
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import RANGES, SafetyLimits
+
+
+def batch(first, samples, rate_hz=1000.0, channels=('dynamic',)):
+    samples = np.asarray(samples, dtype=np.float32).reshape(-1, len(channels))
+    return TactileSignal(0, 'tsf85', channels, 'count', rate_hz, first, samples)
+
+
+def sliding(exploration_id, phase=Phase.SLIDE):
+    return ExplorationState(1, exploration_id, 'linear_slide', phase, speed_m_s=0.05, force_n=1.0, progress=0.5)
+
+
+def test_a_ring_keeps_the_newest_and_leaves_a_gap_where_samples_are_lost() -> None:
+    ring = Ring(0.01)
+    ring.update(batch(0, range(8)))
+    ring.update(batch(10, [10, 11, 12]))
+    np.testing.assert_array_equal(ring.newest(1.0), [3, 4, 5, 6, 7, np.nan, np.nan, 10, 11, 12])
+    assert ring.lost == 2
+
+
+def test_a_burst_longer_than_the_ring_and_an_endless_gap_take_no_more_memory() -> None:
+    ring = Ring(0.01)
+    ring.update(batch(0, range(50)))
+    np.testing.assert_array_equal(ring.newest(1.0), range(40, 50))
+    ring.update(batch(2**60, [7]))
+    assert ring.newest(1.0)[-1] == 7
+    assert len(ring.newest(1.0)) == 10
+
+
+def test_an_envelope_loses_no_peak() -> None:
+    samples = np.zeros(2000)
+    samples[[777, 1234]] = 5, -3
+    low, high = envelope(samples, 100)
+    assert (len(low), high.max(), low.min()) == (100, 5, -3)
+
+
+def test_a_sine_of_amplitude_one_is_a_line_of_zero_decibels() -> None:
+    levels = spectrum_db(np.sin(2 * np.pi * 125 * np.arange(512) / 1000), 128)
+    assert np.argmax(levels) == pytest.approx(128 * 125 / 500, abs=1)
+    assert levels.max() == pytest.approx(0.0, abs=0.1)
+
+
+def test_taxels_lie_where_their_names_say_else_in_a_square() -> None:
+    assert places_of(('taxel_0_0', 'taxel_6_3')) == [(0, 0), (6, 3)]
+    assert places_of(('a', 'b', 'c')) == [(0, 0), (0, 1), (1, 0)]
+    assert places_of(()) == []
+
+
+def test_taxels_are_shown_from_their_rest_and_a_touch_does_not_move_it() -> None:
+    feed = Feed()
+    feed.on_static(batch(0, [100.0, 50.0], 60.0, ('taxel_0_0', 'taxel_0_1')))
+    feed.on_state(sliding('a'))
+    for k in range(1, 200):
+        feed.on_static(batch(k, [130.0, 50.0], 60.0, ('taxel_0_0', 'taxel_0_1')))
+    assert json.loads(feed.frame(0.0))['taxels']['values'] == [30.0, 0.0]
+
+
+def test_an_empty_frame_is_json_without_nan() -> None:
+    frame = json.loads(Feed().frame(0.0), parse_constant=pytest.fail)
+    assert frame['state']['phase'] == 'idle'
+    assert frame['past'] == frame['lights'] == []
+
+
+def test_a_frame_shows_what_came_and_stays_small() -> None:
+    feed = Feed()
+    feed.on_signal(batch(0, np.random.default_rng(0).normal(size=5000)))
+    feed.on_state(sliding('a'))
+    feed.on_texture(TextureEstimate(2, 'a', 'felt', True, 0.9, ('cork', 'felt'), (0.1, 0.9), 4, 1.0))
+    feed.on_roughness(RoughnessEstimate(2, 'a', True, 3.25, 0.5))
+    text = feed.frame(0.0)
+    frame = json.loads(text)
+    assert (frame['texture']['labels'], frame['texture']['probabilities']) == (['felt', 'cork'], [0.9, 0.1])
+    assert (frame['roughness']['grade'], frame['state']['speed_m_s']) == (3.25, 0.05)
+    assert (len(frame['signal']['low']), len(frame['spectrum']['db'])) == (POINTS, BINS)
+    assert len(text) < 10_000
+
+
+def test_a_new_exploration_begins_without_evidence_and_a_late_estimate_enters_only_its_own_summary() -> None:
+    feed = Feed()
+    feed.on_state(sliding('a'))
+    feed.on_texture(TextureEstimate(2, 'a', 'felt', True, 0.6))
+    feed.on_state(sliding('b'))
+    feed.on_texture(TextureEstimate(3, 'a', 'cork', True, 0.9))
+    frame = json.loads(feed.frame(0.0))
+    assert frame['texture']['label'] == ''
+    assert [(past['id'], past.get('label')) for past in frame['past']] == [('b', None), ('a', 'cork')]
+
+
+def test_a_past_exploration_is_replayed_in_the_frames_that_were_shown() -> None:
+    feed = Feed()
+    for k in range(3):
+        feed.on_state(sliding('a'))
+        feed.on_texture(TextureEstimate(k, 'a', f'label{k}'))
+        feed.frame(0.0)
+    feed.on_state(sliding('a', Phase.DONE))
+    feed.frame(0.0)
+    replay = json.loads(feed.history.replay('a'))
+    assert [frame['texture']['label'] for frame in replay['frames'][:3]] == ['label0', 'label1', 'label2']
+    assert feed.history.replay('b') is None
+
+
+def test_the_history_is_bounded_however_many_and_however_long_the_explorations_are() -> None:
+    history = History()
+    for number in range(3 * MOST_EXPLORATIONS):
+        history.add(f'e{number}', {}, '{}')
+    for frame in range(5 * MOST_FRAMES):
+        history.add('long', {}, str(frame))
+    assert len(history.listed()) == MOST_EXPLORATIONS
+    replay = json.loads(history.replay('long'))
+    assert len(replay['frames']) <= MOST_FRAMES
+    assert set(np.diff(replay['frames'])) == {replay['stride']}
+
+
+def test_a_failing_node_and_a_silent_one_are_red() -> None:
+    lights = Lights()
+    lights.update('sensor', 'ERROR', 'unplugged', 0.0)
+    lights.update('explorer', 'OK', 'the arm answers', 0.0)
+    assert {light['name']: light['colour'] for light in lights.shown(1.0)} == {'sensor': 'red', 'explorer': 'green'}
+    assert {light['colour'] for light in lights.shown(SILENT_S + 1)} == {'red'}
+    for number in range(200):
+        lights.update(f'node{number}', 'OK', 'x' * 10_000, 2.0)
+    assert len(lights.shown(2.0)) == MOST_LIGHTS
+
+
+@pytest.mark.parametrize('motion', MOTIONS)
+@pytest.mark.parametrize('number', RANGES)
+def test_the_page_offers_each_motion_the_numbers_it_knows_with_its_defaults(motion, number) -> None:
+    def plan(request):
+        return MOTIONS[motion](request, (0.0, 0.0, 0.0), TouchParams(), SafetyLimits())
+
+    if number in DEFAULTS[motion]:
+        plan(ExplorationRequest(motion, **DEFAULTS[motion]))
+        bounds = {item['name']: item for item in offered(SafetyLimits())[motion]}[number]
+        assert bounds['low'] <= bounds['default'] <= bounds['high']
+    else:
+        with pytest.raises(MotionRefused, match=f'knows no {number}'):
+            plan(ExplorationRequest(motion, **{number: 1.0}))

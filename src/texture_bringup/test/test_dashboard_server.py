@@ -1,0 +1,204 @@
+import asyncio
+import json
+from pathlib import Path
+
+import pytest
+from aiohttp import WSMsgType
+from aiohttp.test_utils import TestClient, TestServer
+
+from texture_bringup.dashboard.access import Access
+from texture_bringup.dashboard.server import MOST_BODY_BYTES, MOST_MESSAGE_BYTES, MOST_VIEWERS, VIEWERS, make_app
+from texture_bringup.dashboard.serving import Serving
+from texture_core.errors import InvalidParameter, LaunchFailed, MotionRefused
+
+PAGE = Path(__file__).parents[1] / 'config' / 'dashboard'
+TOKEN = 'a-secret-of-24-characters'
+DEADLINE_S = 30.0
+
+
+class Nodes:
+    """What the page's buttons reach, without nodes."""
+
+    def __init__(self):
+        self.asked = []
+
+    async def explore(self, asked):
+        raise MotionRefused('speed_m_s is 9; allowed is 0.002 to 0.25 m/s')
+
+    async def stop(self, asked):
+        self.asked.append(asked)
+        return {'success': True, 'message': 'nothing is moving'}
+
+    learn = record = stop
+
+    async def offered(self):
+        return {'linear_slide': []}
+
+    def replay(self, exploration_id):
+        return '{"stride": 1, "frames": []}' if exploration_id == 'known' else None
+
+
+def with_client(story, access=Access('127.0.0.1')):  # noqa: B008
+    """Run a story against a server of its own."""
+
+    async def run():
+        nodes = Nodes()
+        async with TestClient(TestServer(make_app(nodes, access, PAGE))) as client:
+            return await asyncio.wait_for(story(client, nodes), DEADLINE_S)
+
+    return asyncio.run(run())
+
+
+async def post(client, name='stop', body='{}', **headers):
+    headers = {'Content-Type': 'application/json', **headers}
+    answer = await client.post(f'/api/{name}', data=body, headers=headers)
+    return answer.status, await answer.text()
+
+
+@pytest.mark.parametrize(
+    ('path', 'kind'), [('/', 'text/html'), ('/dashboard.js', 'text/javascript'), ('/dashboard.css', 'text/css')]
+)
+def test_the_page_is_served_and_may_load_nothing_from_elsewhere(path, kind) -> None:
+    async def story(client, _nodes):
+        answer = await client.get(path)
+        assert (answer.status, answer.content_type) == (200, kind)
+        assert answer.headers['Content-Security-Policy'].startswith("default-src 'none'")
+
+    with_client(story)
+
+
+@pytest.mark.parametrize(
+    'path', ['/none', '/../package.xml', '/%2e%2e/package.xml', '/api/past/unknown', '/api/explore']
+)
+def test_an_unknown_path_is_not_found(path) -> None:
+    async def story(client, _nodes):
+        answer = await client.get(path)
+        assert answer.status in (404, 405)
+        assert 'Content-Security-Policy' in answer.headers
+
+    with_client(story)
+
+
+def test_a_command_is_passed_on_and_a_refusal_is_told() -> None:
+    async def story(client, nodes):
+        assert (await post(client, body='{"on": true}'))[0] == 200
+        assert nodes.asked == [{'on': True}]
+        status, text = await post(client, 'explore')
+        assert (status, json.loads(text)['success']) == (409, False)
+        assert 'allowed is 0.002' in text
+        assert json.loads(await (await client.get('/api/motions')).text()) == {'linear_slide': []}
+        assert (await client.get('/api/past/known')).status == 200
+
+    with_client(story)
+
+
+@pytest.mark.parametrize(
+    ('body', 'headers', 'status'),
+    [
+        ('x' * (MOST_BODY_BYTES + 1), {}, 413),
+        ('{', {}, 400),
+        ('[]', {}, 400),
+        ('{}', {'Content-Type': 'text/plain'}, 415),
+        ('{}', {'Origin': 'http://evil.example'}, 403),
+        ('{}', {'Origin': 'null'}, 403),
+        ('{}', {'Host': 'evil.example'}, 403),
+        ('{}', {'Host': '192.0.2.1:8085'}, 403),
+        ('{}', {'Host': '['}, 403),
+    ],
+)
+def test_a_request_that_is_too_large_broken_or_of_another_page_is_refused_and_reaches_no_node(
+    body, headers, status
+) -> None:
+    async def story(client, nodes):
+        assert (await post(client, body=body, **headers))[0] == status
+        assert nodes.asked == []
+
+    with_client(story)
+
+
+def test_the_web_socket_sends_the_newest_frame_and_is_closed_to_other_pages() -> None:
+    async def story(client, _nodes):
+        async with client.ws_connect('/ws') as socket:
+            client.app[VIEWERS].show('{"number": 1}')
+            assert await socket.receive_json() == {'number': 1}
+        answer = await client.get('/ws', headers={'Origin': 'http://evil.example', 'Upgrade': 'websocket'})
+        assert answer.status == 403
+
+    with_client(story)
+
+
+def test_an_oversized_message_closes_its_own_socket_alone() -> None:
+    async def story(client, _nodes):
+        async with client.ws_connect('/ws') as talker, client.ws_connect('/ws') as listener:
+            await talker.send_str('x' * (MOST_MESSAGE_BYTES + 1))
+            closed = await talker.receive()
+            assert (closed.type, closed.data) == (WSMsgType.CLOSE, 1009)
+            client.app[VIEWERS].show('{}')
+            assert await listener.receive_json() == {}
+
+    with_client(story)
+
+
+def test_a_page_that_does_not_read_misses_frames_and_keeps_nobody_waiting() -> None:
+    async def story(client, _nodes):
+        async with client.ws_connect('/ws') as slow, client.ws_connect('/ws') as quick:
+            for number in range(200):
+                client.app[VIEWERS].show(json.dumps({'number': number, 'rest': 'x' * 100_000}))
+                await asyncio.sleep(0)
+            while (await quick.receive_json())['number'] < 199:
+                pass
+            assert not slow.closed
+
+    with_client(story)
+
+
+def test_only_so_many_pages_are_open_at_once() -> None:
+    async def story(client, _nodes):
+        sockets = [await client.ws_connect('/ws') for _ in range(MOST_VIEWERS)]
+        assert (await client.get('/ws')).status == 503
+        for socket in sockets:
+            await socket.close()
+
+    with_client(story)
+
+
+def test_beyond_loopback_the_token_is_needed_once_and_then_a_cookie_carries_it() -> None:
+    async def story(client, nodes):
+        assert (await client.get('/')).status == 401
+        assert (await client.get('/ws')).status == 401
+        assert (await client.get('/', params={'token': 'wrong' * 6})).status == 401
+        assert (await client.get('/', params={'token': 'ä'})).status == 401
+        assert (await post(client))[0] == 401
+        answer = await client.get('/', params={'token': TOKEN}, allow_redirects=False)
+        assert (answer.status, answer.headers['Location']) == (303, '/')
+        assert 'HttpOnly' in answer.headers['Set-Cookie']
+        assert 'SameSite=Strict' in answer.headers['Set-Cookie']
+        assert nodes.asked == []
+        assert (await post(client, Authorization=f'Bearer {TOKEN}'))[0] == 200
+        assert (await post(client, Cookie=f'texture_token={TOKEN}'))[0] == 200
+
+    with_client(story, Access('0.0.0.0', TOKEN, ('robot',)))
+
+
+def test_names_and_addresses_of_this_machine_are_known() -> None:
+    open_access, closed = Access('0.0.0.0', TOKEN, ('robot',)), Access('127.0.0.1')
+    assert all(open_access.is_our_host(host) for host in ('robot:8085', '192.0.2.7', '[::1]:8085', 'localhost'))
+    assert not any(open_access.is_our_host(host) for host in ('evil.example', 'robot.evil.example', ''))
+    assert closed.is_our_host('[::1]:8085')
+    assert not closed.is_our_host('robot')
+
+
+@pytest.mark.parametrize('token', ['', 'short'])
+def test_beyond_loopback_there_is_no_page_without_a_good_token(token) -> None:
+    with pytest.raises(InvalidParameter, match='at least 16'):
+        Access('0.0.0.0', token)
+
+
+def test_a_port_in_use_is_told_and_nothing_is_left_running() -> None:
+    first = Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', 0)
+    try:
+        with pytest.raises(LaunchFailed, match='choose another port'):
+            Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', first.port)
+        first.show('{}')
+    finally:
+        first.close()

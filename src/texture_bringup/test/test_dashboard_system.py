@@ -1,0 +1,216 @@
+"""The dashboard as an operator meets it: the emulated bench, and the page in a real browser.
+
+Where no Chromium is installed the same story runs over the page's own requests and WebSocket, and a warning says so.
+"""
+
+import asyncio
+import json
+import os
+import re
+import shutil
+import socket
+import time
+import urllib.request
+import warnings
+from contextlib import contextmanager
+
+import aiohttp
+import numpy as np
+import pytest
+from playwright.sync_api import expect, sync_playwright
+
+pytestmark = pytest.mark.ros
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from texture_bringup.demo.isolation import free_port  # noqa: E402
+from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
+from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
+from texture_evaluation.train import train_from_bags  # noqa: E402
+
+DOMAIN = 90
+DEADLINE_S = 90.0
+SURFACES = ('glass', 'ridge_2mm_deep')
+CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'google-chrome'))), None)
+# Slow enough that there is time to press stop on a busy machine.
+LONG = {'motion': 'linear_slide', 'speed_m_s': 0.005, 'force_n': 1.0, 'distance_m': 0.15}
+SHORT = {'motion': 'linear_slide', 'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.08}
+
+
+class Browser:
+    """The page in headless Chromium."""
+
+    def __init__(self, page, address):
+        self.page = page
+        page.goto(address)
+        expect(page.locator('#numbers input')).to_have_count(3)
+        expect(page.locator('#lights li', has_text='explorer')).to_have_class('green')
+
+    def explore(self, request):
+        for name, value in request.items():
+            if name == 'motion':
+                self.page.select_option('#motion', value)
+            else:
+                self.page.fill(f'#numbers input[name={name}]', str(value))
+        self.page.click('#go')
+
+    def wait_for_estimate(self, label):
+        expect(self.page.locator('#label[data-final=true]')).to_have_text(label)
+        expect(self.page.locator('#evidence .bar').first).to_contain_text(label)
+
+    def wait_for_said(self, text):
+        expect(self.page.locator('#banner')).to_contain_text(text)
+
+    def wait_for_phase(self, phase):
+        expect(self.page.locator('#phase')).to_have_text(phase)
+
+    def wait_for_past(self, phase):
+        expect(self.page.locator('#past li').first).to_contain_text(phase)
+
+    def stop(self):
+        self.page.click('#stop')
+
+    def replay_newest(self):
+        self.page.locator('#past button').first.click()
+        self.wait_for_said('replayed')
+
+
+class Wire:
+    """The requests that the page would send, without a browser."""
+
+    def __init__(self, address):
+        self._address = address
+        self._answers = []
+
+    def _post(self, name, body):
+        request = urllib.request.Request(
+            f'{self._address}api/{name}', json.dumps(body).encode(), {'Content-Type': 'application/json'}
+        )
+        with urllib.request.urlopen(request, timeout=DEADLINE_S) as answer:
+            return json.load(answer)['message']
+
+    def _until(self, condition):
+        async def watch():
+            async with aiohttp.ClientSession() as session, session.ws_connect(f'{self._address}ws') as frames:
+                async for frame in frames:
+                    if condition(json.loads(frame.data)):
+                        return
+
+        asyncio.run(asyncio.wait_for(watch(), DEADLINE_S))
+
+    def explore(self, request):
+        loop = asyncio.new_event_loop()
+        self._answers.append(loop.run_in_executor(None, self._post, 'explore', request))
+        self._loop = loop
+
+    def wait_for_estimate(self, label):
+        self._until(lambda frame: frame['texture']['final'] and frame['texture']['label'] == label)
+
+    def wait_for_said(self, text):
+        assert text in self._loop.run_until_complete(self._answers.pop())
+
+    def wait_for_phase(self, phase):
+        self._until(lambda frame: frame['state']['phase'] == phase)
+
+    def wait_for_past(self, phase):
+        self._until(lambda frame: frame['past'][0]['phase'] == phase)
+
+    def stop(self):
+        assert 'lifted' in self._post('stop', {})
+
+    def replay_newest(self):
+        frames = []
+        self._until(lambda frame: frames.append(frame) or True)
+        with urllib.request.urlopen(f'{self._address}api/past/{frames[0]["past"][0]["id"]}') as answer:
+            assert json.load(answer)['frames']
+
+
+def free_tcp_port():
+    with socket.socket() as probe:
+        probe.bind(('127.0.0.1', 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp('dashboard')
+
+
+@pytest.fixture(scope='module')
+def address(folder):
+    """Return the address of the page of a bench that knows two surfaces."""
+    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
+    bags = write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=SURFACES)
+    train_from_bags('default', bags, out=folder / 'model')
+    port = free_tcp_port()
+    given = {
+        'device': folder / 'tsf85',
+        'finger_port': free_port(),
+        'surface': SURFACES[1],
+        'model': folder / 'model.skops',
+    }
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
+    page = {'dashboard': 'true', 'dashboard_port': port}
+    with ChildLauncher('bench', {**given, **page}, environment, folder / 'nodes.log') as launcher:
+        wait_for_page(f'http://127.0.0.1:{port}/', launcher)
+        yield f'http://127.0.0.1:{port}/'
+
+
+def wait_for_page(address, launcher):
+    deadline = time.monotonic() + DEADLINE_S
+    while True:
+        launcher.check()
+        try:
+            urllib.request.urlopen(address, timeout=5.0).close()
+        except OSError:
+            assert time.monotonic() < deadline
+            time.sleep(0.2)
+        else:
+            return
+
+
+@contextmanager
+def opened(address, **context):
+    """Open the page in Chromium; fail on any error of its script."""
+    with sync_playwright() as playwright:
+        # The sandbox of Chromium does not run as root, nor in many containers; the page is our own.
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=['--no-sandbox', '--disable-gpu'])
+        expect.set_options(timeout=DEADLINE_S * 1000)
+        try:
+            page = browser.new_page(**context)
+            page.set_default_timeout(DEADLINE_S * 1000)
+            errors = []
+            page.on('pageerror', lambda error: errors.append(str(error)))
+            page.on('console', lambda told: errors.append(told.text) if told.type == 'error' else None)
+            yield Browser(page, address)
+            assert not errors, errors
+        finally:
+            browser.close()
+
+
+@contextmanager
+def operating(address):
+    if CHROMIUM:
+        with opened(address) as browser:
+            yield browser
+    else:
+        warnings.warn('no Chromium: the page itself is not tested, only what it asks for', stacklevel=1)
+        yield Wire(address)
+
+
+def test_an_operator_explores_sees_the_estimate_and_stops_the_next_exploration(address) -> None:
+    with operating(address) as operator:
+        operator.explore(SHORT)
+        operator.wait_for_estimate(SURFACES[1])
+        operator.wait_for_said('ended as asked')
+        operator.explore(LONG)
+        operator.wait_for_phase('slide')
+        operator.stop()
+        operator.wait_for_past('aborted')
+        operator.replay_newest()
+
+
+def test_the_page_needs_nothing_from_elsewhere(address) -> None:
+    for path in ('', 'dashboard.js', 'dashboard.css'):
+        with urllib.request.urlopen(address + path, timeout=DEADLINE_S) as answer:
+            assert "default-src 'none'" in answer.headers['Content-Security-Policy']
+            assert not re.search(r'https?://|//\w+\.\w', answer.read().decode().replace("https:'", ''))

@@ -1,0 +1,31 @@
+"""`texture dashboard`: a web page of what is felt, with buttons to explore, stop, teach and record."""
+
+from __future__ import annotations
+
+import argparse
+
+from texture_bringup.nodes.dashboard import TOKEN_VARIABLE, Dashboard, DashboardParams
+from texture_bringup.ros.run_node import run_node
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the sub-command."""
+    default = DashboardParams()
+    parser.add_argument(
+        '--host',
+        default=default.host,
+        help=f'address to listen on (default {default.host}); beyond loopback the page needs the token that is '
+        f'printed, or the one in {TOKEN_VARIABLE}',
+    )
+    parser.add_argument(
+        '--port', type=int, default=default.port, help=f'port (default {default.port}); 0: any that is free'
+    )
+    parser.add_argument('--recordings', default=default.recordings, help='folder for new bags')
+    parser.add_argument('--namespace', default='', help='namespace of the nodes')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Serve until Ctrl-C."""
+    parameters = {'host': options.host, 'port': options.port, 'recordings': options.recordings}
+    run_node(Dashboard, parameters, options.namespace)
+    return 0

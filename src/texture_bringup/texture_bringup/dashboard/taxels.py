@@ -1,0 +1,54 @@
+"""The image of the slow channels: how far each is from where it rested, and where it lies."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.signal import TactileSignal
+
+PLACE = re.compile(r'.*_(\d+)_(\d+)')  # 'taxel_6_3': row and column
+MOST_CHANNELS = 1024
+RESTING_SHARE = 0.05  # of a batch in the resting value: follows a drift of seconds, not a touch
+
+
+class Taxels:
+    """Keep the newest image and the resting one."""
+
+    def __init__(self) -> None:
+        self.channels: tuple[str, ...] = ()
+        self.places: list[tuple[int, int]] = []
+        self.unit = ''
+        self._resting: NDArray[np.float64] = np.zeros(0)
+        self._newest: NDArray[np.float64] = np.zeros(0)
+
+    def update(self, signal: TactileSignal, touching: bool) -> None:
+        """Take the newest sample; while nothing is touched it moves the resting image."""
+        newest = signal.samples[-1:, :MOST_CHANNELS].astype(np.float64)
+        if not len(newest):
+            return
+        if signal.channels[:MOST_CHANNELS] != self.channels:
+            self.channels, self.unit = signal.channels[:MOST_CHANNELS], signal.unit
+            self.places = places_of(self.channels)
+            self._resting = newest[0]
+        self._newest = newest[0]
+        if not touching:
+            known = np.where(np.isfinite(self._resting), self._resting, self._newest)
+            step = np.nan_to_num(self._newest - known)
+            self._resting = known + RESTING_SHARE * step
+
+    @property
+    def image(self) -> NDArray[np.float64]:
+        """How far each channel is from its resting value, (n_channels,)."""
+        return self._newest - self._resting
+
+
+def places_of(channels: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Return row and column of each channel: as its name tells, else line by line in a square."""
+    named = [PLACE.fullmatch(channel) for channel in channels]
+    if named and all(named):
+        return [(int(match[1]), int(match[2])) for match in named if match]
+    columns = int(np.ceil(np.sqrt(len(channels)))) or 1
+    return [divmod(number, columns) for number in range(len(channels))]
