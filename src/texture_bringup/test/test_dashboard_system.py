@@ -29,6 +29,7 @@ from texture_evaluation.train import train_from_bags  # noqa: E402
 
 DOMAIN = 90
 DEADLINE_S = 90.0
+NODES = {'bench', 'sensor', 'explorer', 'feature_extractor', 'classifier', 'dashboard'}
 SURFACES = ('glass', 'ridge_2mm_deep')
 CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'google-chrome'))), None)
 # Slow enough that there is time to press stop on a busy machine.
@@ -43,7 +44,7 @@ class Browser:
         self.page = page
         page.goto(address)
         expect(page.locator('#numbers input')).to_have_count(3)
-        expect(page.locator('#lights li', has_text='explorer')).to_have_class('green')
+        expect(page.locator('#lights li.green')).to_have_count(len(NODES))
 
     def explore(self, request):
         for name, value in request.items():
@@ -80,6 +81,7 @@ class Wire:
     def __init__(self, address):
         self._address = address
         self._answers = []
+        self._until(lambda frame: {light['name'] for light in frame['lights'] if light['colour'] == 'green'} == NODES)
 
     def _post(self, name, body):
         request = urllib.request.Request(

@@ -7,7 +7,7 @@ import os
 import secrets
 import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from datetime import datetime
 from functools import partial
@@ -42,6 +42,7 @@ from texture_exploration.safety import SafetyLimits
 TOKEN_VARIABLE = 'TEXTURE_DASHBOARD_TOKEN'
 ANSWER_DEADLINE_S = 30.0
 ASKED_AGAIN_S = 2.0
+FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
 GONE_S = 10.0  # so long the explorer may be away before an exploration is given up
 MOST_CHARACTERS = 200
 LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
@@ -89,8 +90,7 @@ class Dashboard(Node):
         if 'motion' not in asked:
             raise InvalidParameter('no motion is asked for; give its name as `motion`')
         request = from_mapping(ExplorationRequest, {name: _short(value) for name, value in asked.items()})
-        if not self._explorer.server_is_ready():
-            raise LaunchFailed('no explorer answers; is it running?')
+        await _ready(self._explorer.server_is_ready, 'explorer')
         goal = await _answer(self._explorer.send_goal_async(request_to_msg(request)), ANSWER_DEADLINE_S)
         ending = goal.get_result_async()
         seen_s = time.monotonic()
@@ -183,8 +183,7 @@ class Dashboard(Node):
         return level, self._trouble or 'the page is served', {'bad_messages': self._bad}
 
     async def _ask(self, client: Any, request: Any, node: str) -> Mapping[str, Any]:
-        if not client.service_is_ready():
-            raise LaunchFailed(f'no {node} answers; is it running?')
+        await _ready(client.service_is_ready, node)
         answer = await _answer(client.call_async(request), ANSWER_DEADLINE_S)
         return {'success': answer.success, 'message': answer.message}
 
@@ -219,6 +218,21 @@ class Dashboard(Node):
             recorder.check()
         except LaunchFailed as error:
             self._recorder, self._feed.recording, self._trouble = None, '', str(error)
+
+
+async def _ready(is_ready: Callable[[], bool], node: str) -> None:
+    """Wait until a node can be asked: one that has just started is found a moment later.
+
+    Raises
+    ------
+    LaunchFailed
+        If it is not there in time.
+    """
+    deadline_s = time.monotonic() + FOUND_DEADLINE_S
+    while not is_ready():
+        if time.monotonic() > deadline_s:
+            raise LaunchFailed(f'no {node} answers; is it running?')
+        await asyncio.sleep(FOUND_STEP_S)
 
 
 async def _answer(future: Future, deadline_s: float) -> Any:
