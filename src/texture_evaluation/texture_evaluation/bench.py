@@ -18,6 +18,7 @@ from texture_evaluation.benches import (
     motion,
     optimise,
     recipes,
+    robustness,
     roughness,
     scenes,
     segmentation,
@@ -35,6 +36,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'decisions': decisions.run,  # early decisions, calibration, candidates and unknown surfaces, recorded
     'speed_force': speed_force.run,  # speeds, forces and directions that were not taught, recorded
     'roughness': roughness.run,  # from window to grade
+    'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
     'optimise': optimise.run,  # genetic searches of the papers' size: time, convergence, front
     'learning': learning.run,  # taught slide by slide against trained anew on the same slides
     'clock': clock.run,  # stamps in spite of late arrivals and drift
