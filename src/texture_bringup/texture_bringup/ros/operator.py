@@ -29,6 +29,8 @@ CANCEL_DEADLINE_S = 10.0
 LISTENERS_DEADLINE_S = 60.0
 # So long the explorer may be away; meanwhile `guard` can tell why.
 GONE_S = 10.0
+# So long it may say nothing although it is there; it waits for the last estimates for a minute at most.
+SILENT_S = 75.0
 # What this process sees, the other processes see soon after.
 DISCOVERY_S = 1.0
 Progress = Callable[[ExplorationState, TextureEstimate], None]
@@ -68,6 +70,7 @@ class Operator:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._explore = ActionClient(self._node, action.Explore, 'explore')
+        self._heard_s = 0.0
 
     def __enter__(self) -> Operator:
         return self
@@ -127,10 +130,11 @@ class Operator:
         Raises
         ------
         MotionAborted
-            If the explorer vanishes meanwhile.
+            If the explorer vanishes meanwhile, or says nothing any more.
         """
 
         def on_feedback(message: Any) -> None:
+            self._heard_s = time.monotonic()
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
         goal = self._result(self._explore.send_goal_async(request_to_msg(request), on_feedback))
@@ -204,13 +208,17 @@ class Operator:
 
     def _result(self, future: Future) -> Any:
         """Return the result of a future that the explorer or another node answers."""
-        seen_s = time.monotonic()
+        seen_s = self._heard_s = time.monotonic()
         while not future.done():
             self._step()
             if self._explore.server_is_ready():
                 seen_s = time.monotonic()
             elif time.monotonic() - seen_s > GONE_S:
                 raise MotionAborted('the explorer has vanished; look at its output')
+            if time.monotonic() - self._heard_s > SILENT_S:
+                raise MotionAborted(
+                    f'no answer for {SILENT_S:g} s, though an explorer is there; stop it, and see that there is only one'
+                )
         return future.result()
 
     def _until(self, condition: Callable[[], bool], deadline_s: float, complaint: str) -> None:

@@ -1,0 +1,51 @@
+import os
+import threading
+
+import pytest
+from rclpy.action import ActionServer
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor
+from rclpy.node import Node
+from texture_msgs import action
+
+from texture_bringup.ros import operator as operators
+from texture_core.errors import MotionAborted
+from texture_core.exploration import ExplorationRequest
+
+pytestmark = pytest.mark.ros
+DOMAIN = 62
+
+
+@pytest.fixture
+def silent_explorer():
+    """An explorer that takes a goal and never answers."""
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    context, over = Context(), threading.Event()
+    context.init(domain_id=DOMAIN)
+    node = Node('explorer', context=context)
+
+    def hang(goal):
+        over.wait(60.0)
+        goal.abort()
+        return action.Explore.Result()
+
+    server = ActionServer(node, action.Explore, 'explore', hang)
+    executor = MultiThreadedExecutor(2, context=context)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin)
+    thread.start()
+    yield
+    over.set()
+    executor.shutdown()
+    thread.join(10.0)
+    server.destroy()
+    node.destroy_node()
+    context.try_shutdown()
+
+
+def test_an_explorer_that_is_there_and_says_nothing_is_not_waited_for_for_ever(silent_explorer, monkeypatch):
+    monkeypatch.setattr(operators, 'SILENT_S', 1.0)
+    with operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        with pytest.raises(MotionAborted, match='no answer for 1 s'):
+            operator.explore(ExplorationRequest('linear_slide'))
