@@ -217,7 +217,7 @@ class Operator:
                 raise MotionAborted('the explorer has vanished; look at its output')
             if time.monotonic() - self._heard_s > SILENT_S:
                 raise MotionAborted(
-                    f'no answer for {SILENT_S:g} s, though an explorer is there; stop it, and see that there is only one'
+                    f'no answer for {SILENT_S:g} s, though there is an explorer; stop it, and see that it is alone'
                 )
         return future.result()
 
