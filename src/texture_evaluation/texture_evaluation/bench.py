@@ -16,6 +16,7 @@ from texture_evaluation.benches import (
     learning,
     load,
     motion,
+    next_motion,
     optimise,
     recipes,
     robustness,
@@ -45,6 +46,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'features': features.run,  # cost of each feature, one window at a time and many at once
     'segmentation': segmentation.run,  # start and end of sliding, found from the signals alone
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
+    'next_motion': next_motion.run,  # slides needed with motions chosen for what they tell, simulated
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene is worth
     'stick_slip': stick_slip.run,  # cost, error and longest step of simulated friction
 }
