@@ -25,7 +25,10 @@ VALUES = [
     ('signal', signal()),
     ('exploration', ExplorationState(STAMP_NS, 'e1', 'linear_slide', Phase.SLIDE, 0.5, 0.1, 2.0, surface='cork')),
     ('features', FeatureVector(STAMP_NS, 'e1', 0.5, 0.1, ('f', 'g'), np.array([1.5, math.nan]), feature_set='abc')),
-    ('texture', TextureEstimate(STAMP_NS, 'e1', 'cork', True, 0.9, ('cork', 'felt'), (0.9, 0.1), 3, 0.7)),
+    (
+        'texture',
+        TextureEstimate(STAMP_NS, 'e1', 'cork', True, 0.9, ('cork', 'felt'), (0.9, 0.1), True, ('cork',), 3, 0.7),
+    ),
     ('roughness', RoughnessEstimate(STAMP_NS, 'e1', True, 3.5, 0.4)),
 ]
 
