@@ -20,13 +20,14 @@ DOMAIN = 62
 def silent_explorer():
     """An explorer that takes a goal and never answers."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    context, over = Context(), threading.Event()
+    context, over, left = Context(), threading.Event(), threading.Event()
     context.init(domain_id=DOMAIN)
     node = Node('explorer', context=context)
 
     def hang(goal):
         over.wait(60.0)
         goal.abort()
+        executor.create_task(left.set)  # after what this answer asks of the executor
         return action.Explore.Result()
 
     server = ActionServer(node, action.Explore, 'explore', hang)
@@ -36,6 +37,7 @@ def silent_explorer():
     thread.start()
     yield
     over.set()
+    left.wait(10.0)
     executor.shutdown()
     thread.join(10.0)
     server.destroy()
