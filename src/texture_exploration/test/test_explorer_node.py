@@ -207,7 +207,7 @@ def test_a_refused_goal_ends_aborted_with_a_sentence(world):
 
 
 def cork(state, **values):
-    known = {'label': 'cork', 'known': True, 'confidence': 0.99, 'windows': 5}
+    known = {'label': 'cork', 'known': True, 'confidence': 0.99, 'certain': True, 'windows': 5}
     return TextureEstimate(to_ns(state.header.stamp), state.exploration_id, **{**known, **values})
 
 
