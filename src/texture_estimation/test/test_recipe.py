@@ -1,8 +1,9 @@
 import pytest
 
-from texture_core.errors import TextureError
+from texture_core.errors import InvalidParameter, TextureError
 from texture_core.resources import folder
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.roughness.recipe import RoughnessRecipe
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 INPUTS = {'inputs': {'signal': {'features': ['hjorth']}}}
@@ -42,3 +43,9 @@ def test_a_wrong_recipe_gets_one_sentence_that_says_where(more, sentence):
         Recipe.from_mapping({**INPUTS, **more}, 'mine')
     assert "recipe 'mine'" in str(caught.value)
     assert '\n' not in str(caught.value)
+
+
+def test_what_rules_decisions_about_textures_is_no_parameter_of_a_roughness_recipe():
+    assert RoughnessRecipe.from_mapping({**INPUTS, 'training': {'folds': 5}}, 'mine').training.folds == 5
+    with pytest.raises(InvalidParameter, match='false_rejections'):
+        RoughnessRecipe.from_mapping({**INPUTS, 'training': {'false_rejections': 0.1}}, 'mine')

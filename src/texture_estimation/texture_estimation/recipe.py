@@ -23,7 +23,7 @@ KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
 
 @dataclass(frozen=True)
 class TrainingParams:
-    """How the examples for training are cut, and how rarely decisions made with them may err."""
+    """How the examples for training are cut."""
 
     hop_s: float = param(
         0.25,
@@ -32,6 +32,12 @@ class TrainingParams:
         low=0.001,
         high=60.0,
     )
+
+
+@dataclass(frozen=True)
+class DecisionParams(TrainingParams):
+    """How the examples for training are cut, how they count, and how rarely decisions made with them may err."""
+
     start_weight: int = param(
         1, 'How often the windows at the start of a slide count: friction and sensor settle there.', low=1, high=100
     )
@@ -59,7 +65,7 @@ class Recipe:
     learner: Learner
     evidence_name: str
     evidence: EvidenceRule
-    training: TrainingParams = dataclasses.field(default_factory=TrainingParams)
+    training: DecisionParams = dataclasses.field(default_factory=DecisionParams)
     description: str = ''
 
     @property
@@ -87,7 +93,7 @@ class Recipe:
             FeatureSet.from_mapping(content, where),
             *learner,
             *evidence,
-            from_mapping(TrainingParams, content.get('training') or {}, f'{where}, training'),
+            from_mapping(DecisionParams, content.get('training') or {}, f'{where}, training'),
             str(content.get('description', '')),
         )
 
