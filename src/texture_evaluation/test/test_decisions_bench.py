@@ -2,6 +2,7 @@ import os
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from texture_evaluation.bench import run_bench
 from texture_evaluation.benches.result import Bench
@@ -9,6 +10,7 @@ from texture_evaluation.benches.result import Bench
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 
 
+@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 def test_decisions_on_a_few_recorded_slides_are_told_in_figures_and_charts(tmp_path: Path) -> None:
     result, path = run_bench('decisions', Bench(out=tmp_path, quick=True, data=DATA))
     assert path.is_file()
