@@ -6,7 +6,6 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from texture_core.errors import InvalidData
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import confusion_chart, evidence_chart
@@ -22,11 +21,7 @@ QUICK_MATERIALS = ('material01', 'material02', 'material03')
 
 def run(bench: Bench) -> BenchResult:
     """Train on the first 30 slides of each material, test on the last 10."""
-    source = bench.data / 'biotac20' if bench.data else None
-    if source is None or not source.is_dir():
-        raise InvalidData(
-            f"no recorded data in '{source or 'no folder'}'; give the folder that holds biotac20/ with --data"
-        )
+    [source] = bench.recordings('biotac20')
     with tempfile.TemporaryDirectory() as folder:
         bags = import_biotac20(source, Path(folder), materials=QUICK_MATERIALS if bench.quick else ())
         reports = {recipe: _report(recipe, bags) for recipe in RECIPES}

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from texture_core.arrays import AnyArray, Array
-from texture_core.errors import InvalidData
 from texture_estimation.familiarity import WORTHS, Familiarity
 from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.model import Model
@@ -53,11 +52,7 @@ class _Trial:
 
 def run(bench: Bench) -> BenchResult:
     """Train on the first 30 slides of each material, decide about the last 10; leave materials out in several draws."""
-    source = bench.data / 'biotac20' if bench.data else None
-    if source is None or not source.is_dir():
-        raise InvalidData(
-            f"no recorded data in '{source or 'no folder'}'; give the folder that holds biotac20/ with --data"
-        )
+    [source] = bench.recordings('biotac20')
     with tempfile.TemporaryDirectory() as folder:
         slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if bench.quick else ('', ())
         bags = import_biotac20(source, Path(folder), slides, materials)

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_core.errors import InvalidData
 from texture_estimation.recipe import load_recipe
 from texture_evaluation import metrics
 from texture_evaluation.benches.recipes import DATA, RATE_HZ, VIBRATION, biotac20_settings
@@ -43,11 +42,8 @@ class _Point(NamedTuple):
 
 def run(bench: Bench) -> BenchResult:
     """Try recipes with windows of many lengths on recorded slides, and learners with trainings of many sizes."""
-    if not bench.data or not (bench.data / 'biotac20').is_dir():
-        raise InvalidData(
-            f"no recorded data in '{bench.data or 'no folder'}'; give the folder of biotac20/ with --data"
-        )
-    setting = biotac20_settings(bench.data / 'biotac20', bench)[VIBRATION]
+    [source] = bench.recordings('biotac20')
+    setting = biotac20_settings(source, bench)[VIBRATION]
     points = _points(setting.recorded, setting.splits['by time'], bench.quick)
     sizes = _sizes(bench)
     return BenchResult(

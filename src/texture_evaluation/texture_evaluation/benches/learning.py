@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_core.errors import InvalidData
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.benches.result import Bench, BenchResult
@@ -30,11 +29,7 @@ TARGETS = {'lesson_ms': 50.0, 'behind_training_points': 3.0}
 
 def run(bench: Bench) -> BenchResult:
     """Train on 15 materials, teach 5 more, test on later slides of all; several draws of the five."""
-    source = bench.data / 'biotac20' if bench.data else None
-    if source is None or not source.is_dir():
-        raise InvalidData(
-            f"no recorded data in '{source or 'no folder'}'; give the folder that holds biotac20/ with --data"
-        )
+    [source] = bench.recordings('biotac20')
     recipe = _recipe()
     stages, taught = (QUICK_STAGES, QUICK_TAUGHT) if bench.quick else (STAGES, TAUGHT)
     with tempfile.TemporaryDirectory() as folder:

@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from texture_core.errors import InvalidData
+
 CPU_INFO = Path('/proc/cpuinfo')
 
 
@@ -36,6 +38,22 @@ class Bench:
     seed: int = 0
     quick: bool = False
     duration_s: float = 30.0
+
+    def recordings(self, name: str, *more: str) -> list[Path]:
+        """Return the folders of recorded data sets, by the names of these.
+
+        Raises
+        ------
+        InvalidData
+            If one of them is missing.
+        """
+        folders = [self.data / each for each in (name, *more)] if self.data else []
+        if not folders or not all(folder.is_dir() for folder in folders):
+            wanted = ' and '.join(f'{each}/' for each in (name, *more))
+            raise InvalidData(
+                f"no recorded data in '{self.data or 'no folder'}'; give the folder that holds {wanted} with --data"
+            )
+        return folders
 
 
 @dataclass(frozen=True)

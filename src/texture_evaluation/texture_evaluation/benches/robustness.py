@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.errors import InvalidData
 from texture_core.signal import TactileSignal
 from texture_estimation.model import Model
 from texture_estimation.recipe import Recipe
@@ -41,11 +40,8 @@ class _Trained:
 
 def run(bench: Bench) -> BenchResult:
     """Train recipes on clean slides and test them on degraded ones."""
-    if not bench.data or not (bench.data / 'biotac20').is_dir():
-        raise InvalidData(
-            f"no recorded data in '{bench.data or 'no folder'}'; give the folder of biotac20/ with --data"
-        )
-    setting = biotac20_settings(bench.data / 'biotac20', bench)[VIBRATION]
+    [source] = bench.recordings('biotac20')
+    setting = biotac20_settings(source, bench)[VIBRATION]
     learnt, tested = setting.splits['by time'][0]
     slides = [item for item in setting.recorded if item.slide.name in tested]
     chosen = slides if bench.quick else slides[::TESTED_EVERY]

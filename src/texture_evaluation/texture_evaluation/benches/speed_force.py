@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from texture_core.errors import InvalidData
 from texture_estimation.learners.svm_rbf import SvmRbf
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.datasets.fabricslide import import_fabricslide
@@ -37,20 +36,15 @@ QUICK_FABRICSLIDE: Mapping[str, Any] = {'learner': SvmRbf(folds=2, common_scale=
 
 def run(bench: Bench) -> BenchResult:
     """Leave out speeds, forces and directions of both data sets."""
-    if not bench.data or any(not (bench.data / name).is_dir() for name in GOALS):
-        raise InvalidData(
-            f"no recorded data in '{bench.data or 'no folder'}'; give the folder of ntp21/ and fabricslide/ with --data"
-        )
+    array, pad = bench.recordings('ntp21', 'fabricslide')
     with tempfile.TemporaryDirectory() as folder:
         textures = import_ntp21(
-            bench.data / 'ntp21',
+            array,
             Path(folder) / 'ntp21',
             QUICK_SLIDES if bench.quick else '',
             QUICK_TEXTURES if bench.quick else (),
         )
-        fabrics = import_fabricslide(
-            bench.data / 'fabricslide', Path(folder) / 'fabricslide', QUICK_RUNS if bench.quick else '', COMPLETE
-        )
+        fabrics = import_fabricslide(pad, Path(folder) / 'fabricslide', QUICK_RUNS if bench.quick else '', COMPLETE)
         ntp21 = Ntp21(Conditions(whole_slides(textures, 'signal')), **(QUICK_NTP21 if bench.quick else {}))
         fabricslide = Fabricslide(
             Conditions(whole_slides(fabrics, 'signal_static')), **(QUICK_FABRICSLIDE if bench.quick else {})
