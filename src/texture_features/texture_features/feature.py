@@ -61,8 +61,7 @@ class Windows:
     @property
     def moving_m_s(self) -> Array:
         """The speed, (...); NaN where it is unknown or not above 0."""
-        speed_m_s = np.asarray(self.speed_m_s)
-        return np.where(speed_m_s > 0, speed_m_s, np.nan)
+        return self.shared('moving_m_s', lambda: np.where(np.greater(self.speed_m_s, 0), self.speed_m_s, np.nan))
 
     def shared(self, key: Hashable, compute: Callable[[], T]) -> T:
         """Return an intermediate result that several features need; it is computed once."""

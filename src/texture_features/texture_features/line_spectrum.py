@@ -8,7 +8,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_features.feature import Windows
-from texture_features.spectrum import densities_of, mean_over_segments
+from texture_features.spectrum import mean_densities
 
 
 def line_spectrum(windows: Windows, points: int, rate_of_change: bool) -> tuple[Array, Array]:
@@ -27,7 +27,8 @@ def line_spectrum(windows: Windows, points: int, rate_of_change: bool) -> tuple[
     segment = 2 * (points // 2)
     hertz, integration = _lines(segment, windows.rate_hz)
     densities = windows.shared(
-        ('line_spectrum', segment), lambda: mean_over_segments(densities_of(windows, segment, segment // 2, len(hertz)))
+        ('line_spectrum', segment),
+        lambda: mean_densities(windows.centred_rows, windows.rate_hz, segment, segment // 2, len(hertz)),
     )
     if rate_of_change:
         whole = densities
@@ -38,13 +39,13 @@ def line_spectrum(windows: Windows, points: int, rate_of_change: bool) -> tuple[
 def at_reference_speed(hertz: Array, windows: Windows, speed_m_s: float) -> Array:
     """Return at which frequencies the lines would stand at another speed, (..., 1, n_lines); 0 m/s: where they stand.
 
-    A wave of the surface met at f is met at f · speed_m_s / v at that speed.
+    A wave of the surface met at f is met at f · speed_m_s / v at that speed; NaN if that is unknown or not above 0.
     """
     if not speed_m_s:
         return hertz
     return windows.shared(
         ('at_reference_speed', speed_m_s, len(hertz)),
-        lambda: hertz * (speed_m_s / np.asarray(windows.speed_m_s)[..., None, None]),
+        lambda: hertz * (speed_m_s / windows.moving_m_s[..., None, None]),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import Windows, power
 
 MIDDLE, WEAKEST = 'middle', 'weakest'
 
@@ -39,6 +39,8 @@ class Bursts:
         pieces = min(self.pieces, rows.shape[-1])
         length = rows.shape[-1] // pieces
         cut = rows[..., : pieces * length].reshape(*rows.shape[:-1], pieces, length)
-        logs = np.sort(np.log(np.add.reduce(cut * cut, axis=-1) / length + self.floor), axis=-1)
-        difference: Array = logs[..., -1] - logs[..., pieces // 2 if self.over == MIDDLE else 0]
-        return difference[..., None]
+        powers = power(cut)
+        powers.sort(axis=-1)
+        other = pieces // 2 if self.over == MIDDLE else 0
+        ratio = (powers[..., -1:] + self.floor) / (powers[..., other : other + 1] + self.floor)
+        return np.log(ratio)

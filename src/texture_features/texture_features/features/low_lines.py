@@ -10,7 +10,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.spectrum import mean_densities
+from texture_features.line_spectrum import line_spectrum
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,5 @@ class LowLines:
 
     def __call__(self, windows: Windows) -> Array:
         """Return log(mean density + floor)."""
-        segment = 2 * (self.points // 2)
-        densities = mean_densities(windows.centred_rows, windows.rate_hz, segment, segment // 2, self._count)
-        return np.log(densities + self.floor)
+        densities, _ = line_spectrum(windows, self.points, rate_of_change=False)
+        return np.log(densities[..., : self._count] + self.floor)

@@ -12,6 +12,8 @@ from texture_core.parameters import param
 from texture_features.feature import Windows
 from texture_features.line_spectrum import at_reference_speed, line_spectrum, without_force
 
+OCTAVES_A_DB = 0.1 / np.log10(2.0)  # of power
+
 
 @dataclass(frozen=True)
 class PacinianPower:
@@ -44,6 +46,7 @@ class PacinianPower:
         """Return the log power."""
         densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
         octaves = np.log2(at_reference_speed(hertz, windows, self.at_speed_m_s) / self.best_hz)
-        threshold_db = np.where(octaves < 0.0, -self.slope_below_db, self.slope_above_db) * octaves
-        power = np.add.reduce(densities * 10.0 ** (-threshold_db / 10.0), axis=-1, keepdims=True) * hertz[0]
+        below, above = OCTAVES_A_DB * self.slope_below_db, OCTAVES_A_DB * self.slope_above_db
+        weights = np.exp2(np.minimum(below * octaves, -above * octaves))  # 1 / threshold²
+        power = np.add.reduce(densities * weights, axis=-1, keepdims=True) * hertz[0]
         return without_force(np.log(power + self.floor), windows, self.force_exponent)

@@ -56,11 +56,19 @@ class SpatialLevel:
         edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
         low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
         high = np.minimum(np.maximum(edges[..., 1:, :], low + LEAST_LINES), len(hertz))
-        line = np.arange(len(hertz), dtype=np.float64)
-        share = np.maximum(np.minimum(high, line + 1.0) - np.maximum(low, line), 0.0)
+        line = _numbers(len(hertz) + 1)
+        inside = np.minimum(np.maximum(line, low), high)
+        share = inside[..., 1:] - inside[..., :-1]
         mean = np.add.reduce(share * densities[..., None, :], axis=-1) / (high - low)[..., 0]
         # Density per wave per metre: the same power on a stretch that is speed times narrower.
         return without_force(np.log(mean * speed[..., 0] + self.floor), windows, self.force_exponent)
+
+
+@lru_cache(maxsize=64)
+def _numbers(count: int) -> Array:
+    numbers = np.arange(count, dtype=np.float64)
+    numbers.flags.writeable = False
+    return numbers
 
 
 @lru_cache(maxsize=64)

@@ -45,14 +45,10 @@ class SpectralExponent:
         """Return s."""
         densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
         felt = at_reference_speed(hertz, windows, self.at_speed_m_s)
-        within = np.where((felt >= self.low_hz) & (felt <= self.high_hz), 1.0, np.where(np.isnan(felt), np.nan, 0.0))
+        within = (felt >= self.low_hz) * (felt <= self.high_hz) + 0.0 * felt  # NaN where the speed is unknown
         logs = np.log(hertz)
-        middle = _total(within * logs) / (_total(within) + TINY)
-        weights = within * (logs - middle)
-        slope: Array = _total(weights * np.log(densities + self.floor)) / (_total(weights * logs) + TINY)
-        return -slope
-
-
-def _total(values: Array) -> Array:
-    total: Array = np.add.reduce(values, axis=-1, keepdims=True)
-    return total
+        middle = (within @ logs) / (np.add.reduce(within, axis=-1) + TINY)
+        weights = within * (logs - middle[..., None])
+        fall = np.add.reduce(weights * np.log(densities + self.floor), axis=-1)
+        exponent: Array = -fall / (weights @ logs + TINY)
+        return exponent[..., None]
