@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import yaml
 
 pytestmark = pytest.mark.ros
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
@@ -15,8 +16,13 @@ from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
 from texture_bringup.launcher.files import find_launch_file  # noqa: E402
 from texture_bringup.launcher.reader import read  # noqa: E402
 from texture_bringup.ros.operator import Operator  # noqa: E402
+from texture_core import resources  # noqa: E402
+from texture_core.parameters import parameters_of  # noqa: E402
 from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
+from texture_exploration.arms.ur_params import UrArmParams  # noqa: E402
+from texture_exploration.safety import SafetyLimits  # noqa: E402
+from texture_exploration.signal_watch import SignalWatchParams  # noqa: E402
 
 DEADLINE_S = 60.0
 SURFACE = 'ridge_2mm_deep'
@@ -27,6 +33,7 @@ IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 # What each motion feels like. A label other than the true one would tell that the signal is not that of the way the
 # finger went. The model knows neither circles nor strokes as slow as in the hand: there only the evidence counts.
 MOTIONS = ((LINEAR, SURFACE), (CIRCULAR, ''), (IN_HAND, ''))
+TOLD = (UrArmParams, SafetyLimits, SignalWatchParams)  # parameters in the example of a file
 ROBOTS = {'ur': 110, 'rails': 111, 'hand': 112}  # and the domain of its nodes
 
 
@@ -44,15 +51,16 @@ def model(tmp_path_factory):
 def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, tmp_path, monkeypatch, capsys):
     for name, value in {'ROS_DOMAIN_ID': str(ROBOTS[robot]), 'ROS_LOG_DIR': str(tmp_path)}.items():
         monkeypatch.setenv(name, value)
+    # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
+    (tmp_path / 'patient.yaml').write_text('/**: {ros__parameters: {stale_s: 1.5, estimate_timeout_s: 10.0}}')
     place = {'ip': '127.0.0.110'} if robot == 'ur' else {'robot': tmp_path / robot}
     given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'surface': SURFACE, 'model': model, **place}
+    given['explorer_params'] = tmp_path / 'patient.yaml'
     with ChildLauncher(robot, given, dict(os.environ), tmp_path / 'nodes.log') as launcher:
         with Operator(guard=launcher.check) as operator:
             operator.wait_for_explorer(DEADLINE_S)
             operator.wait_for_signal(DEADLINE_S)
             operator.wait_for_listeners(('exploration', 'features'), 1, launcher.check)  # who estimates
-            # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
-            operator.set_parameters('explorer', {'stale_s': 1.5, 'estimate_timeout_s': 10.0})
         for motion, label in MOTIONS:
             code = command.main(['explore', *motion])
             told = capsys.readouterr().out
@@ -68,3 +76,21 @@ def test_a_real_robot_comes_without_anything_emulated(robot):
     emulated, real = (read(path, {'emulated': value}, {}) for value in ('true', 'false'))
     assert {node.package for node in emulated} - {node.package for node in real} == {'texture_simulation'}
     assert {node.executable for node in real} == {'explorer', 'sensor', 'feature_extractor', 'classifier'}
+
+
+@pytest.mark.parametrize('robot', ROBOTS)
+def test_a_parameter_file_of_the_explorer_has_the_last_word(robot, tmp_path):
+    file = tmp_path / 'my_robot.yaml'
+    file.touch()
+    nodes = read(find_launch_file(robot), {'explorer_params': str(file)}, {})
+    explorer = next(node for node in nodes if node.executable == 'explorer')
+    assert explorer.parameters[-1] == file
+
+
+def test_the_example_of_a_parameter_file_says_nothing_until_it_is_uncommented():
+    text = (resources.folder('texture_bringup', 'config') / 'explorer.yaml').read_text()
+    assert yaml.safe_load(text) is None
+    [told] = yaml.safe_load(re.sub(r'^#(?=/| {2}\S| {4}\S+: )', '', text, flags=re.MULTILINE)).values()
+    for name, value in told['ros__parameters'].items():
+        [parameter] = [item for cls in TOLD for item in parameters_of(cls) if item.name == name]
+        assert parameter.check(value) == value and type(value) is parameter.type

@@ -11,7 +11,7 @@ from rclpy.parameter import Parameter
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
-from texture_core.ros.parameters import declare, on_change, read
+from texture_core.ros.parameters import declare, on_change, read, warn_of_unknown
 
 pytestmark = pytest.mark.ros
 
@@ -68,3 +68,11 @@ def test_a_refused_change_is_not_set(make_node: Any) -> None:
     assert node.set_parameters([Parameter('name', value='y')])[0].successful
     assert seen == [Params(name='y')]
     assert read(node, Params).name == 'y'
+
+
+def test_a_parameter_that_the_node_does_not_know_is_named_in_a_warning(make_node: Any, capfd: Any) -> None:
+    node = make_node(lenght_s=2.0, length_s=2.0)
+    declare(node, Params)
+    warn_of_unknown(node)
+    [line] = capfd.readouterr().err.splitlines()
+    assert "no parameter 'lenght_s'; did you mean 'length_s'?" in line

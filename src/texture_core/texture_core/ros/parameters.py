@@ -10,6 +10,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.parameter import Parameter as RosParameter
 
+from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import Parameter, from_mapping, parameters_of
 
@@ -66,6 +67,14 @@ def on_change(node: Any, cls: type[T], apply: Callable[[T], None]) -> None:
         return SetParametersResult(successful=True)
 
     node.add_on_set_parameters_callback(check)
+
+
+def warn_of_unknown(node: Any) -> None:
+    """Log a warning for each parameter that was given and is unknown: a mistyped limit limits nothing."""
+    declared = set(node._parameters)
+    for name in sorted(set(node._parameter_overrides) - declared):
+        if not name.startswith('qos_overrides.'):
+            node.get_logger().warning(f'this has no effect: {unknown(name, declared, "parameter")}')
 
 
 def _needed(item: Parameter) -> str:

@@ -14,6 +14,7 @@ from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedEx
 from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import TextureError
+from texture_core.ros.parameters import warn_of_unknown
 
 try:  # from rclpy 7.1.4 on; half the computing time per message
     from rclpy.experimental import EventsExecutor as OneThread
@@ -36,6 +37,7 @@ def run(make_node: Callable[[], Any], args: Sequence[str] | None = None, threads
     node = None
     try:
         node = make_node()
+        warn_of_unknown(node)
         executor = OneThread() if threads == 1 else MultiThreadedExecutor(num_threads=threads)
         executor.add_node(node)
         _wake_on_signals(executor)
