@@ -8,6 +8,7 @@ of the manual; the sensitivities are ours, in the order of magnitude of public r
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,20 +165,8 @@ def points_per_frame(layout: Layout) -> int:
 
 def kind(layout: Layout) -> SensorKind:
     """Return a kind of BioTac."""
-
-    def make(
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        *,
-        finger: int = 0,
-        scans: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> BioTacModel:
-        return BioTacModel(scene, surface, rng, layout, finger=finger, scans=scans, settled=settled)
-
     return SensorKind(
-        make=make,
+        make=partial(BioTacModel, layout=layout),
         path_rate_hz=PATH_RATE_HZ,
         step_points=points_per_frame(layout),
         streams=(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,20 +133,8 @@ class Tsf85Model:
 
 def kind(layout: Layout) -> SensorKind:
     """Return a kind of TSF-85."""
-
-    def make(
-        scene: Scene,
-        surface: Surface,
-        rng: np.random.Generator,
-        *,
-        finger: int = 0,
-        scans: tuple[int, ...] = (),
-        settled: bool = False,
-    ) -> Tsf85Model:
-        return Tsf85Model(scene, surface, rng, layout, finger=finger, scans=scans, settled=settled)
-
     return SensorKind(
-        make=make,
+        make=partial(Tsf85Model, layout=layout),
         path_rate_hz=PATH_RATE_HZ,
         step_points=OVERSAMPLING,
         streams=(
