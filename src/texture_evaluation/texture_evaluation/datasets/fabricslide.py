@@ -8,19 +8,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from texture_core.arrays import AnyArray
-from texture_core.catalogue import unknown
 from texture_core.errors import InvalidData
-from texture_evaluation.datasets.npz_file import read_arrays
-from texture_evaluation.datasets.steady_slides import SteadySlide, Stream, numbered, write_steady_slides
-from texture_evaluation.slides import parse_selection
+from texture_evaluation.datasets.slide_file import SlideFile
+from texture_evaluation.datasets.steady_slides import SteadySlide, Stream
 
-FILE = 'runs.npz'
 FABRIC = re.compile(r'([^/]+)/F(\d+)/V(-?\d+)/(\d+)')
 GRATING = re.compile(r'grating/([^/]+?)_F(\d+)_V(-?\d+)mmps_(\d+)')
 TAXELS = slice(3, 19)  # after the time (ms) and two proximities
@@ -39,7 +35,30 @@ class Run(NamedTuple):
     counts: int
     speed_mm_s: int
     repeat: int
-    key: str
+
+
+def place(key: str) -> tuple[str, Run] | None:
+    """Return fabric or grating of a key, and the run."""
+    match = GRATING.fullmatch(key) or FABRIC.fullmatch(key)
+    if not match:
+        return None
+    speed = int(match[3])
+    return match[1], Run(speed > 0, int(match[2]), abs(speed), int(match[4]))
+
+
+def slide(key: str, surface: str, run: Run, recorded: AnyArray) -> SteadySlide:
+    """Return a slide, given its rows as recorded."""
+    speed_m_s = run.speed_mm_s / 1000.0
+    direction_rad = math.pi / 2 if run.up else -math.pi / 2
+    first, last = (round(way / speed_m_s / ROW_S) for way in (RAMP_M, RAMP_M + STEADY_M))
+    # A run that is not of that length, as those over gratings, is taken as it is.
+    steady = range(first, last) if first < last <= len(recorded) else None
+    return SteadySlide(
+        key, surface, recorded[:, TAXELS], speed_m_s, run.counts / COUNTS_PER_FORCE, direction_rad, steady
+    )
+
+
+DATA = SlideFile('runs.npz', STREAM, place, slide)
 
 
 def import_fabricslide(
@@ -73,38 +92,4 @@ def import_fabricslide(
     """
     if channels != 'all':
         raise InvalidData(f"channels are '{channels}'; this finger has slow taxels alone, import 'all'")
-    return _import(read_arrays(source, FILE), Path(out), parse_selection(slides), materials)
-
-
-def _import(
-    content: Mapping[str, AnyArray], out: Path, wanted: frozenset[int] | None, materials: Sequence[str]
-) -> list[Path]:
-    surfaces: defaultdict[str, list[Run]] = defaultdict(list)
-    for key in content:
-        match = GRATING.fullmatch(key) or FABRIC.fullmatch(key)
-        if not match:
-            raise InvalidData(f"'{FILE}' holds '{key}'; Fabric/F120/V-10/0 is needed, fetch the file anew")
-        speed = int(match[3])
-        surfaces[match[1]].append(Run(speed > 0, int(match[2]), abs(speed), int(match[4]), key))
-    for name in materials:
-        if name not in surfaces:
-            raise unknown(name, surfaces, 'fabric')
-    return [
-        write_steady_slides(
-            out / name,
-            STREAM,
-            (_slide(name, run, content[run.key]) for run in numbered(name, sorted(surfaces[name]), wanted)),
-        )
-        for name in (materials or sorted(surfaces))
-    ]
-
-
-def _slide(surface: str, run: Run, recorded: AnyArray) -> SteadySlide:
-    speed_m_s = run.speed_mm_s / 1000.0
-    direction_rad = math.pi / 2 if run.up else -math.pi / 2
-    first, last = (round(way / speed_m_s / ROW_S) for way in (RAMP_M, RAMP_M + STEADY_M))
-    # A run that is not of that length, as those over gratings, is taken as it is.
-    steady = range(first, last) if first < last <= len(recorded) else None
-    return SteadySlide(
-        run.key, surface, recorded[:, TAXELS], speed_m_s, run.counts / COUNTS_PER_FORCE, direction_rad, steady
-    )
+    return DATA.write_bags(source, out, slides, materials)

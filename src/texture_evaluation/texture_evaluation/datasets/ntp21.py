@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,13 +16,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from texture_core.arrays import AnyArray, Array
-from texture_core.catalogue import unknown
 from texture_core.errors import InvalidData
-from texture_evaluation.datasets.npz_file import read_arrays
-from texture_evaluation.datasets.steady_slides import SteadySlide, Stream, numbered, write_steady_slides
-from texture_evaluation.slides import parse_selection
+from texture_evaluation.datasets.slide_file import SlideFile
+from texture_evaluation.datasets.steady_slides import SteadySlide, Stream
 
-FILE = 'slides.npz'
 KEY = re.compile(r'([^/]+)/speed(\d+(?:\.\d+)?)/force(\d+(?:\.\d+)?)')
 TAXELS = 9
 TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out
@@ -37,7 +33,29 @@ class Condition(NamedTuple):
 
     speed_mm_s: float
     force_n: float
-    key: str
+
+
+def place(key: str) -> tuple[str, Condition] | None:
+    """Return texture and condition of a key."""
+    match = KEY.fullmatch(key)
+    return (match[1], Condition(float(match[2]), float(match[3]))) if match else None
+
+
+def slide(key: str, texture: str, condition: Condition, recorded: AnyArray) -> SteadySlide:
+    """Return a slide, given its rows as recorded."""
+    samples = evenly(np.asarray(recorded[:, :TAXELS], dtype=float), float(recorded[-1, TIME] - recorded[0, TIME]))
+    return SteadySlide(key, texture, samples, condition.speed_mm_s / 1000.0, condition.force_n, math.nan)
+
+
+def evenly(samples: Array, duration_s: float) -> Array:
+    """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
+    own = np.linspace(0.0, duration_s, len(samples))
+    grid = np.arange(int(duration_s * RATE_HZ) + 1) / RATE_HZ
+    values: Array = CubicSpline(own, samples, axis=0)(grid)
+    return values
+
+
+DATA = SlideFile('slides.npz', STREAM, place, slide)
 
 
 def import_ntp21(
@@ -71,39 +89,4 @@ def import_ntp21(
     """
     if channels not in ('fast', 'all'):
         raise InvalidData(f"channels are '{channels}'; 'fast' or 'all' is needed")
-    return _import(read_arrays(source, FILE), Path(out), parse_selection(slides), materials)
-
-
-def _import(
-    content: Mapping[str, AnyArray], out: Path, wanted: frozenset[int] | None, materials: Sequence[str]
-) -> list[Path]:
-    textures: defaultdict[str, list[Condition]] = defaultdict(list)
-    for key in content:
-        match = KEY.fullmatch(key)
-        if not match:
-            raise InvalidData(f"'{FILE}' holds '{key}'; texture/speedSSS/forceF.F is needed, fetch the file anew")
-        textures[match[1]].append(Condition(float(match[2]), float(match[3]), key))
-    for name in materials:
-        if name not in textures:
-            raise unknown(name, textures, 'texture')
-    return [
-        write_steady_slides(
-            out / name,
-            STREAM,
-            (_slide(name, one, content[one.key]) for one in numbered(name, sorted(textures[name]), wanted)),
-        )
-        for name in (materials or sorted(textures))
-    ]
-
-
-def _slide(texture: str, condition: Condition, recorded: AnyArray) -> SteadySlide:
-    samples = evenly(np.asarray(recorded[:, :TAXELS], dtype=float), float(recorded[-1, TIME] - recorded[0, TIME]))
-    return SteadySlide(condition.key, texture, samples, condition.speed_mm_s / 1000.0, condition.force_n, math.nan)
-
-
-def evenly(samples: Array, duration_s: float) -> Array:
-    """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
-    own = np.linspace(0.0, duration_s, len(samples))
-    grid = np.arange(int(duration_s * RATE_HZ) + 1) / RATE_HZ
-    values: Array = CubicSpline(own, samples, axis=0)(grid)
-    return values
+    return DATA.write_bags(source, out, slides, materials)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from texture_core.arrays import AnyArray
-from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_evaluation.bags import BagWriter
@@ -17,7 +15,6 @@ START_NS = 1_000_000_000 * NANOSECONDS
 PAUSE_NS = NANOSECONDS
 DELAY_NS = 100_000  # a batch is logged this long after its last sample
 BATCH_S = 0.1
-T = TypeVar('T')
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,20 +68,6 @@ def write_steady_slides(path: Path, stream: Stream, slides: Iterable[SteadySlide
             start_ns = _write(bag, stream, slide, start_ns, first) + PAUSE_NS
             first += len(slide.samples)
     return path
-
-
-def numbered(surface: str, slides: Sequence[T], wanted: frozenset[int] | None) -> list[T]:
-    """Return the slides of a surface that are wanted, counted from 1; all for None.
-
-    Raises
-    ------
-    InvalidData
-        If there is none of them.
-    """
-    found = [slide for number, slide in enumerate(slides, 1) if wanted is None or number in wanted]
-    if not found:
-        raise InvalidData(f"'{surface}' has none of the slides asked for; it has 1 to {len(slides)}")
-    return found
 
 
 def _write(bag: BagWriter, stream: Stream, slide: SteadySlide, start_ns: int, first: int) -> int:
