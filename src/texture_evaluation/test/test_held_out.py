@@ -1,14 +1,9 @@
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 from texture_estimation.learners.svm_rbf import SvmRbf
-from texture_evaluation.datasets.steady_slides import SteadySlide, Stream, write_steady_slides
 from texture_evaluation.held_out import Mask, one_out, recognised, run_chosen
-from texture_evaluation.retime import retimed, write_retimed
+from texture_evaluation.retime import retimed
 from texture_evaluation.turns import TurnFree
-from texture_evaluation.whole_slides import whole_slides
 
 SPEEDS = np.repeat([20.0, 40.0, 60.0], 4)
 RATE_HZ = 200.0
@@ -72,18 +67,6 @@ def test_a_slide_at_twice_the_speed_is_half_as_long_and_its_waves_twice_as_fast(
         retimed(wave, 0.02, 0.04)[20:-20, 0], np.sin(2 * np.pi * 10.0 * seconds[:200])[20:-20], atol=0.01
     )
     assert len(retimed(wave, 0.04, 0.02)) == 800
-
-
-def test_retimed_slides_are_bags_to_train_on(tmp_path: Path) -> None:
-    stream = Stream('signal', 'ntp/array', ('a',), '', RATE_HZ)
-    samples = np.random.default_rng(0).normal(size=(400, 1))
-    bag = write_steady_slides(tmp_path / 'felt', stream, [SteadySlide('one', 'felt', samples, 0.02, 1.0, 0.0)])
-    (path,) = write_retimed([bag], tmp_path / 'out', [0.01, 0.04])
-    slow, fast = whole_slides([path], 'signal')
-    assert (slow.surface, fast.surface) == ('felt', 'felt')
-    assert (slow.speed_m_s, fast.speed_m_s) == (0.01, 0.04)
-    assert (len(slow.samples), len(fast.samples)) == (800, 200)
-    assert slow.distance_m == pytest.approx(fast.distance_m)
 
 
 def test_what_a_turn_does_to_the_load_is_taken_out_and_the_rest_stays() -> None:

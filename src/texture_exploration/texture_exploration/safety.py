@@ -104,10 +104,6 @@ class SafetyLimits:
         ]
         return max(0.0, min(rooms))
 
-    def violation(self, arm: ArmState) -> str:
-        """Return in a sentence which limit the finger has passed, '' if none."""
-        return self.too_hard(arm) or self.outside(arm)
-
     def too_hard(self, arm: ArmState) -> str:
         """Return in a sentence that the force is too high, or that it or the place is unknown; '' if not."""
         # Written so that NaN is too much too.

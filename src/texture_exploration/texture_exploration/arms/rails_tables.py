@@ -33,4 +33,3 @@ FAULTS = {
     OVERLOAD: 'its force sensor was overloaded, and the finger was lifted',
     STALL: 'an encoder does not follow its motor; is something in the way?',
 }
-END_SWITCHES = {LOW_X: 'low x', HIGH_X: 'high x', LOW_Y: 'low y', HIGH_Y: 'high y', TOP: 'top'}

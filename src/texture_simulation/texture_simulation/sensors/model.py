@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -99,9 +99,6 @@ class SensorKind:
     def fast(self) -> Stream:
         """The fast stream."""
         return self.streams[0]
-
-
-Traits = Callable[[int], np.random.Generator]
 
 
 def traits(finger: int) -> np.random.Generator:
