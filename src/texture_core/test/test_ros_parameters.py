@@ -1,8 +1,8 @@
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import pytest
@@ -11,6 +11,7 @@ from rclpy.parameter import Parameter
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
+from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.parameters import declare, on_change, read, warn_of_unknown
 
 pytestmark = pytest.mark.ros
@@ -23,22 +24,9 @@ class Params:
 
 
 @pytest.fixture
-def make_node(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    monkeypatch.setitem(os.environ, 'ROS_DOMAIN_ID', '10')
-    monkeypatch.setitem(os.environ, 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    context = rclpy.Context()
-    context.init()
-    nodes = []
-
-    def make(**overrides: Any) -> Any:
-        given = [Parameter(name, value=value) for name, value in overrides.items()]
-        nodes.append(rclpy.create_node('n', context=context, parameter_overrides=given))
-        return nodes[-1]
-
-    yield make
-    for node in nodes:
-        node.destroy_node()
-    context.shutdown()
+def make_node() -> Iterator[Any]:
+    with LocalGraph(10) as graph:
+        yield partial(graph.add, partial(rclpy.create_node, 'n'))
 
 
 def test_defaults_ranges_and_descriptions_reach_ros(make_node: Any) -> None:

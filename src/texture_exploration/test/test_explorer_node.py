@@ -8,7 +8,6 @@ import sys
 import time
 
 import pytest
-import rclpy
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.action import ActionClient
@@ -21,6 +20,7 @@ from texture_msgs import action, msg, srv
 from texture_core.estimates import TextureEstimate
 from texture_core.finger import FingerState
 from texture_core.ros.conversions import to_msg
+from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import ESTIMATE_QOS, STATE_QOS
 from texture_core.ros.time import to_ns
 from texture_exploration.nodes.explorer import THREADS, ExplorerNode
@@ -104,12 +104,9 @@ class World:
 
 
 @pytest.fixture
-def ros(monkeypatch):
-    monkeypatch.setenv('ROS_DOMAIN_ID', '30')
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    rclpy.init()
-    yield
-    rclpy.shutdown()
+def ros():
+    with LocalGraph(30):
+        yield
 
 
 @pytest.fixture

@@ -5,10 +5,9 @@ import sys
 import time
 
 import pytest
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from texture_msgs import msg, srv
 
+from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
 
 pytestmark = pytest.mark.ros
@@ -23,15 +22,13 @@ QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
 class Finger:
     """A client that also plays the sensor, for as long as `feeling`."""
 
-    def __init__(self):
+    def __init__(self, graph):
         self.feeling, self.phases = True, []
-        self._node = rclpy.create_node('finger')
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-        self._signal = self._node.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
-        self._node.create_timer(0.01, self._feel)
-        self._node.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
-        self._explore = self._node.create_client(srv.Explore, 'explore')
+        self.until, peer = graph.until, graph.peer
+        self._signal = peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
+        peer.create_timer(0.01, self._feel)
+        peer.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
+        self._explore = peer.create_client(srv.Explore, 'explore')
 
     def _feel(self):
         if self.feeling:
@@ -40,35 +37,19 @@ class Finger:
     def _on_state(self, state):
         self.phases.append((state.phase, time.monotonic()))
 
-    def until(self, condition):
-        deadline = time.monotonic() + DEADLINE_S
-        while not condition():
-            assert time.monotonic() < deadline
-            self._executor.spin_once(timeout_sec=0.05)
-
     def ready(self):
         return self._explore.service_is_ready() and self._signal.get_subscription_count() > 0
 
     def explore(self, **request):
         return self._explore.call_async(srv.Explore.Request(**request))
 
-    def close(self):
-        self._executor.shutdown()
-        self._node.destroy_node()
-
 
 @pytest.fixture
-def finger(monkeypatch):
-    monkeypatch.setenv('ROS_DOMAIN_ID', '114')
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    rclpy.init()
+def finger():
     options = [word for name, value in PARAMETERS.items() for word in ('-p', f'{name}:={value}')]
-    with subprocess.Popen([*EXPLORER, *options]) as process:
-        made = Finger()
-        yield made
+    with LocalGraph(114) as graph, subprocess.Popen([*EXPLORER, *options]) as process:
+        yield Finger(graph)
         process.terminate()
-    made.close()
-    rclpy.shutdown()
 
 
 def test_a_silent_sensor_ends_the_slide_and_the_next_exploration_works(finger, record_property):

@@ -1,14 +1,11 @@
-import time
-
 import numpy as np
 import pytest
-import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.executors import SingleThreadedExecutor
 from texture_msgs import msg
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.ros.conversions import from_msg, to_msg
+from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_features.feature_set import FeatureSet
@@ -17,53 +14,35 @@ from texture_features.windows import cut_recording
 
 pytestmark = pytest.mark.ros
 RATE_HZ = 1000.0
-DEADLINE_S = 20.0
 
 
 class Bench:
-    """The node under test, and a node that plays the sensor and the explorer and hears the features."""
+    """The node under test, and a peer that plays the sensor and the explorer and hears the features."""
 
-    def __init__(self):
-        self.node = FeatureExtractor()
-        self.peer = rclpy.create_node('peer')
-        self.executor = SingleThreadedExecutor()
-        for node in (self.node, self.peer):
-            self.executor.add_node(node)
-        self.features, self.reports = [], []
-        self.signals = self.peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
-        self.states = self.peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
-        self.peer.create_subscription(
-            msg.FeatureVector, 'features', lambda m: self.features.append(from_msg(m)), FEATURE_QOS
-        )
-        self.peer.create_subscription(DiagnosticArray, '/diagnostics', lambda m: self.reports.append(m.status[0]), 10)
-        self.spin_until(lambda: self.signals.get_subscription_count() and self.peer.count_publishers('features') == 1)
+    def __init__(self, graph):
+        self.graph, peer = graph, graph.peer
+        self.node = graph.add(FeatureExtractor, recipe='default')
+        self._features = graph.listen(msg.FeatureVector, 'features', FEATURE_QOS)
+        self.reports = graph.listen(DiagnosticArray, '/diagnostics')
+        self.signals = peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
+        self.states = peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
+        self.until = graph.until
+        self.until(lambda: self.signals.get_subscription_count() and peer.count_publishers('features') == 1)
 
-    def spin_until(self, condition):
-        deadline = time.monotonic() + DEADLINE_S
-        while not condition():
-            assert time.monotonic() < deadline, 'the condition did not come true in time'
-            self.executor.spin_once(timeout_sec=0.05)
+    @property
+    def features(self):
+        return [from_msg(message) for message in self._features]
 
     def play(self, batches):
         for batch in batches:
             self.signals.publish(to_msg(batch))
-            self.executor.spin_once(timeout_sec=0.02)
-
-    def close(self):
-        self.executor.shutdown()
-        for node in (self.node, self.peer):
-            node.destroy_node()
+            self.graph.spin_once(0.02)
 
 
 @pytest.fixture
-def bench(monkeypatch):
-    monkeypatch.setenv('ROS_DOMAIN_ID', '40')
-    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    rclpy.init(args=['--ros-args', '-p', 'recipe:=default'])
-    bench = Bench()
-    yield bench
-    bench.close()
-    rclpy.shutdown()
+def bench():
+    with LocalGraph(40) as graph:
+        yield Bench(graph)
 
 
 def recording(seconds=1.0):
@@ -92,11 +71,11 @@ def lift(at_s=0.8):
 
 def test_the_node_publishes_what_the_same_recording_gives_offline(bench):
     bench.states.publish(to_msg(slide()))
-    bench.spin_until(lambda: bench.node._cutter._slides)
+    bench.until(lambda: bench.node._cutter._slides)
     bench.play(recording())
-    bench.spin_until(lambda: len(bench.features) == 4)
+    bench.until(lambda: len(bench.features) == 4)
     bench.states.publish(to_msg(lift()))
-    bench.spin_until(lambda: bench.features and bench.features[-1].last)
+    bench.until(lambda: bench.features and bench.features[-1].last)
     feature_set = FeatureSet.load('default')
     pieces = cut_recording({'signal': recording()}, [slide(), lift()], feature_set.windows)
     for heard, expected in zip(bench.features, map(feature_set.describe, pieces), strict=True):
@@ -111,16 +90,16 @@ def test_the_node_publishes_what_the_same_recording_gives_offline(bench):
 def test_a_slide_whose_sensor_died_ends_all_the_same(bench):
     bench.states.publish(to_msg(slide()))
     bench.states.publish(to_msg(lift()))
-    bench.spin_until(lambda: bench.features and bench.features[-1].last)
+    bench.until(lambda: bench.features and bench.features[-1].last)
     assert bench.features[-1].skipped == 4
-    bench.spin_until(lambda: any('nothing has come yet on signal' in report.message for report in bench.reports))
+    bench.until(lambda: any('nothing has come yet on signal' in report.status[0].message for report in bench.reports))
 
 
 def test_broken_messages_are_counted_and_survived(bench):
     bench.signals.publish(msg.TactileSignal(sensor='s', channels=['a', 'b'], sampling_rate_hz=1000.0, samples=[1.0]))
     bench.states.publish(msg.ExplorationState(phase='sleeping'))
-    bench.spin_until(lambda: bench.node._broken == 2)
+    bench.until(lambda: bench.node._broken == 2)
     bench.states.publish(to_msg(slide()))
-    bench.spin_until(lambda: bench.node._cutter._slides)
+    bench.until(lambda: bench.node._cutter._slides)
     bench.play(recording())
-    bench.spin_until(lambda: len(bench.features) == 4)
+    bench.until(lambda: len(bench.features) == 4)

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
-import time
 from dataclasses import dataclass
 from typing import Any
 
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
-from texture_core.errors import InvalidParameter, ModelMismatch, TextureError
+from texture_core.errors import ModelMismatch, TextureError
+from texture_core.estimates import TextureEstimate
+from texture_core.features import FeatureVector
 from texture_core.parameters import param
-from texture_core.ros.conversions import from_msg, to_msg
-from texture_core.ros.diagnostics import Diagnostics, Report
-from texture_core.ros.parameters import declare, on_change
-from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
 from texture_core.ros.run import run
 from texture_estimation.evidence import NO_MODEL, Evidence
 from texture_estimation.model import Model, load_model
 from texture_estimation.pupil import Pupil
+from texture_estimation.ros.estimator_node import EstimatorNode
 
 
 @dataclass(frozen=True)
@@ -32,37 +28,35 @@ class ClassifierParams:
     )
 
 
-class Classifier(Node):
+class Classifier(EstimatorNode):
     """Turn feature vectors into texture estimates, and explorations into knowledge."""
 
-    def __init__(self) -> None:
-        super().__init__('classifier')
-        self._load(declare(self, ClassifierParams))
-        on_change(self, ClassifierParams, self._change)
-        self._estimates = 0
-        self._broken = 0
-        self._reported = 0
-        self._processing_s = 0.0
-        self._publisher = self.create_publisher(msg.TextureEstimate, 'texture', ESTIMATE_QOS)
-        self.create_subscription(msg.FeatureVector, 'features', self._on_features, FEATURE_QOS)
+    params = ClassifierParams
+    estimate = (msg.TextureEstimate, 'texture')
+    no_model = NO_MODEL
+    doing = 'judging'
+    unused = 'some feature vectors could not be used'
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('classifier', **kwargs)
         self.create_service(srv.LearnTexture, 'learn', self._on_learn)
         self.create_service(Trigger, 'undo_learning', self._on_undo)
-        self._diagnostics = Diagnostics(self, self._report)
 
-    def _on_features(self, message: msg.FeatureVector) -> None:
-        began = time.perf_counter()
-        try:
-            vector = from_msg(message)
-        except TextureError as error:
-            self._broken += 1
-            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
-            return
+    def _load(self, path: str) -> Evidence:
+        model = load_model(path) if path else None
+        self._pupil = Pupil(model, path) if model and model.examples else None
+        return Evidence(model)
+
+    def _judge(self, vector: FeatureVector) -> TextureEstimate:
         if self._pupil is not None:
             self._pupil.remember(vector)
-        estimate = self._evidence.update(vector)
-        self._processing_s = time.perf_counter() - began
-        self._publisher.publish(to_msg(dataclasses.replace(estimate, processing_s=self._processing_s)))
-        self._estimates += 1
+        return super()._judge(vector)
+
+    def _facts(self) -> dict[str, int]:
+        return {'lessons': len(self._evidence.model.lessons) if self._evidence.model else 0}
+
+    def _faults(self) -> dict[str, int]:
+        return {'refused_vectors': self._evidence.refused, 'not_finite_vectors': self._evidence.not_finite}
 
     def _on_learn(self, request: srv.LearnTexture.Request, answer: srv.LearnTexture.Response) -> Any:
         try:
@@ -100,34 +94,6 @@ class Classifier(Node):
         self._evidence = Evidence(model)
         self.get_logger().info(_known(model))
         return model
-
-    def _change(self, params: ClassifierParams) -> None:
-        try:
-            self._load(params)
-        except TextureError as error:
-            raise InvalidParameter(str(error)) from error
-
-    def _load(self, params: ClassifierParams) -> None:
-        model = load_model(params.model) if params.model else None
-        self._pupil = Pupil(model, params.model) if model and model.examples else None
-        self._evidence = Evidence(model)
-
-    def _report(self) -> Report:
-        evidence = self._evidence
-        numbers = {
-            'model': evidence.model.name if evidence.model else '',
-            'lessons': len(evidence.model.lessons) if evidence.model else 0,
-            'estimates': self._estimates,
-            'refused_vectors': evidence.refused,
-            'not_finite_vectors': evidence.not_finite,
-            'broken_messages': self._broken,
-            'processing_s': self._processing_s,
-        }
-        if evidence.model is None:
-            return 'WARN', NO_MODEL, numbers
-        faults = evidence.refused + evidence.not_finite + self._broken
-        new, self._reported = faults != self._reported, faults
-        return ('WARN', 'some feature vectors could not be used', numbers) if new else ('OK', 'judging', numbers)
 
 
 def _known(model: Model) -> str:

@@ -34,8 +34,8 @@ class ExtractorParams:
 class FeatureExtractor(Node):
     """Publish the features of each window as soon as its last sample has arrived."""
 
-    def __init__(self) -> None:
-        super().__init__('feature_extractor')
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('feature_extractor', **kwargs)
         self._feature_set = FeatureSet.load(declare(self, ExtractorParams).recipe)
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.topics)
         self._broken = 0

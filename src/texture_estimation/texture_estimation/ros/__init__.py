@@ -1,0 +1,1 @@
+"""ROS parts of the estimation that are not nodes."""
