@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
 import struct
 from dataclasses import astuple, dataclass
 
 FORMAT = struct.Struct('<4sq7d')
 MAGIC = b'TTF1'
+LOOPBACK = '127.0.0.1'
 
 
 @dataclass(frozen=True)
@@ -37,3 +40,26 @@ class FingerState:
             return None
         _, time_ns, *numbers = FORMAT.unpack(data)
         return cls(time_ns, *numbers)
+
+
+class FingerSender:
+    """Tells the emulated bench on a UDP port of this machine, which need not listen; says nothing if the port is 0."""
+
+    def __init__(self, port: int) -> None:
+        self._address = (LOOPBACK, port)
+        self._socket: socket.socket | None = None
+
+    def send(self, state: FingerState) -> None:
+        """Send one datagram."""
+        if not self._address[1]:
+            return
+        if self._socket is None:
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        with contextlib.suppress(OSError):
+            self._socket.sendto(state.to_bytes(), self._address)
+
+    def close(self) -> None:
+        """Close the socket; the next datagram opens it again."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -12,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_core.finger import FingerState
+from texture_core.finger import FingerSender, FingerState
 from texture_core.signal import NANOSECONDS
 from texture_drivers.tsf85.protocol import start_command
 from texture_simulation.bench import Bench, BenchParams
-from texture_simulation.finger_link import LOOPBACK
 from texture_simulation.scans import scan_streams
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.sensors.catalogue import SENSORS
@@ -119,27 +117,25 @@ class _Arm:
     """Moves the finger along and reads the line, as arm and driver do; usable as a context manager."""
 
     def __init__(self, port: int, link: Path) -> None:
-        self._address = (LOOPBACK, port)
+        self._bench = FingerSender(port)
         self._link = link
         self._x_m, self._speed_m_s = 0.0, SPEED_M_S
 
     def __enter__(self) -> _Arm:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._line = os.open(self._link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         os.write(self._line, start_command())  # a TSF-85 waits for it, the others do not listen
         return self
 
     def __exit__(self, *_: object) -> None:
         os.close(self._line)
-        self._socket.close()
+        self._bench.close()
 
     def slide(self, seconds: float) -> None:
         """Slide for a while."""
         end_s = time.monotonic() + seconds
         while time.monotonic() < end_s:
             now_ns = time.monotonic_ns()
-            state = FingerState(now_ns, x_m=self._x_m, vx_m_s=self._speed_m_s, force_n=FORCE_N)
-            self._socket.sendto(state.to_bytes(), self._address)
+            self._bench.send(FingerState(now_ns, x_m=self._x_m, vx_m_s=self._speed_m_s, force_n=FORCE_N))
             time.sleep(ARM_PERIOD_S)
             self._x_m += self._speed_m_s * (time.monotonic_ns() - now_ns) / NANOSECONDS
             self._read()

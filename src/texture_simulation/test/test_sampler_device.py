@@ -18,9 +18,8 @@ from texture_drivers.daq.sensor import daq
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
 from texture_simulation.devices.daq import EmulatedDaq
-from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.faults import ByteFaults, FrameFaults
 from texture_simulation.devices.pvdf import EmulatedPvdf
-from texture_simulation.devices.sampler import FrameFaults
 
 SECOND = 1_000_000_000
 DEADLINE_S = 30.0

@@ -5,9 +5,7 @@ from __future__ import annotations
 import socket
 
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerState
-
-LOOPBACK = '127.0.0.1'
+from texture_core.finger import LOOPBACK, FingerState
 
 
 class FingerLink:

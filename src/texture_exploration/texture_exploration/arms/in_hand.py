@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from texture_core.catalogue import find
 from texture_core.errors import DeviceError
+from texture_core.finger import FingerSender, FingerState
 from texture_core.parameters import param
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
-from texture_exploration.arms.simulated import FingerReport
 from texture_exploration.hands.dynamixel import DynamixelHand
 from texture_exploration.hands.protocol import FingerSet, Fingertip, Hand
 from texture_exploration.hands.simulated import SimulatedHand
@@ -53,7 +53,7 @@ class InHandArm:
         self._params = params
         self.hand = hand or HANDS[params.hand](params)
         self.fingers: FingerSet = find(self.hand.finger_sets, params.finger_set, 'finger set')
-        self._report = FingerReport(params.finger_port)
+        self._bench = FingerSender(params.finger_port)
         self._connected = False
 
     def connect(self) -> None:
@@ -61,7 +61,6 @@ class InHandArm:
         self.close()
         self.hand.connect()
         self._connected = True
-        self._report.open()
         self.hand.grip(dict.fromkeys(self.fingers.hold, self._params.grip_force_n))
         end_s = time.monotonic() + self._params.grip_timeout_s
         while weak := self._weak(HELD_SHARE):
@@ -74,7 +73,7 @@ class InHandArm:
         """Let go."""
         self._connected = False
         self.hand.close()
-        self._report.close()
+        self._bench.close()
 
     def state(self) -> ArmState:
         """Return the mean of the sliding fingers."""
@@ -90,7 +89,7 @@ class InHandArm:
             force_n=sum(tip.force_n for tip in tips) / len(tips),
             fault=hand.fault or (f'the grip is lost: {weak}' if weak else ''),
         )
-        self._report.send(state)
+        self._bench.send(FingerState(state.time_ns, *state.position, *state.velocity, state.force_n))
         return state
 
     def command(self, command: ArmCommand) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import socket
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerState
+from texture_core.finger import FingerSender, FingerState
 from texture_core.parameters import param
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
 from texture_exploration.arms.simulated_surface import SimulatedSurface, SimulatedSurfaceParams
@@ -78,7 +77,7 @@ class SimulatedArm:
         self._wake = threading.Event()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
-        self._report = FingerReport(params.finger_port)
+        self._bench = FingerSender(params.finger_port)
         self._surface = SimulatedSurface(params, params.stiffness_n_m)
         self._slow = None if params.force_mode else VelocityOnly(params, 1 / RATE_HZ, clock())
 
@@ -87,7 +86,6 @@ class SimulatedArm:
         self.close()
         self._frozen, self._fault, self._push_n = False, '', 0.0
         self._closing.clear()
-        self._report.open()
         self.step(0.0)
         if self._own_thread:
             self._thread = threading.Thread(target=self._run, name='simulated_arm', daemon=True)
@@ -101,7 +99,7 @@ class SimulatedArm:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-        self._report.close()
+        self._bench.close()
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -158,7 +156,7 @@ class SimulatedArm:
         self._state = ArmState(now_ns, (x, y, z), velocity, force_n, self._fault)
         if self._slow:
             self._slow.ask(command, self._state, dt_s)
-        self._report.send(self._state)
+        self._bench.send(FingerState(now_ns, x, y, z, *velocity, force_n))
 
     @property
     def _resting(self) -> bool:
@@ -204,28 +202,3 @@ def _speed(moved_m: Vector, dt_s: float) -> Vector:
         return 0.0, 0.0, 0.0
     x, y, z = (way / dt_s for way in moved_m)
     return x, y, z
-
-
-class FingerReport:
-    """Tells the emulated bench where the finger is; says nothing if the port is 0."""
-
-    def __init__(self, port: int) -> None:
-        self._address = ('127.0.0.1', port)
-        self._socket: socket.socket | None = None
-
-    def open(self) -> None:
-        """Open the socket; nobody needs to listen."""
-        if self._address[1]:
-            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-
-    def send(self, state: ArmState) -> None:
-        """Send one datagram."""
-        if self._socket is not None:
-            finger = FingerState(state.time_ns, *state.position, *state.velocity, state.force_n)
-            self._socket.sendto(finger.to_bytes(), self._address)
-
-    def close(self) -> None:
-        """Close the socket."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None

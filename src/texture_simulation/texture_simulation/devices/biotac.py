@@ -10,8 +10,7 @@ import numpy as np
 
 from texture_core.parameters import param
 from texture_simulation.devices.biotac_encoder import VERSION, Bytes, Values, encode_replies, reply_frame, serials_frame
-from texture_simulation.devices.faults import ByteFaults, FrameFaults
-from texture_simulation.devices.pty_port import PtyPort
+from texture_simulation.devices.device import Device
 
 SLOT_US = 1e6 / 4400
 FRAMES_PER_SERIALS = 100
@@ -25,17 +24,13 @@ class BoardFaults:
     flip: float = param(0.0, 'Probability that one bit of a byte on the SPI bus is changed.', low=0.0, high=1.0)
 
 
-class EmulatedBioTac:
-    """An emulated bridge without a clock of its own: `advance` it by the frames that have been sampled.
-
-    Its time is its own: called at another pace than nominal it is a device whose clock drifts.
+class EmulatedBioTac(Device):
+    """An emulated bridge: `advance` it by the frames that have been sampled.
 
     Parameters
     ----------
-    link
-        Symbolic link that leads to the device; this is the path for the driver.
-    rng
-        Randomness of the faults.
+    link, rng
+        See `Device`.
     serials
         Serial number of the BioTac at each place, '' where there is none.
     """
@@ -43,47 +38,16 @@ class EmulatedBioTac:
     def __init__(
         self, link: Path, rng: np.random.Generator, serials: Sequence[str] = ('BT-2P-02.2.0-B-11-E-00-04',)
     ) -> None:
-        self.faults = ByteFaults()
-        self.frame_faults = FrameFaults()
+        super().__init__(link, rng)
         self.board_faults = BoardFaults()
-        self.mute = False
-        self.stalled = False
-        self.wrong_firmware = False
-        self._port = PtyPort(link)
-        self._rng = rng
         self._serials = serials
         self._absent = [place for place, serial in enumerate(serials) if not serial]
         self._frames = 0
-        self._kept = b''
-
-    @property
-    def plugged(self) -> bool:
-        """Whether the device is there."""
-        return self._port.plugged
-
-    @property
-    def streaming(self) -> bool:
-        """Whether it sends."""
-        return self.plugged and not self.mute
-
-    @property
-    def dropped_bytes(self) -> int:
-        """How many bytes nobody took."""
-        return self._port.dropped_bytes
-
-    def plug(self) -> None:
-        """Appear, under a new name, with sequence and clock at 0."""
-        self._port.plug()
-        self.reset()
-
-    def unplug(self) -> None:
-        """Vanish."""
-        self._port.unplug()
 
     def reset(self) -> None:
         """Begin the sequence numbers and the clock anew, as after a brown-out."""
+        super().reset()
         self._frames = 0
-        self._kept = b''
 
     def pass_by(self, frames: int) -> None:
         """Let time pass without sending: frames are lost."""
@@ -97,13 +61,7 @@ class EmulatedBioTac:
         values : (n_frames, n_slots, n_fingers) counts, 0 to 4095
         """
         replies = self._disturb(encode_replies(values, self._absent))
-        data = b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(values, replies, strict=True))
-        if not self.streaming:
-            return
-        self._kept += data
-        if not self.stalled:
-            self._port.write(self.faults.apply(self._kept, self._rng))
-            self._kept = b''
+        self._send(b''.join(self._sent(frame, reply.tobytes()) for frame, reply in zip(values, replies, strict=True)))
 
     def _sent(self, values: Values, reply: bytes) -> bytes:
         """Return the bytes that one frame becomes."""

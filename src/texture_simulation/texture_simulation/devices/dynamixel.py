@@ -7,28 +7,23 @@ position mode follows its goal by its gain, with at most its goal current; motor
 from __future__ import annotations
 
 import argparse
-import signal
-import socket
 import struct
-import threading
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.finger import FingerState
-from texture_simulation.devices.pty_port import PtyPort
+from texture_simulation.devices.robot_line import RobotLine
 
 HEADER = b'\xff\xff\xfd\x00'
-BROADCAST = 0xFE
 PING, READ, WRITE, STATUS, SYNC_READ, SYNC_WRITE = 1, 2, 3, 0x55, 0x82, 0x83
 ALERT, RANGE, ACCESS = 0x80, 4, 7
 EEPROM_END = 64
-MODE, TORQUE, ERROR, P_GAIN, GOAL_CURRENT, GOAL_POSITION, PRESENT = 11, 64, 70, 84, 102, 116, 126
+TORQUE, ERROR, P_GAIN, GOAL_CURRENT, GOAL_POSITION, PRESENT = 64, 70, 84, 102, 116, 126
 RAD_PER_COUNT, RAD_S_PER_COUNT, A_PER_COUNT = 0.001533981, 0.0239691, 0.001
 TORQUE_NM_A = 0.35
 A_PER_RAD_AND_GAIN = 0.005  # how much current an error makes, per gain
@@ -172,77 +167,40 @@ class DynamixelMotors:
             )
 
 
-class EmulatedDynamixelBus:
-    """The motors in real time behind a device path, in a thread of their own; usable as a context.
+class EmulatedDynamixelBus(RobotLine):
+    """The motors on their bus.
 
     Parameters
     ----------
-    link
-        Symbolic link that leads to the device.
+    link, finger_port
+        See `RobotLine`.
     motors
         On the bus.
-    finger, finger_port
-        Which finger is reported to the emulated bench, at which UDP port on loopback; 0: none.
+    finger
+        Which one is reported to the bench.
     """
 
     def __init__(self, link: Path, motors: DynamixelMotors, finger: Finger | None = None, finger_port: int = 0) -> None:
+        super().__init__(link, finger_port)
         self.motors = motors
-        self.port = PtyPort(link)
-        self._finger = finger if finger_port else None
-        self._bench = ('127.0.0.1', finger_port)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._finger = finger
         self._heard = b''
-        self._using = threading.Lock()  # the port: it is unplugged by others
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='dynamixel bus', daemon=True)
 
-    def __enter__(self) -> EmulatedDynamixelBus:
-        self.port.plug()
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._closing.set()
-        self._thread.join()
-        self.port.unplug()
-        self._socket.close()
-
-    @property
-    def running(self) -> bool:
-        """Whether time goes by."""
-        return self._thread.is_alive()
-
-    def _run(self) -> None:
+    def run(self) -> None:
+        """Answer what comes, and let the motors move."""
         due_s = time.monotonic()
-        while not self._closing.is_set():
-            with self._using:
+        while not self.closing.is_set():
+            with self.using:
                 data = self.port.read()
                 self.port.write(self.hear(data))
             if not data:
-                self._closing.wait(IDLE_S)
+                self.closing.wait(IDLE_S)
             steps = int((time.monotonic() - due_s) / PHYSICS_S)
             if steps * PHYSICS_S >= TURN_S:
                 due_s += steps * PHYSICS_S
                 self.motors.advance(min(steps, MOST_STEPS))
-                self._tell()
-
-    def _tell(self) -> None:
-        """Tell the bench where the finger is."""
-        if self._finger is not None:
-            state = self.motors.finger_state(self._finger, time.monotonic_ns())
-            self._socket.sendto(state.to_bytes(), self._bench)
-
-    def plug(self) -> None:
-        """Plug it in again; it gets another device name."""
-        with self._using:
-            self.port.plug()
-
-    def unplug(self) -> None:
-        """Pull its plug."""
-        with self._using:
-            self.port.unplug()
+                if self._finger is not None:
+                    self.bench.send(self.motors.finger_state(self._finger, time.monotonic_ns()))
 
     def hear(self, data: bytes) -> bytes:
         """Return the answers to what came over the line."""
@@ -309,12 +267,7 @@ def main() -> None:
         'link', type=Path, nargs='?', default=Path('/tmp/texture/dynamixel'), help='device path to make'
     )
     options = parser.parse_args()
-    stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: stopped.set())
-    with EmulatedDynamixelBus(options.link, DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING)):
-        print(f'the hand is at {options.link}', flush=True)
-        stopped.wait()
+    EmulatedDynamixelBus(options.link, DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING)).live()
 
 
 if __name__ == '__main__':

@@ -9,14 +9,10 @@ from __future__ import annotations
 
 import argparse
 import binascii
-import signal
-import socket
 import struct
-import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 from cobs import cobs
@@ -24,7 +20,7 @@ from cobs import cobs
 from texture_core.finger import FingerState
 from texture_core.parameters import param
 from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.devices.pty_port import PtyPort
+from texture_simulation.devices.robot_line import RobotLine
 
 STEP_S = 0.0025
 STATE_STEPS = 4  # a state every 10 ms
@@ -176,19 +172,17 @@ def _checked(piece: bytes) -> bytes | None:
     return checked if len(checked) >= 10 and struct.pack('<H', binascii.crc_hqx(checked, 0xFFFF)) == told else None
 
 
-class EmulatedRails:
-    """The rails in real time, in a thread of their own; usable as a context.
+class EmulatedRails(RobotLine):
+    """The rails on their line.
 
     Parameters
     ----------
-    link
-        Symbolic link that leads to the device; this is the path for the arm.
+    link, finger_port
+        See `RobotLine`.
     machine
         The mechanics.
     rng
         Randomness of the faults.
-    finger_port
-        UDP port of the emulated bench on loopback; 0: none.
     """
 
     def __init__(
@@ -198,52 +192,20 @@ class EmulatedRails:
         rng: np.random.Generator | None = None,
         finger_port: int = 0,
     ) -> None:
+        super().__init__(link, finger_port)
         self.faults = ByteFaults()
         self.firmware = RailsFirmware(machine)
         self.mute = False
-        self.port = PtyPort(link)
         self._rng = rng or np.random.default_rng(0)
-        self._bench = ('127.0.0.1', finger_port)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._using = threading.Lock()  # the port: it is unplugged by others
-        self._closing = threading.Event()
         self._steps = 0
-        self._thread = threading.Thread(target=self._run, name='rails', daemon=True)
 
-    def __enter__(self) -> EmulatedRails:
-        self.port.plug()
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._closing.set()
-        self._thread.join()
-        self.port.unplug()
-        self._socket.close()
-
-    @property
-    def running(self) -> bool:
-        """Whether time goes by."""
-        return self._thread.is_alive()
-
-    def plug(self) -> None:
-        """Plug it in again; it gets another device name."""
-        with self._using:
-            self.port.plug()
-
-    def unplug(self) -> None:
-        """Pull its plug."""
-        with self._using:
-            self.port.unplug()
-
-    def _run(self) -> None:
+    def run(self) -> None:
+        """Follow the orders that come, and send states."""
         due_s = time.monotonic()
-        while not self._closing.wait(STEP_S):
+        while not self.closing.wait(STEP_S):
             passed = int((time.monotonic() - due_s) / STEP_S)
             due_s += passed * STEP_S
-            with self._using:
+            with self.using:
                 self.firmware.hear(self.port.read())
                 for _ in range(min(passed, MOST_STEPS)):
                     self._step()
@@ -256,12 +218,10 @@ class EmulatedRails:
         state = self.firmware.state()
         if not self.mute:
             self.port.write(self.faults.apply(state, self._rng))
-        if self._bench[1]:
-            x, y, z = self.firmware.position.tolist()
-            vx, vy, vz = self.firmware.velocity.tolist()
-            height, force = z - self.firmware.surface_m, self.firmware.force_n
-            finger = FingerState(time.monotonic_ns(), x, y, height, vx, vy, vz, force)
-            self._socket.sendto(finger.to_bytes(), self._bench)
+        x, y, z = self.firmware.position.tolist()
+        vx, vy, vz = self.firmware.velocity.tolist()
+        height, force = z - self.firmware.surface_m, self.firmware.force_n
+        self.bench.send(FingerState(time.monotonic_ns(), x, y, height, vx, vy, vz, force))
 
 
 def main() -> None:
@@ -270,12 +230,7 @@ def main() -> None:
     parser.add_argument('link', type=Path, nargs='?', default=Path('/tmp/texture/rails'), help='device path to make')
     parser.add_argument('--finger-port', type=int, default=0, help='UDP port of the emulated bench; 0: none')
     options = parser.parse_args()
-    stopped = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda _number, _frame: stopped.set())
-    with EmulatedRails(options.link, finger_port=options.finger_port):
-        print(f'the rails are at {options.link}', flush=True)
-        stopped.wait()
+    EmulatedRails(options.link, finger_port=options.finger_port).live()
 
 
 if __name__ == '__main__':

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_simulation.devices.biotac_encoder import stuff
-from texture_simulation.devices.faults import ByteFaults, FrameFaults
-from texture_simulation.devices.pty_port import PtyPort
+from texture_simulation.devices.device import Device
 
 Counts = NDArray[np.int16]
 VERSION = 1
@@ -35,17 +34,13 @@ class Sampled:
     rows: int  # in a frame
 
 
-class EmulatedSampler:
-    """An emulated device without a clock of its own: `advance` it by what has been sampled.
-
-    Its time is its own: called at another pace than nominal it is a device whose clock drifts.
+class EmulatedSampler(Device):
+    """An emulated device: `advance` it by what has been sampled.
 
     Parameters
     ----------
-    link
-        Symbolic link that leads to the device; this is the path for the driver.
-    rng
-        Randomness of the faults.
+    link, rng
+        See `Device`.
     streams
         What it samples, by a name of our own.
     start_us
@@ -53,48 +48,18 @@ class EmulatedSampler:
     """
 
     def __init__(self, link: Path, rng: np.random.Generator, streams: Mapping[str, Sampled], start_us: int = 0) -> None:
-        self.faults = ByteFaults()
-        self.frame_faults = FrameFaults()
-        self.mute = False  # open but silent
-        self.stalled = False  # keeps what it samples, and sends it all at once when it goes on
-        self.wrong_firmware = False
-        self._port = PtyPort(link)
-        self._rng = rng
+        super().__init__(link, rng)
         self._start_us = start_us
         self._streams = streams
         self.reset()
 
-    @property
-    def plugged(self) -> bool:
-        """Whether the device is there."""
-        return self._port.plugged
-
-    @property
-    def streaming(self) -> bool:
-        """Whether it sends."""
-        return self.plugged and not self.mute
-
-    @property
-    def dropped_bytes(self) -> int:
-        """How many bytes nobody took."""
-        return self._port.dropped_bytes
-
-    def plug(self) -> None:
-        """Appear, under a new name, with numbers and clock at the beginning."""
-        self._port.plug()
-        self.reset()
-
-    def unplug(self) -> None:
-        """Vanish."""
-        self._port.unplug()
-
     def reset(self) -> None:
         """Begin numbers and clock anew, as after a brown-out."""
+        super().reset()
         self._frames = dict.fromkeys(self._streams, 0)
         self._waiting: dict[str, Counts] = {
             name: np.empty((0, stream.columns), dtype=np.int16) for name, stream in self._streams.items()
         }
-        self._kept = b''
 
     def pass_by(self, duration_s: float) -> None:
         """Let time pass without sending: whole frames are lost."""
@@ -109,17 +74,14 @@ class EmulatedSampler:
         samples
             Counts of each stream, (n_samples, n_columns).
         """
+        data = b''
         for name, counts in samples.items():
             self._waiting[name] = np.concatenate([self._waiting[name], counts])
             rows = self._streams[name].rows
             while len(self._waiting[name]) >= rows:
-                self._kept += self._sent(name, self._waiting[name][:rows])
+                data += self._sent(name, self._waiting[name][:rows])
                 self._waiting[name] = self._waiting[name][rows:]
-        if self.stalled:
-            return
-        if self.streaming:
-            self._port.write(self.faults.apply(self._kept, self._rng))
-        self._kept = b''
+        self._send(data)
 
     def _sent(self, name: str, counts: Counts) -> bytes:
         """Return the bytes that one frame becomes."""

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_simulation.devices.faults import ByteFaults, FrameFaults
-from texture_simulation.devices.pty_port import PtyPort
+from texture_simulation.devices.device import Device
+from texture_simulation.devices.faults import FrameFaults
 from texture_simulation.devices.tsf85_encoder import TAXELS, Counts, Image, Tsf85Encoder
 
 AUTOSEND = re.compile(rb'\x9a.\x58\x01(.)', re.DOTALL)  # the last byte is the period in ms; 0 stops
@@ -16,60 +16,37 @@ KEPT_BYTES = 4  # of an incomplete command
 UNKNOWN_ITEM = b'\x80'  # no type that any firmware known sends
 
 
-class EmulatedTsf85:
-    """An emulated sensor without a clock of its own: `advance` it by the milliseconds that have passed.
+class EmulatedTsf85(Device):
+    """An emulated sensor: `advance` it by the milliseconds that have passed.
 
     Parameters
     ----------
-    link
-        Symbolic link that leads to the device; this is the path for the driver.
-    rng
-        Randomness of the faults.
+    link, rng
+        See `Device`.
     finger, long_stamps
         See `Tsf85Encoder`.
     """
 
     def __init__(self, link: Path, rng: np.random.Generator, finger: int = 0, long_stamps: bool = True) -> None:
-        self.faults = ByteFaults()
-        self.frame_faults = FrameFaults()
+        super().__init__(link, rng)
         self.started = False
-        self.mute = False
-        self.stalled = False
-        self.wrong_firmware = False
         self.deaf_starts = 0  # so many start commands to come do not help, as after an unclean end
-        self._port = PtyPort(link)
-        self._rng = rng
         self._encoder = Tsf85Encoder(finger, long_stamps)
-        self._heard = self._kept = b''
+        self._heard = b''
         self._clock_ms = 0
         self._image: Image = np.zeros(TAXELS, dtype=np.uint16)
         self._image_is_new = False
 
     @property
-    def plugged(self) -> bool:
-        """Whether the device is there."""
-        return self._port.plugged
-
-    @property
     def streaming(self) -> bool:
         """Whether it sends."""
-        return self.plugged and self.started and not self.mute
+        return super().streaming and self.started
 
-    @property
-    def dropped_bytes(self) -> int:
-        """How many bytes nobody took."""
-        return self._port.dropped_bytes
-
-    def plug(self) -> None:
-        """Appear, under a new name, with the clock at 0 and silent until started."""
-        self._port.plug()
+    def reset(self) -> None:
+        """Begin the clock anew, silent until started, as after a brown-out."""
+        super().reset()
         self._clock_ms = 0
-        self._kept = b''
         self.started = False
-
-    def unplug(self) -> None:
-        """Vanish."""
-        self._port.unplug()
 
     def advance(self, dynamic: Counts, images: Image) -> None:
         """Let as many milliseconds pass as there are dynamic values, and send them if started.
@@ -83,12 +60,10 @@ class EmulatedTsf85:
         self._obey(self._port.read())
         if len(images):
             self._image, self._image_is_new = images[-1], True
+        data = b''
         if self.streaming:
-            self._kept += self._sent(dynamic)
-            self._image_is_new = False
-        if not self.stalled:
-            self._port.write(self.faults.apply(self._kept, self._rng))
-            self._kept = b''
+            data, self._image_is_new = self._sent(dynamic), False
+        self._send(data)
         self.pass_by(len(dynamic))
 
     def pass_by(self, milliseconds: int) -> None:

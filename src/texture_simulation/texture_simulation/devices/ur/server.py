@@ -14,7 +14,7 @@ from functools import partial
 from typing import Protocol
 
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerState
+from texture_core.finger import FingerSender, FingerState
 from texture_simulation.devices.ur.controller import Controller
 from texture_simulation.devices.ur.dashboard import DashboardSession
 from texture_simulation.devices.ur.rtde import InputClaims, RtdeSession
@@ -167,16 +167,11 @@ class FingerReport:
 
     def __init__(self, controller: Controller, port: int) -> None:
         self._controller = controller
-        self._address = ('127.0.0.1', port)
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._bench = FingerSender(port)
 
     def send(self) -> None:
-        """Send one datagram; nobody needs to listen."""
-        if not self._address[1]:
-            return
+        """Send one datagram."""
         robot = self._controller.robot
         x, y, z = (robot.pose[:3] - robot.surface.origin).tolist()
         vx, vy, vz = robot.velocity[:3].tolist()
-        state = FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n)
-        with suppress(OSError):
-            self._socket.sendto(state.to_bytes(), self._address)
+        self._bench.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
