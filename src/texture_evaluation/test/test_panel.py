@@ -6,16 +6,10 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_evaluation.panel import (
-    Ratings,
-    examine,
-    intraclass_correlation,
-    krippendorff_alpha,
-    one_against_rest,
-    protocol_violations,
-    read_ratings,
-)
+from texture_evaluation.agreement import intraclass_correlation, krippendorff_alpha, one_against_rest
+from texture_evaluation.panel import examine, protocol_violations
 from texture_evaluation.panel_charts import deviations_chart, votes_chart
+from texture_evaluation.ratings import Ratings, read_ratings
 
 DATA = (
     Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
@@ -50,7 +44,7 @@ def test_the_intraclass_correlations_are_those_of_shrout_and_fleiss() -> None:
 
 
 def test_alpha_is_one_for_full_agreement_and_that_of_krippendorffs_example() -> None:
-    assert krippendorff_alpha(panel(np.array([[1, 2, 3], [1, 2, 3]]))) == pytest.approx(1.0)
+    assert krippendorff_alpha(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0]])) == pytest.approx(1.0)
     # Krippendorff 2011, "Computing Krippendorff's alpha-reliability", section C: four observers, 0.849 for intervals.
     nan = np.nan
     observers = np.array(
@@ -61,7 +55,7 @@ def test_alpha_is_one_for_full_agreement_and_that_of_krippendorffs_example() -> 
             [1, 2, 3, 3, 2, 4, 4, 1, 2, 5, 1, nan],
         ]
     )
-    assert krippendorff_alpha(panel(observers)) == pytest.approx(0.849, abs=5e-4)
+    assert krippendorff_alpha(observers) == pytest.approx(0.849, abs=5e-4)
 
 
 def test_one_person_is_compared_with_the_mean_of_the_others() -> None:

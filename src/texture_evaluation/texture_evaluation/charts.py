@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from scipy.signal import welch
 
-from texture_core.arrays import AnyArray, Array, Samples
-from texture_core.estimates import TextureEstimate
+from texture_core.arrays import AnyArray, Array
 
 # Okabe & Ito 2008: told apart by all kinds of colour vision.
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000')
@@ -31,56 +28,6 @@ STYLE: Any = {
 }
 DPI = 130
 MANY = 25  # more labels than this: no numbers in the cells
-SHOWN_LABELS = 4
-SHOWN_S = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Tour:
-    """One slide from the first sample to the decision, and how often such decisions are right.
-
-    Parameters
-    ----------
-    source
-        Where the signal comes from, in words, such as 'simulated TSF-85'.
-    surface
-        What the finger slid over.
-    samples : (n_samples,)
-        One channel of the slide.
-    rate_hz, unit
-        Of the samples.
-    estimates
-        The growing evidence, after each window.
-    labels, table
-        Confusion of test windows, as `metrics.confusion` counts it.
-    others
-        Slides over other surfaces, (n_samples,) each, whose spectra are drawn beside for comparison.
-    """
-
-    source: str
-    surface: str
-    samples: Array
-    rate_hz: float
-    unit: str
-    estimates: Sequence[TextureEstimate]
-    labels: Sequence[str]
-    table: AnyArray
-    others: Mapping[str, Array] = field(default_factory=dict)
-
-
-def picture(tour: Tour, path: str | Path) -> Path:
-    """Draw one slide in four panels: signal, spectrum, evidence and confusion."""
-    with chart(path, (11.0, 8.0)) as figure:
-        figure.suptitle(
-            f'How a slide over {tour.surface} is recognised ({tour.source})', x=0.02, ha='left', fontweight='bold'
-        )
-        (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
-        _signal(signal, tour)
-        _spectrum(spectrum, tour)
-        _evidence(evidence, tour)
-        _table(table, tour.labels, tour.table)
-        table.set_title('4. All test slides: what each single window was taken for')
-    return Path(path)
 
 
 def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: str | Path) -> Path:
@@ -88,7 +35,7 @@ def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: st
     side = 3.5 + 0.28 * len(labels)
     with chart(path, (side + 0.8, side)) as figure:
         axes = figure.subplots()
-        _table(axes, labels, table)
+        draw_confusion(axes, labels, table)
         axes.set_title(title)
     return Path(path)
 
@@ -110,7 +57,7 @@ def line_chart(
     """Draw lines of percentages over x, on a logarithmic x axis if wanted; (x, y) by the name of each line."""
     with chart(path, (7.0, 4.2)) as figure:
         axes = figure.subplots()
-        for (name, (x, y)), style in zip(series.items(), _styles(), strict=False):
+        for (name, (x, y)), style in zip(series.items(), line_styles(), strict=False):
             axes.plot(x, y, label=name, marker='.', **style)
         axes.set(xlabel=axis_labels[0], ylabel=axis_labels[1], title=title)
         if logarithmic:
@@ -241,48 +188,15 @@ def _front(axes: Any, points: Mapping[str, tuple[float, float]], names: Sequence
         )  # fmt: skip
 
 
-def _styles() -> Iterator[dict[str, Any]]:
+def line_styles() -> Iterator[dict[str, Any]]:
+    """Yield styles of lines that are told apart."""
     for dashes in ('-', '--', ':'):
         for colour in COLOURS:
             yield {'color': colour, 'linestyle': dashes}
 
 
-def _signal(axes: Any, tour: Tour) -> None:
-    shown = tour.samples[: round(SHOWN_S * tour.rate_hz)]
-    axes.plot(np.arange(len(shown)) / tour.rate_hz, shown, color=COLOURS[0], linewidth=0.8)
-    axes.set(xlabel='time since the slide began (s)', ylabel=f'signal ({tour.unit or "no unit"})')
-    axes.set_title(f'1. The fingertip vibrates while it slides: the first {SHOWN_S} s')
-
-
-def _spectrum(axes: Any, tour: Tour) -> None:
-    slides = {tour.surface: tour.samples, **tour.others}
-    for (name, slide), colour in zip(slides.items(), COLOURS, strict=False):
-        samples: Samples = np.asarray(slide, dtype=float)
-        n_segment = min(len(samples), round(tour.rate_hz / 2))
-        hertz, power = welch(samples, fs=tour.rate_hz, nperseg=n_segment)
-        own = name == tour.surface
-        axes.semilogy(hertz[1:], power[1:], color=colour, linewidth=1.4 if own else 0.7, label=name, zorder=2 + own)
-    unit = f'{tour.unit}²/Hz' if tour.unit else '1/Hz'
-    axes.set(xlabel='frequency (Hz)', ylabel=f'power density ({unit})')
-    axes.set_title('2. Its spectrum is the mark of the surface')
-    if tour.others:
-        axes.legend(loc='upper right')
-
-
-def _evidence(axes: Any, tour: Tour) -> None:
-    labels = tour.estimates[-1].labels
-    seconds = [estimate.evidence_s for estimate in tour.estimates]
-    probabilities = 100 * np.array([estimate.probabilities for estimate in tour.estimates])
-    shown = np.argsort(-probabilities.max(axis=0))[:SHOWN_LABELS]
-    for column, style in zip(sorted(shown, key=lambda c: -probabilities[-1, c]), _styles(), strict=False):
-        axes.plot(seconds, probabilities[:, column], marker='.', label=labels[column], **style)
-    axes.set(xlabel='sliding time used (s)', ylabel='probability (%)', ylim=(-3, 103))
-    axes.set_xlim(left=0)
-    axes.set_title(f'3. Evidence grows until it says: {tour.estimates[-1].label}')
-    axes.legend(loc='center right', title='surface')
-
-
-def _table(axes: Any, labels: Sequence[str], table: AnyArray) -> None:
+def draw_confusion(axes: Any, labels: Sequence[str], table: AnyArray) -> None:
+    """Draw a confusion table into a panel; each row adds up to 100 %."""
     totals = np.maximum(table.sum(axis=1, keepdims=True), 1)
     percent = 100 * table / totals
     image = axes.imshow(percent, cmap='Blues', vmin=0, vmax=100)

@@ -9,10 +9,12 @@ import pytest
 from texture_core.errors import InvalidParameter
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.simulated_surface import SimulatedSurface
-from texture_exploration.force_control import ForceController, ForceLoopParams, SlopeObserver, StiffnessEstimate
+from texture_exploration.force_control import ForceController, ForceLoopParams
 from texture_exploration.force_trials import ARM, CIRCLE, SURFACES, slide_trial, surface_trials
 from texture_exploration.motions.touch import TouchParams
+from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import growth
+from texture_exploration.stiffness import StiffnessEstimate
 
 TILT = math.radians(10)
 PERIOD_S = 0.004

@@ -13,24 +13,14 @@ k is estimated while the finger comes into contact, and g follows from it: see `
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass
-
-import numpy as np
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
+from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import Loop, border_gain
+from texture_exploration.stiffness import TOUCHING_N, StiffnessEstimate
 
-SOFTEST_N_M = 50.0
-MIN_POINTS = 3
-RECENT_SHARE = 0.5  # of the force, from which on points count
-MIN_RISE_N = 0.1  # of the force, before a stiffness can be told from noise
-TOUCHING_N = 0.03
-OBSERVED = 8  # heights that tell the slope: fewer follow a bump better, but shake with a finger that sticks and slips
-SHORTEST_M = 1e-6  # way over which a slope is told
-LIKELY_SLOPE = 0.2
-LIKELY_BEND_1_M = 0.5  # half of the second derivative; higher bends are followed the better k is known
 NOISE_N = 0.005  # of the force
 SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
 SETTLED = 0.3  # from an error of this share of the wanted force on, the slope is observed
@@ -86,43 +76,6 @@ class ForceLoopParams:
         return self.impact_n / self.stiffest_n_m
 
 
-class StiffnessEstimate:
-    """Feel how stiff a contact is, by the slope of force over height while the force rises: least squares."""
-
-    def __init__(self) -> None:
-        self.value_n_m = math.nan
-        self.restart()
-
-    @property
-    def empty(self) -> bool:
-        """Whether this contact has just begun."""
-        return not self._points
-
-    def restart(self) -> None:
-        """The contact ended: forget the points, not the value."""
-        self.fixed = False  # for the rest of this contact
-        self._points: list[tuple[float, float]] = []
-
-    def update(self, height_m: float, force_n: float) -> None:
-        """Take a point; those before the contact are passed over."""
-        if self.fixed or force_n < TOUCHING_N or (self._points and force_n <= self._points[-1][1]):
-            return
-        self._points.append((height_m, force_n))
-        # A finger is the stiffer the harder it is pressed: what counts is how stiff it is now.
-        recent_n = min(RECENT_SHARE * force_n, force_n - 1.5 * MIN_RISE_N)
-        self._points = [point for point in self._points if point[1] >= recent_n]
-        if len(self._points) >= MIN_POINTS and force_n - self._points[0][1] > MIN_RISE_N:
-            self.value_n_m = max(SOFTEST_N_M, self._slope())
-
-    def _slope(self) -> float:
-        count = len(self._points)
-        z_mean = sum(z for z, _ in self._points) / count
-        f_mean = sum(f for _, f in self._points) / count
-        spread = sum((z - z_mean) ** 2 for z, _ in self._points)
-        shared = sum((z - z_mean) * (f - f_mean) for z, f in self._points)
-        return -shared / spread if spread > 0 else math.nan
-
-
 class ForceController:
     """The PI part, with a limit of the speed and no windup at it.
 
@@ -153,60 +106,6 @@ class ForceController:
         if limited == wanted or (wanted > 0) == (error_n > 0):
             self._sum_ns = added
         return limited
-
-
-class SlopeObserver:
-    """How fast the surface will rise under the finger, freed from what the controller does itself.
-
-    A parabola through the last heights over the way tells the slope where the finger will be when the answer comes
-    into effect; times the speed that is commanded now, it is the rise then.
-
-    Parameters
-    ----------
-    ahead_s
-        From a height to the middle of the time in which the answer to it is in effect.
-    """
-
-    def __init__(self, ahead_s: float) -> None:
-        self._ahead_s = ahead_s
-        self._seen: deque[tuple[float, float]] = deque(maxlen=OBSERVED)
-
-    @property
-    def running(self) -> bool:
-        """Whether it has seen a height."""
-        return bool(self._seen)
-
-    def restart(self) -> None:
-        """The finger left the surface."""
-        self._seen.clear()
-
-    def update(self, way_m: float, surface_m: float, speed_m_s: float, noise_m: float) -> float:
-        """Return how fast the surface will rise, m/s.
-
-        Parameters
-        ----------
-        way_m
-            That the finger has gone along the surface.
-        surface_m
-            Height of the untouched surface, z + F/k.
-        speed_m_s
-            Along the surface, as commanded.
-        noise_m
-            Of the height.
-        """
-        self._seen.append((way_m, surface_m))
-        if len(self._seen) < MIN_POINTS:
-            return 0.0
-        way, height = np.array(self._seen).T
-        unit = max(float(way[-1] - way[0]), SHORTEST_M)
-        way = (way - way_m) / unit
-        shapes = np.stack([way, way**2], axis=1)
-        shapes = shapes - shapes.mean(axis=0)
-        # Likely slopes and bends, as if they had been seen once beside the heights.
-        likely = np.diag([noise_m / (LIKELY_SLOPE * unit), noise_m / (LIKELY_BEND_1_M * unit**2)]) ** 2
-        slope, bend = np.linalg.solve(shapes.T @ shapes + likely, shapes.T @ (height - height.mean()))
-        ahead = min(1.0, speed_m_s * self._ahead_s / unit)
-        return float((slope + 2 * bend * ahead) / unit * speed_m_s)
 
 
 @dataclass(frozen=True)

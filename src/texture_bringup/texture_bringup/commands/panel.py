@@ -6,8 +6,9 @@ import argparse
 import math
 from pathlib import Path
 
-from texture_evaluation.panel import ROUGH, SMOOTH, PanelReport, examine, read_ratings
+from texture_evaluation.panel import PanelReport, examine
 from texture_evaluation.panel_charts import deviations_chart, votes_chart
+from texture_evaluation.ratings import ROUGH, SMOOTH, read_ratings
 
 SHOWN_VIOLATIONS = 5
 

@@ -13,8 +13,8 @@ from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
 from texture_evaluation.bags import read_bag
-from texture_evaluation.charts import Tour, picture
 from texture_evaluation.evaluate import Report
+from texture_evaluation.tour_chart import Tour, picture
 
 
 def draw(bag: Path, surface: str, report: Report, source: str, path: Path) -> Path:

@@ -1,0 +1,48 @@
+"""How stiff a contact is, felt while the force rises."""
+
+from __future__ import annotations
+
+import math
+
+SOFTEST_N_M = 50.0
+MIN_POINTS = 3
+RECENT_SHARE = 0.5  # of the force, from which on points count
+MIN_RISE_N = 0.1  # of the force, before a stiffness can be told from noise
+TOUCHING_N = 0.03
+
+
+class StiffnessEstimate:
+    """Feel how stiff a contact is, by the slope of force over height while the force rises: least squares."""
+
+    def __init__(self) -> None:
+        self.value_n_m = math.nan
+        self.restart()
+
+    @property
+    def empty(self) -> bool:
+        """Whether this contact has just begun."""
+        return not self._points
+
+    def restart(self) -> None:
+        """The contact ended: forget the points, not the value."""
+        self.fixed = False  # for the rest of this contact
+        self._points: list[tuple[float, float]] = []
+
+    def update(self, height_m: float, force_n: float) -> None:
+        """Take a point; those before the contact are passed over."""
+        if self.fixed or force_n < TOUCHING_N or (self._points and force_n <= self._points[-1][1]):
+            return
+        self._points.append((height_m, force_n))
+        # A finger is the stiffer the harder it is pressed: what counts is how stiff it is now.
+        recent_n = min(RECENT_SHARE * force_n, force_n - 1.5 * MIN_RISE_N)
+        self._points = [point for point in self._points if point[1] >= recent_n]
+        if len(self._points) >= MIN_POINTS and force_n - self._points[0][1] > MIN_RISE_N:
+            self.value_n_m = max(SOFTEST_N_M, self._slope())
+
+    def _slope(self) -> float:
+        count = len(self._points)
+        z_mean = sum(z for z, _ in self._points) / count
+        f_mean = sum(f for _, f in self._points) / count
+        spread = sum((z - z_mean) ** 2 for z, _ in self._points)
+        shared = sum((z - z_mean) * (f - f_mean) for z, f in self._points)
+        return -shared / spread if spread > 0 else math.nan
