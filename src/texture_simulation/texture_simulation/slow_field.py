@@ -29,9 +29,9 @@ def slowly(field: Callable[[Array, Array], AnyArray], x_m: Array, y_m: Array, wi
     if every == 1 or n_points <= every:
         return field(x_m, y_m)
     knots = np.append(np.arange(0, n_points - 1, every), n_points - 1)
-    values = field(x_m[..., knots], y_m[..., knots])
+    values = field(x_m.take(knots, axis=-1), y_m.take(knots, axis=-1))
     points = np.arange(n_points)
     left = np.minimum(points // every, len(knots) - 2)
     share = (points - knots[left]) / (knots[left + 1] - knots[left])
     rise = np.diff(values)
-    return np.asarray(values[..., left] + rise[..., left] * share)
+    return np.asarray(values.take(left, axis=-1) + rise.take(left, axis=-1) * share)

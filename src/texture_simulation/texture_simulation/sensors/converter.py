@@ -60,7 +60,8 @@ class Converter:
             for through in self._through:
                 counts = through(counts)
             counts = counts * self._scale
-        return np.clip(np.rint(counts), *self._limits)
+        whole = np.rint(counts)
+        return np.clip(whole, *self._limits, out=whole)
 
     def counts(self, counts: Samples, kind: type[Integer]) -> NDArray[Integer]:
         """Return the same as whole numbers."""

@@ -8,6 +8,7 @@ low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the p
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +30,12 @@ RATE_HZ = tables.RATE_HZ
 OVERSAMPLING = 1
 PATH_RATE_HZ = OVERSAMPLING * RATE_HZ
 FILMS, GAUGES = 4, 4
+ELEMENTS = FILMS + GAUGES
 CHANNELS = tuple(
     f'{element}_{layer}_{number}' for element in ('pvdf', 'strain') for layer in ('outer', 'inner') for number in (1, 2)
 )  # as in the driver's daq.yaml
 LAYER_BLUR_M = (1.5e-4, 4e-4)  # outer, inner; half of the films and half of the gauges lie in each
+BLUR_M = np.repeat(np.tile(LAYER_BLUR_M, 2), ELEMENTS // 4)[:, None]
 PLACE_M = 4e-3  # largest distance of a place from the middle, along each side
 VOLT_PER_N = (2.0, 6.0)  # range of the sensitivities
 VOLT_PER_COUNT = 10.0 / 2**15
@@ -56,12 +59,9 @@ class DaqModel:
         settled: bool = False,
     ) -> None:
         self.touch = Touch(scene, surface, rng, PATH_RATE_HZ, finger=finger, scans=scans)
-        count, made = FILMS + GAUGES, traits(finger)
-        self._offset_m = (made.uniform(-PLACE_M, PLACE_M, (count, 1)), made.uniform(-PLACE_M, PLACE_M, (count, 1)))
-        self._blur_m = np.repeat(np.tile(LAYER_BLUR_M, 2), count // 4)[:, None]
-        self.volt_per_n = made.uniform(*VOLT_PER_N, count) * made.choice([-1.0, 1.0], count)
+        self._offset_m, self.volt_per_n = _elements(finger)
         self._leak, self._band = Filter(LEAK, settled=settled), Filter(BAND, settled=settled)
-        self._converter = Converter(scene, rng, RATE_HZ, count, LIMITS, scans=scans)
+        self._converter = Converter(scene, rng, RATE_HZ, ELEMENTS, LIMITS, scans=scans)
 
     def streams(self, path: Path, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return the 8 channels in V."""
@@ -82,14 +82,22 @@ class DaqModel:
         return self._converter.counts(self._exact(path), np.int16)
 
     def _exact(self, path: Path) -> Samples:
-        volt = self.volt_per_n[:, None] * self._pressed_n(self.touch.placed(path))
-        volt[..., :FILMS, :] = self._leak(volt[..., :FILMS, :])
-        felt = self._band(volt)[..., OVERSAMPLING - 1 :: OVERSAMPLING]
-        return np.swapaxes(felt, -1, -2) / VOLT_PER_COUNT
+        pressed_n = self._pressed_n(self.touch.placed(path))
+        pressed_n[..., :FILMS, :] = self._leak(pressed_n[..., :FILMS, :])
+        felt_n = self._band(pressed_n)[..., OVERSAMPLING - 1 :: OVERSAMPLING]
+        return np.swapaxes(felt_n, -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
 
     def _pressed_n(self, placed: Path) -> Array:
         """Return the force that each element feels, (..., 8, n)."""
-        return placed.force_n[..., None, :] + self.touch.variation_n(placed, self._blur_m, self._offset_m)
+        return placed.force_n[..., None, :] + self.touch.variation_n(placed, BLUR_M, self._offset_m)
+
+
+@lru_cache(maxsize=16)
+def _elements(finger: int) -> tuple[tuple[Array, Array], Array]:
+    """Return where the elements of a finger lie, x and y, (8, 1) m each, and their sensitivities, (8,) V/N."""
+    made = traits(finger)
+    offset_m = (made.uniform(-PLACE_M, PLACE_M, (ELEMENTS, 1)), made.uniform(-PLACE_M, PLACE_M, (ELEMENTS, 1)))
+    return offset_m, made.uniform(*VOLT_PER_N, ELEMENTS) * made.choice([-1.0, 1.0], ELEMENTS)
 
 
 KIND = SensorKind(

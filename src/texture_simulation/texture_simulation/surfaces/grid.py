@@ -34,5 +34,10 @@ class Grid:
         along = profile(x_m * cosine + y_m * sine, blur_m, self.pitch_x_m, self.shape, self.duty)
         across = profile(y_m * cosine - x_m * sine, blur_m, self.pitch_y_m, self.shape, self.duty)
         sign = 1.0 if self.relief == 'posts' else -1.0
-        # (mean + along)·(mean + across) less its own mean
-        return sign * self.depth_m * (along * across + mean * (along + across))
+        # Less its own mean; in place, which costs half as much.
+        along += mean
+        across += mean
+        along *= across
+        along -= mean**2
+        along *= sign * self.depth_m
+        return along

@@ -29,6 +29,8 @@ def profile(across_m: Array, blur_m: Array, pitch_m: float, shape: str, duty: fl
     first_share = np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
     amplitudes = _amplitudes(pitch_m, shape, duty, float(blur_m.min(initial=pitch_m)))
     height = amplitudes[0] * first_share * cosine
+    if len(amplitudes) == 1:
+        return np.asarray(height)
     twice, wave, before = 2 * cosine, cosine, np.ones_like(cosine)
     share, ratio, square = first_share, first_share**3, first_share**2
     for amplitude in amplitudes[1:]:

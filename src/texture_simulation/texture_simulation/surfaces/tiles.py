@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import lru_cache
 from typing import Protocol
@@ -9,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.arrays import Array
+from texture_core.arrays import AnyArray, Array
 from texture_simulation.surfaces.surface import LEAST_BLUR_M, MOST_BLUR_M
 
 SIDE = 256  # points along each side of a tile; a power of two
@@ -17,6 +18,8 @@ POINTS_PER_WAVE = 4  # of the shortest wave
 # The periodic tile lies askew at the golden slope, so that a slide along x or y never meets the same stretch again.
 TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
 BLURS_M = np.geomspace(LEAST_BLUR_M, MOST_BLUR_M, 10)  # tiles are made for these and interpolated between
+WORTH_MIXING = 10_000  # points under one blur, from which on a tile of its own is cheaper than mixing point by point
+TILE_POINTS = (SIDE + 1) ** 2
 
 
 class Random(Protocol):
@@ -37,69 +40,85 @@ def tile_height(random: Random, x_m: Array, y_m: Array, blur_m: Array) -> Array:
     """Return the height of random relief at places, (..., n); `blur_m` is (..., n) or (..., 1)."""
     cosine, sine = math.cos(TURN_RAD) / random.spacing_m, math.sin(TURN_RAD) / random.spacing_m
     rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
-    level = np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M)))
-    low = np.minimum(level, len(BLURS_M) - 1.001).astype(np.intp)
-    share = level - low
-    if low.min() == low.max():
-        return _mixed(random, int(low.flat[0]), share, rows, columns)
-    # What has one blur along its way is picked out way by way: far cheaper than point by point.
-    shape = rows.shape[: rows.ndim - (low.shape[-1] == 1)]
-    low, share = (
-        np.broadcast_to(values[..., 0] if len(shape) < rows.ndim else values, shape) for values in (low, share)
-    )
-    height = np.empty_like(rows)
-    for value in np.unique(low):
-        here = low == value
-        part = share[here][..., None] if len(shape) < rows.ndim else share[here]
-        height[here] = _mixed(random, int(value), part, rows[here], columns[here])
-    return height
+    level = np.minimum(np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M))), len(BLURS_M) - 1.001)
+    many = level.shape[-1] == 1 and rows.size >= WORTH_MIXING
+    if many and len(levels := np.unique(level)) * WORTH_MIXING <= rows.size:
+        height = _bilinear(_mixed(random, tuple(levels.tolist())), np.searchsorted(levels, level), rows, columns)
+        return np.asarray(height, dtype=np.float64)
+    low = level.astype(np.intp)
+    first = int(low.min())
+    both = _bilinear(_pairs(random, first, int(low.max()) + 1), low - first, rows, columns)
+    return np.asarray(both.real + (level - low) * (both.imag - both.real), dtype=np.float64)
 
 
-def _mixed(random: Random, low: int, share: Array, rows: Array, columns: Array) -> Array:
-    """Return the height between the tiles of two blurs: `share` of the blunter."""
-    both = _bilinear(_pair(random, low), rows, columns)
-    return np.asarray(both.real + share * (both.imag - both.real), dtype=np.float64)
-
-
-def _bilinear(tile: NDArray[np.complex64], rows: Array, columns: Array) -> NDArray[np.complex64]:
-    """Return a tile, with its first row and column again at its end, between its points; rows and columns go on.
+def _bilinear(tiles: AnyArray, number: NDArray[np.intp], rows: Array, columns: Array) -> AnyArray:
+    """Return tiles between their points; rows and columns go on periodically.
 
     Written in place, which takes two thirds of the time.
+
+    Parameters
+    ----------
+    tiles : (n_tiles * (SIDE + 1)**2,) in single precision, real or complex
+        Flat, one after the other, the first row and column of each again at its end.
+    number : (..., n) or (..., 1)
+        Which of the tiles.
+    rows, columns : (..., n)
     """
     row, column = np.floor(rows), np.floor(columns)
     down, right = (rows - row).astype(np.float32), (columns - column).astype(np.float32)
-    at = (row.astype(np.intp) & (SIDE - 1)) * (SIDE + 1)
-    at += column.astype(np.intp) & (SIDE - 1)
-    upper = _between(tile, at, right)
+    at = row.astype(np.intp)
+    at &= SIDE - 1
+    at *= SIDE + 1
+    place = column.astype(np.intp)
+    place &= SIDE - 1
+    at += place
+    if len(tiles) > TILE_POINTS:
+        at += TILE_POINTS * number
+    upper = _between(tiles, at, right)
     at += SIDE + 1
-    lower = _between(tile, at, right)
+    lower = _between(tiles, at, right)
     lower -= upper
     lower *= down
     upper += lower
     return upper
 
 
-def _between(tile: NDArray[np.complex64], at: NDArray[np.intp], share: NDArray[np.float32]) -> NDArray[np.complex64]:
+def _between(tiles: AnyArray, at: NDArray[np.intp], share: NDArray[np.float32]) -> AnyArray:
     """Return values between points and those after them."""
-    value, after = tile.take(at), tile.take(at + 1)
+    value, after = tiles.take(at), tiles[1:].take(at)
     after -= value
     after *= share
     value += after
     return value
 
 
-@lru_cache(maxsize=256)
-def _pair(random: Random, low: int) -> NDArray[np.complex64]:
-    """Return the tiles of a blur and of the next blunter one as real and imaginary part: found at once.
+@lru_cache(maxsize=64)
+def _mixed(random: Random, levels: tuple[float, ...]) -> AnyArray:
+    """Return one tile for each of some levels of blur."""
+    tiles = []
+    for level in levels:
+        pair = _pairs(random, int(level), int(level) + 1)
+        tiles.append(pair.real + np.float32(level - int(level)) * (pair.imag - pair.real))
+    return np.concatenate(tiles)
 
-    Flat, ((SIDE + 1)²,), the first row and column again at the end.
-    """
+
+@lru_cache(maxsize=128)
+def _pairs(random: Random, first: int, end: int) -> AnyArray:
+    """Return the tiles of some levels of blur, and of the next blunter ones as imaginary part: found at once."""
+    blurred = [_blurred(random, level) for level in range(first, end + 1)]
+    return _flat([sharp + 1j * blunt for sharp, blunt in itertools.pairwise(blurred)]).astype(np.complex64)
+
+
+def _flat(tiles: list[AnyArray]) -> AnyArray:
+    """Return tiles one after the other, each with its first row and column again at its end."""
+    return np.concatenate([np.pad(tile, ((0, 1), (0, 1)), mode='wrap').ravel() for tile in tiles])
+
+
+def _blurred(random: Random, level: int) -> Array:
+    """Return a tile, (SIDE, SIDE) m, under one of the blurs."""
     spectrum, wave_1_m = _spectrum(random)
-    sharp, blunt = (
-        np.fft.irfft2(spectrum * np.exp(-0.5 * (2 * np.pi * wave_1_m * blur) ** 2), s=(SIDE, SIDE))
-        for blur in BLURS_M[low : low + 2]
-    )
-    return np.pad((sharp + 1j * blunt).astype(np.complex64), ((0, 1), (0, 1)), mode='wrap').ravel()
+    weak = np.exp(-0.5 * (2 * np.pi * wave_1_m * BLURS_M[level]) ** 2)
+    return np.asarray(np.fft.irfft2(spectrum * weak, s=(SIDE, SIDE)))
 
 
 @lru_cache(maxsize=64)
