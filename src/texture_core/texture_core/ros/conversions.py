@@ -1,8 +1,11 @@
-"""Data classes of texture_core to messages and back; each pair is one row of two tables."""
+"""Data classes of texture_core to messages and back: field by field of the same name, the time in the header."""
 
 from __future__ import annotations
 
 import array
+import typing
+from collections.abc import Callable, Mapping
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +13,7 @@ from std_msgs.msg import Header
 from texture_msgs import msg
 from texture_msgs.action import Explore
 
+from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
@@ -17,10 +21,24 @@ from texture_core.features import FeatureVector
 from texture_core.ros.time import to_ns, to_stamp
 from texture_core.signal import TactileSignal
 
+MESSAGES: Mapping[type, type] = {
+    ExplorationState: msg.ExplorationState,
+    FeatureVector: msg.FeatureVector,
+    TextureEstimate: msg.TextureEstimate,
+    RoughnessEstimate: msg.RoughnessEstimate,
+}
+DATA_CLASSES = {message: cls for cls, message in MESSAGES.items()}
+STAMPS = ('stamp_ns', 'start_ns')  # the field that stands in the header
+Convert = Callable[[Any], Any] | None  # None: the same on both sides
+
 
 def to_msg(value: Any) -> Any:
     """Return the message of a data class of texture_core."""
-    return TO_MSG[type(value)](value)
+    if isinstance(value, TactileSignal):
+        return _signal_to_msg(value)
+    stamp, fields = _plan(type(value))
+    values = {name: wire(getattr(value, name)) if wire else getattr(value, name) for name, wire, _ in fields}
+    return MESSAGES[type(value)](header=Header(stamp=to_stamp(getattr(value, stamp))), **values)
 
 
 def from_msg(message: Any) -> Any:
@@ -31,7 +49,13 @@ def from_msg(message: Any) -> Any:
     InvalidData
         If the message contradicts itself.
     """
-    return FROM_MSG[type(message)](message)
+    if isinstance(message, msg.TactileSignal):
+        return _signal_from_msg(message)
+    cls = DATA_CLASSES[type(message)]
+    stamp, fields = _plan(cls)
+    values = {name: unwire(getattr(message, name)) if unwire else getattr(message, name) for name, _, unwire in fields}
+    values[stamp] = to_ns(message.header.stamp)
+    return cls(**values)
 
 
 def _signal_to_msg(signal: TactileSignal) -> msg.TactileSignal:
@@ -68,146 +92,35 @@ def _signal_from_msg(message: msg.TactileSignal) -> TactileSignal:
     )
 
 
-def _state_to_msg(state: ExplorationState) -> msg.ExplorationState:
-    return msg.ExplorationState(
-        header=Header(stamp=to_stamp(state.stamp_ns)),
-        exploration_id=state.exploration_id,
-        motion=state.motion,
-        phase=state.phase.value,
-        steady_s=float(state.steady_s),
-        speed_m_s=float(state.speed_m_s),
-        force_n=float(state.force_n),
-        direction_rad=float(state.direction_rad),
-        progress=float(state.progress),
-        surface=state.surface,
-    )
-
-
-def _state_from_msg(message: msg.ExplorationState) -> ExplorationState:
+def _phase(text: str) -> Phase:
     try:
-        phase = Phase(message.phase)
+        return Phase(text)
     except ValueError as error:
         raise InvalidData(
-            f"exploration state has the phase '{message.phase}'; allowed are {', '.join(p.value for p in Phase)}"
+            f"exploration state has the phase '{text}'; allowed are {', '.join(p.value for p in Phase)}"
         ) from error
-    return ExplorationState(
-        stamp_ns=to_ns(message.header.stamp),
-        exploration_id=message.exploration_id,
-        motion=message.motion,
-        phase=phase,
-        steady_s=message.steady_s,
-        speed_m_s=message.speed_m_s,
-        force_n=message.force_n,
-        direction_rad=message.direction_rad,
-        progress=message.progress,
-        surface=message.surface,
-    )
 
 
-def _features_to_msg(vector: FeatureVector) -> msg.FeatureVector:
-    message = msg.FeatureVector(
-        header=Header(stamp=to_stamp(vector.start_ns)),
-        exploration_id=vector.exploration_id,
-        window_s=float(vector.window_s),
-        hop_s=float(vector.hop_s),
-        speed_m_s=float(vector.speed_m_s),
-        force_n=float(vector.force_n),
-        names=list(vector.names),
-        feature_set=vector.feature_set,
-        last=vector.last,
-        skipped=vector.skipped,
-    )
-    message.values = array.array('d', np.ascontiguousarray(vector.values, dtype=np.float64).tobytes())
-    return message
+def _doubles(values: Array) -> array.array[float]:
+    return array.array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
 
 
-def _features_from_msg(message: msg.FeatureVector) -> FeatureVector:
-    return FeatureVector(
-        start_ns=to_ns(message.header.stamp),
-        exploration_id=message.exploration_id,
-        window_s=message.window_s,
-        hop_s=message.hop_s,
-        names=tuple(message.names),
-        values=np.array(message.values, dtype=np.float64),
-        speed_m_s=message.speed_m_s,
-        force_n=message.force_n,
-        feature_set=message.feature_set,
-        last=message.last,
-        skipped=message.skipped,
-    )
+# By the type of a field: to the message, and back.
+CONVERT: Mapping[Any, tuple[Convert, Convert]] = {
+    float: (float, None),
+    tuple[str, ...]: (list, tuple),
+    tuple[float, ...]: (partial(array.array, 'd'), tuple),
+    Array: (_doubles, partial(np.array, dtype=np.float64)),
+    Phase: (lambda phase: phase.value, _phase),
+}
 
 
-def _texture_to_msg(estimate: TextureEstimate) -> msg.TextureEstimate:
-    message = msg.TextureEstimate(
-        header=Header(stamp=to_stamp(estimate.stamp_ns)),
-        exploration_id=estimate.exploration_id,
-        label=estimate.label,
-        known=estimate.known,
-        confidence=float(estimate.confidence),
-        labels=list(estimate.labels),
-        certain=estimate.certain,
-        candidates=list(estimate.candidates),
-        windows=estimate.windows,
-        evidence_s=float(estimate.evidence_s),
-        final=estimate.final,
-        processing_s=float(estimate.processing_s),
-        model=estimate.model,
-        message=estimate.message,
-    )
-    message.probabilities = array.array('d', estimate.probabilities)
-    return message
-
-
-def _texture_from_msg(message: msg.TextureEstimate) -> TextureEstimate:
-    return TextureEstimate(
-        stamp_ns=to_ns(message.header.stamp),
-        exploration_id=message.exploration_id,
-        label=message.label,
-        known=message.known,
-        confidence=message.confidence,
-        labels=tuple(message.labels),
-        probabilities=tuple(message.probabilities),
-        certain=message.certain,
-        candidates=tuple(message.candidates),
-        windows=message.windows,
-        evidence_s=message.evidence_s,
-        final=message.final,
-        processing_s=message.processing_s,
-        model=message.model,
-        message=message.message,
-    )
-
-
-def _roughness_to_msg(estimate: RoughnessEstimate) -> msg.RoughnessEstimate:
-    return msg.RoughnessEstimate(
-        header=Header(stamp=to_stamp(estimate.stamp_ns)),
-        exploration_id=estimate.exploration_id,
-        valid=estimate.valid,
-        grade=float(estimate.grade),
-        grade_std=float(estimate.grade_std),
-        windows=estimate.windows,
-        evidence_s=float(estimate.evidence_s),
-        final=estimate.final,
-        processing_s=float(estimate.processing_s),
-        model=estimate.model,
-        message=estimate.message,
-    )
-
-
-def _roughness_from_msg(message: msg.RoughnessEstimate) -> RoughnessEstimate:
-    return RoughnessEstimate(
-        stamp_ns=to_ns(message.header.stamp),
-        exploration_id=message.exploration_id,
-        valid=message.valid,
-        grade=message.grade,
-        grade_std=message.grade_std,
-        windows=message.windows,
-        evidence_s=message.evidence_s,
-        final=message.final,
-        processing_s=message.processing_s,
-        model=message.model,
-        message=message.message,
-    )
+@cache
+def _plan(cls: type) -> tuple[str, tuple[tuple[str, Convert, Convert], ...]]:
+    """Return which field is the time, and each other one with what it becomes."""
+    types = typing.get_type_hints(cls)
+    [stamp] = [name for name in STAMPS if types.pop(name, None)]
+    return stamp, tuple((name, *CONVERT.get(kind, (None, None))) for name, kind in types.items())
 
 
 def request_from_msg(goal: Any) -> ExplorationRequest:
@@ -218,19 +131,3 @@ def request_from_msg(goal: Any) -> ExplorationRequest:
 def request_to_msg(request: ExplorationRequest, kind: Any = Explore.Goal) -> Any:
     """Return a goal of the action, or of another `kind` with the same fields."""
     return kind(**{name: getattr(request, name) for name in ExplorationRequest.__dataclass_fields__})
-
-
-TO_MSG = {
-    TactileSignal: _signal_to_msg,
-    ExplorationState: _state_to_msg,
-    FeatureVector: _features_to_msg,
-    TextureEstimate: _texture_to_msg,
-    RoughnessEstimate: _roughness_to_msg,
-}
-FROM_MSG = {
-    msg.TactileSignal: _signal_from_msg,
-    msg.ExplorationState: _state_from_msg,
-    msg.FeatureVector: _features_from_msg,
-    msg.TextureEstimate: _texture_from_msg,
-    msg.RoughnessEstimate: _roughness_from_msg,
-}
