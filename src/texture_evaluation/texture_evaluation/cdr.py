@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import fields
 from functools import cache
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
@@ -28,23 +29,16 @@ MESSAGES: Mapping[str, type] = {
     for cls in (TactileSignal, ExplorationState, FeatureVector, TextureEstimate, RoughnessEstimate)
 }
 TYPES: Mapping[type, str] = {cls: name for name, cls in MESSAGES.items()}
-# Where a field is not the same thing on both sides, by its name.
-TO_WIRE: Mapping[str, Callable[[Any], Any]] = {
-    'phase': lambda phase: phase.value,
-    'channels': list,
-    'names': list,
-    'labels': list,
-    'samples': lambda samples: np.ascontiguousarray(samples, dtype=np.float32).ravel(),
-    'values': lambda values: np.ascontiguousarray(values, dtype=np.float64),
-    'probabilities': lambda values: np.array(values, dtype=np.float64),
+Convert = tuple[Callable[[Any], Any], Callable[[Any], Any]]
+# By the type of a field, where it is not the same on both sides: to the wire, and back.
+WIRE: Mapping[Any, Convert] = {
+    Phase: (lambda phase: phase.value, Phase),
+    tuple[str, ...]: (list, tuple),
+    tuple[float, ...]: (lambda values: np.array(values, dtype=np.float64), lambda values: tuple(values.tolist())),
+    Array: (lambda values: np.ascontiguousarray(values, dtype=np.float64), lambda values: values),
+    NDArray[np.float32]: (lambda samples: np.ascontiguousarray(samples, dtype=np.float32).ravel(), lambda flat: flat),
 }
-FROM_WIRE: Mapping[str, Callable[[Any], Any]] = {
-    'phase': Phase,
-    'channels': tuple,
-    'names': tuple,
-    'labels': tuple,
-    'probabilities': lambda values: tuple(values.tolist()),
-}
+SAME: Convert = (lambda value: value, lambda value: value)
 STAMPS = {'stamp_ns', 'start_ns'}
 
 
@@ -64,15 +58,14 @@ def typestore() -> Typestore:
 def encode(value: Any) -> bytes:
     """Return a data class of texture_core as CDR."""
     types = typestore().types
-    given = {item.name: getattr(value, item.name) for item in fields(value)}
+    cls: type = type(value)
+    given = {name: to_wire(getattr(value, name)) for name, (to_wire, _) in _fields(cls).items()}
     seconds, nanoseconds = divmod(next(given.pop(name) for name in STAMPS if name in given), NANOSECONDS)
     header = types['std_msgs/msg/Header'](
         stamp=types['builtin_interfaces/msg/Time'](sec=int(seconds), nanosec=int(nanoseconds)),
         frame_id=given.pop('frame_id', ''),
     )
-    wired = {name: TO_WIRE[name](content) if name in TO_WIRE else content for name, content in given.items()}
-    msgtype = TYPES[type(value)]
-    return bytes(typestore().serialize_cdr(types[msgtype](header=header, **wired), msgtype))
+    return bytes(typestore().serialize_cdr(types[TYPES[cls]](header=header, **given), TYPES[cls]))
 
 
 def decode(raw: bytes, msgtype: str) -> Any:
@@ -92,22 +85,22 @@ def decode(raw: bytes, msgtype: str) -> Any:
 def _data_class(message: Any, cls: type) -> Any:
     stamp_ns = message.header.stamp.sec * NANOSECONDS + message.header.stamp.nanosec
     values: dict[str, Any] = {}
-    for name in _names(cls):
+    for name, (_, from_wire) in _fields(cls).items():
         if name in STAMPS:
             values[name] = stamp_ns
         elif name == 'frame_id':
             values[name] = message.header.frame_id
         else:
-            content = getattr(message, name)
-            values[name] = FROM_WIRE[name](content) if name in FROM_WIRE else content
+            values[name] = from_wire(getattr(message, name))
     if cls is TactileSignal:
         values['samples'] = values['samples'].reshape(-1, len(values['channels']))
     return cls(**values)
 
 
 @cache
-def _names(cls: type) -> tuple[str, ...]:
-    return tuple(item.name for item in fields(cls))
+def _fields(cls: type) -> Mapping[str, Convert]:
+    """Return what becomes of each field."""
+    return {name: WIRE.get(kind, SAME) for name, kind in get_type_hints(cls).items()}
 
 
 class SignalDecoder:
