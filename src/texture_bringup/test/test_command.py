@@ -41,6 +41,8 @@ def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
         (['scene', 'hu', 'linen_1', '--speed', '-1'], 'speed_m_s'),
         (['bench', 'biotc'], "did you mean 'biotac20'?"),
         (['bench', 'biotac20', '--quick'], '--data'),
+        (['identify', 'm', '--slides', '0'], '--slides is 0'),
+        (['identify', '/nowhere'], "model card '/nowhere.json' cannot be read"),
     ],
 )
 def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:

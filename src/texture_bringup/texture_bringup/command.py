@@ -38,6 +38,7 @@ COMMANDS: Mapping[str, Command] = {
     'demo': Command('demo', 'the whole thing on an emulated bench: explore, learn, recognise, report'),
     'launch': Command('launch', 'start the nodes of a launch file'),
     'explore': Command('explore', 'slide the finger over the surface and say what it is'),
+    'identify': Command('identify', 'slide as tells most, again and again, until it is sure what the surface is'),
     'dashboard': Command('dashboard', 'show a web page of what is felt, with buttons to explore and stop'),
     'learn': Command('learn', 'teach what was explored last as a texture, at once; or undo it'),
     'record': Command('record', 'record the running system into a bag'),

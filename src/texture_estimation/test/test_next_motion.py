@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData, InvalidParameter
-from texture_estimation.next_motion import Explorations, Felt, Motion
+from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
+from texture_core.features import FeatureVector
+from texture_estimation.motion import Motion
+from texture_estimation.next_motion import Explorations, Felt, slide_values
 
 ACROSS = Motion('linear_slide', 0.0, 0.1, 2.0, 1.0)
 ALONG = replace(ACROSS, direction_rad=np.pi / 2)
@@ -70,8 +72,8 @@ def test_probabilities_add_up_to_one_after_any_slide_however_strange() -> None:
 
 
 def test_a_slide_moves_the_odds_by_the_ratio_of_the_gaussians() -> None:
-    felt = Felt(np.eye(1), np.array([[-1.0], [1.0]]))
-    learnt = Explorations(('a', 'b'), {ACROSS: felt})
+    felt = Felt(np.array([[-1.0], [1.0]]))
+    learnt = Explorations(('a', 'b'), np.eye(1), {ACROSS: felt})
     odds = np.subtract(*learnt.update(learnt.ignorance, ACROSS, np.array([0.3]))[::-1])
     assert odds == pytest.approx(2.0 * 0.3)
 
@@ -79,7 +81,7 @@ def test_a_slide_moves_the_odds_by_the_ratio_of_the_gaussians() -> None:
 @pytest.mark.parametrize(('apart', 'nats'), [(0.0, 0.0), (2.0, 0.3368), (4.0, 0.6327), (100.0, np.log(2))])
 def test_information_of_two_gaussians_is_that_of_a_channel_with_two_signals(apart: float, nats: float) -> None:
     """Capacity of the binary-input Gaussian channel, by numerical integration."""
-    felt = Felt(np.eye(1), np.array([[-apart / 2], [apart / 2]]))
+    felt = Felt(np.array([[-apart / 2], [apart / 2]]))
     prior = np.log([0.5, 0.5])
     draws = np.random.default_rng(0).standard_normal((40_000, 1))
     assert felt.sampled_information(prior, draws) == pytest.approx(nats, abs=5e-3)
@@ -114,6 +116,7 @@ def test_scaled_doubled_and_constant_features_change_nothing_that_matters() -> N
         (np.full((2, 1), np.nan), ['a', 'a'], [ACROSS] * 2, 'not finite'),
         (np.eye(3), ['a', 'a', 'b'], [ACROSS, ACROSS, ALONG], 'no slide over b'),
         (np.eye(2), ['a', 'b'], [ACROSS] * 2, 'how much slides differ'),
+        (np.eye(4), ['a', 'b'] * 2, [ACROSS] * 2 + [ALONG] * 2, 'how much slides differ'),
     ],
 )
 def test_slides_that_cannot_be_learnt_from_are_refused(
@@ -121,6 +124,56 @@ def test_slides_that_cannot_be_learnt_from_are_refused(
 ) -> None:
     with pytest.raises(InvalidData, match=said):
         Explorations.learnt(values, textures, motions)
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_what_lies_apart_by_chance_tells_nothing(seed: int) -> None:
+    """Three slides of each texture on 40 features: their means are far apart, their distributions the same."""
+    rng = np.random.default_rng(seed)
+    values = rng.standard_normal((60, 40))
+    learnt = Explorations.learnt(values, ['a', 'b'] * 30, [ACROSS] * 6 + [ALONG] * 54)
+    assert learnt.information(learnt.ignorance, ACROSS) < 0.35
+    after = [learnt.update(learnt.ignorance, ACROSS, slide) for slide in rng.standard_normal((200, 40))]
+    assert np.exp(np.max(after, axis=1)).mean() < 0.85
+
+
+def test_slides_of_an_arm_are_gathered_by_the_motion_that_was_meant() -> None:
+    rng = np.random.default_rng(0)
+    textures = ['a', 'b'] * 12
+    motions = [replace(ACROSS, speed_m_s=0.1 + 0.001 * k, direction_rad=3.0 * (k % 4 < 2)) for k in range(12)] * 2
+    values = rng.standard_normal((25, 3))
+    learnt = Explorations.of_slides(values, [*textures, 'a'], [*motions, None])
+    assert learnt is not None
+    assert {motion.direction_rad for motion in learnt.felt} == {0.0, 3.0}
+    alone = [replace(ACROSS, speed_m_s=0.3)]
+    more = Explorations.of_slides(values, [*textures, 'a'], [*motions, *alone])
+    assert more is not None
+    assert more.felt.keys() == learnt.felt.keys()
+    assert Explorations.of_slides(values[:24], textures, [ACROSS] * 24) is None
+    assert Explorations.of_slides(values[:0], [], []) is None
+
+
+def test_its_parts_say_all() -> None:
+    learnt = slides({ACROSS: UNLIKE, ALONG: LIKE})
+    again = Explorations.from_parts(learnt.as_parts())
+    assert again.textures == learnt.textures
+    assert again.best(again.ignorance, [ALONG, ACROSS]) == learnt.best(learnt.ignorance, [ALONG, ACROSS])
+    values = np.array([0.3, 0.1])
+    assert again.update(again.ignorance, ACROSS, values) == pytest.approx(
+        learnt.update(learnt.ignorance, ACROSS, values)
+    )
+
+
+def test_a_slide_is_the_mean_of_its_usable_windows() -> None:
+    windows = [
+        FeatureVector(k, 'id', 0.5, 0.1, ('x',), np.array([value]), feature_set='kind')
+        for k, value in enumerate((1.0, np.nan, 4.0))
+    ]
+    assert slide_values(windows, 'kind') == pytest.approx([2.5])
+    with pytest.raises(InvalidData, match='none of the 1 windows'):
+        slide_values(windows[1:2], 'kind')
+    with pytest.raises(ModelMismatch, match='does not fit'):
+        slide_values(windows, 'signal=2200Hz*1')
 
 
 def test_motions_and_values_that_were_not_learnt_are_refused() -> None:

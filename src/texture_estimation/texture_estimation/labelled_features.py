@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.features import FeatureVector
+from texture_estimation.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,8 @@ class LabelledFeatures:
         Fingerprint of what made them.
     window_s, hop_s
         Length and distance of the windows.
+    motions
+        How slides were made, as far as it is known.
 
     Raises
     ------
@@ -42,6 +45,7 @@ class LabelledFeatures:
     feature_set: str
     window_s: float
     hop_s: float
+    motions: Mapping[str, Motion] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         shape = (len(self.labels), len(self.names))

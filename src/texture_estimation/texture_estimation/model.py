@@ -22,12 +22,14 @@ from texture_estimation.familiarity import Familiarity
 from texture_estimation.learners.learner import LogProbabilities
 from texture_estimation.lessons import Lesson, read_lessons
 from texture_estimation.log_probabilities import log_softmax, undecided
+from texture_estimation.next_motion import Explorations
 from texture_estimation.prediction_sets import PredictionSets
 from texture_estimation.recipe import Recipe
 from texture_estimation.stopping import Stopping
 from texture_estimation.taught_head import TaughtHead
 
-EXAMPLES, FAMILIARITY = 'examples', 'familiarity'  # names of their parts in the file
+# Names of their parts in the file.
+EXAMPLES, FAMILIARITY, EXPLORATIONS = 'examples', 'familiarity', 'explorations'
 # What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
 TRUSTED = ('sklearn.preprocessing._data.StandardScaler', 'sklearn.svm._classes.SVC')
 
@@ -58,6 +60,8 @@ class Model:
         Which textures are candidates.
     familiarity
         Tells unknown surfaces; None takes all for known.
+    explorations
+        What textures feel like under each motion, to choose the next one; None if the slides were all of one kind.
     examples
         Windows it was trained on, to learn more beside them; None if it holds none.
     lessons
@@ -77,6 +81,7 @@ class Model:
     stopping: Stopping = field(default_factory=Stopping)
     sets: PredictionSets = field(default_factory=PredictionSets)
     familiarity: Familiarity | None = None
+    explorations: Explorations | None = None
     examples: Examples | None = None
     lessons: tuple[Lesson, ...] = ()
     taught: LogProbabilities | None = None
@@ -158,6 +163,7 @@ class Model:
             'growth': self.growth,
             'stopping': asdict(self.stopping),
             'sets': asdict(self.sets),
+            'motions': [asdict(motion) for motion in self.explorations.felt] if self.explorations else [],
             'training': dict(self.training),
             'recipe': self.recipe.as_mapping(),
             'recipe_name': self.recipe.name,
@@ -168,7 +174,7 @@ class Model:
 
         Lessons are not written: they stand beside the model that was taught.
         """
-        more = {EXAMPLES: self.examples, FAMILIARITY: self.familiarity}
+        more = {EXAMPLES: self.examples, FAMILIARITY: self.familiarity, EXPLORATIONS: self.explorations}
         kept = {name: part.as_parts() for name, part in more.items() if part}
         return model_files.write(path, {**self.parts, **kept}, {**self.card, **(facts or {})})
 
@@ -193,7 +199,7 @@ def load_model(path: str | Path) -> Model:
     try:
         recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
         parts = model_files.parts_of(content, TRUSTED)
-        examples, familiarity = parts.pop(EXAMPLES, None), parts.pop(FAMILIARITY, None)
+        examples, familiarity, felt = (parts.pop(name, None) for name in (EXAMPLES, FAMILIARITY, EXPLORATIONS))
         model = Model(
             name=str(card['name']),
             labels=tuple(map(str, card['labels'])),
@@ -206,6 +212,7 @@ def load_model(path: str | Path) -> Model:
             stopping=Stopping(**card['stopping']),
             sets=PredictionSets(**{name: _tuples(value) for name, value in card['sets'].items()}),
             familiarity=Familiarity.from_parts(familiarity) if familiarity else None,
+            explorations=Explorations.from_parts(felt) if felt else None,
             examples=Examples.from_parts(examples) if examples else None,
         )
         answer = model.predict_log_proba(np.zeros(len(model.names)))

@@ -19,6 +19,7 @@ from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.log_probabilities import log_loss, undecided
 from texture_estimation.model import Model
+from texture_estimation.next_motion import Explorations
 from texture_estimation.recipe import Recipe
 
 # Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
@@ -69,6 +70,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Model:
         familiarity=Familiarity.learnt(examples.values, codes, groups, overlap, strictness.false_rejections)
         if strictness.false_rejections
         else None,
+        explorations=_fit_explorations(examples),
         training={
             'windows': len(codes),
             'slides': len(slides),
@@ -182,6 +184,16 @@ def _fit_sets(
     return prediction_sets.learnt(
         posteriors, [slide.truth for slide in slides], [slide.worths for slide in slides], coverage
     )
+
+
+def _fit_explorations(examples: LabelledFeatures) -> Explorations | None:
+    """Return what textures feel like under each motion, from the mean features of slides."""
+    slides, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
+    means = np.zeros((len(slides), examples.values.shape[1]))
+    np.add.at(means, groups, examples.values)
+    means /= np.bincount(groups)[:, None]
+    made = [examples.motions.get(slide) for slide in slides.tolist()]
+    return Explorations.of_slides(means, examples.labels[first].tolist(), made)
 
 
 def _held_out_accuracy(fitted: Fitted, codes: Codes) -> float | None:

@@ -43,7 +43,8 @@ def describe(
     vectors = [vector for _, of_slide in describe_slides(chosen, feature_set) for vector in of_slide]
     if not vectors:
         raise no_window(chosen, feature_set)
-    return LabelledFeatures.from_vectors(vectors, surfaces)
+    motions = {slide.name: slide.motion for slide in chosen if slide.motion}
+    return replace(LabelledFeatures.from_vectors(vectors, surfaces), motions=motions)
 
 
 def describe_slides(slides: Sequence[Slide], feature_set: FeatureSet) -> Iterator[tuple[Slide, list[FeatureVector]]]:

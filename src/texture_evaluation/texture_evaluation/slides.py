@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from texture_core.errors import InvalidData
-from texture_core.exploration import ExplorationState, Phase
+from texture_core.exploration import Phase
+from texture_estimation.motion import Motion
 from texture_evaluation.bags import find_bags, read_bag
+from texture_evaluation.motion_made import motion_made
 
 RANGE = re.compile(r'(\d+)(?:-(\d+))?')
 Message = tuple[str, int, Any]
@@ -23,7 +26,7 @@ class Slide:
     """One exploration with a slide, as it lies in a bag.
 
     `number` counts the slides of this surface from 1 in the order recorded; what belongs to the slide was logged
-    from `start_ns` to before `stop_ns` (None: the end of the bag).
+    from `start_ns` to before `stop_ns` (None: the end of the bag). `motion` is None if it is unknown or not straight.
     """
 
     bag: Path
@@ -33,6 +36,7 @@ class Slide:
     start_ns: int
     stop_ns: int | None
     namespace: str | None = None
+    motion: Motion | None = None
 
     @property
     def name(self) -> str:
@@ -95,7 +99,7 @@ def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | N
     """
     wanted = parse_selection(slides)
     paths = find_bags(bags)
-    labelled = [slide for path in paths for slide in _slides_of(path, namespace) if slide.surface]
+    labelled = [slide for path in paths for slide in _slides_of(path, namespace)]
     if not labelled:
         raise InvalidData(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
@@ -109,24 +113,16 @@ def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | N
 
 
 def _slides_of(path: Path, namespace: str | None) -> list[Slide]:
-    """Return the slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
-    begun: list[tuple[int, str]] = []
-    surfaces: dict[str, str] = {}
-    for _, log_ns, state in read_bag(path, ('exploration',), namespace):
-        _note(state, log_ns, begun, surfaces)
-    ends = [start for start, _ in begun[1:]]
-    return [
-        Slide(path, name, surfaces[name], 0, start, stop, namespace)
-        for (start, name), stop in zip(begun, [*ends, None], strict=True)
-        if name in surfaces
-    ]
-
-
-def _note(state: ExplorationState, log_ns: int, begun: list[tuple[int, str]], surfaces: dict[str, str]) -> None:
-    if state.exploration_id and (not begun or begun[-1][1] != state.exploration_id):
-        begun.append((log_ns, state.exploration_id))
-    if state.phase is Phase.SLIDE:
-        surfaces[state.exploration_id] = state.surface
+    """Return the labelled slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
+    told = ((log_ns, state) for _, log_ns, state in read_bag(path, ('exploration',), namespace) if state.exploration_id)
+    begun: list[tuple[int, Slide | None]] = []
+    for name, group in groupby(told, key=lambda one: one[1].exploration_id):
+        logged, states = zip(*group, strict=True)
+        surface = next((state.surface for state in reversed(states) if state.phase is Phase.SLIDE), None)
+        slide = Slide(path, name, surface, 0, logged[0], None, namespace, motion_made(states)) if surface else None
+        begun.append((logged[0], slide))
+    stops = [*(start_ns for start_ns, _ in begun[1:]), None][: len(begun)]  # a bag may have no exploration at all
+    return [replace(slide, stop_ns=stop_ns) for (_, slide), stop_ns in zip(begun, stops, strict=True) if slide]
 
 
 def _number(slides: Sequence[Slide]) -> list[Slide]:
@@ -138,9 +134,7 @@ def _number(slides: Sequence[Slide]) -> list[Slide]:
         for group in by_surface.values()
         for number, slide in enumerate(sorted(group, key=lambda slide: slide.start_ns), 1)
     }
-    return [
-        Slide(s.bag, s.exploration_id, s.surface, numbers[id(s)], s.start_ns, s.stop_ns, s.namespace) for s in slides
-    ]
+    return [replace(slide, number=numbers[id(slide)]) for slide in slides]
 
 
 def _named(paths: Sequence[Path]) -> str:

@@ -21,12 +21,14 @@ from texture_msgs import action, msg, srv
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationRequest, ExplorationState
+from texture_core.features import FeatureVector
 from texture_core.ros.conversions import from_msg, request_to_msg
-from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS
 
 STEP_S = 0.1
 CANCEL_DEADLINE_S = 10.0
 LISTENERS_DEADLINE_S = 60.0
+FEATURES_DEADLINE_S = 30.0
 # So long the explorer may be away; meanwhile `guard` can tell why.
 GONE_S = 10.0
 # So long it may say nothing although it is there; it waits for the last estimates for a minute at most.
@@ -71,6 +73,7 @@ class Operator:
         self._executor.add_node(self._node)
         self._explore = ActionClient(self._node, action.Explore, 'explore')
         self._heard_s = 0.0
+        self._vectors: list[FeatureVector] | None = None  # nobody listens yet
 
     def __enter__(self) -> Operator:
         return self
@@ -117,8 +120,7 @@ class Operator:
             return all(self.listeners(topic) >= number for topic in topics)
 
         self._until(all_listen, LISTENERS_DEADLINE_S, f'nobody listens to {", ".join(topics)}')
-        settled_s = time.monotonic() + DISCOVERY_S
-        self._until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
+        self._settle()
 
     def listeners(self, topic: str) -> int:
         """Return how many subscriptions a topic has."""
@@ -148,6 +150,29 @@ class Operator:
             result.success, result.message, result.exploration_id, from_msg(result.texture), from_msg(result.roughness)
         )
 
+    def feel(
+        self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
+    ) -> tuple[Explored, list[FeatureVector]]:
+        """Explore as `explore` does, and return the features of the windows, too; none of an aborted exploration.
+
+        Raises
+        ------
+        LaunchFailed
+            If nobody publishes features.
+        """
+        vectors = self._listen_to_features()
+        vectors.clear()
+        explored = self.explore(request, on_progress)
+        if not explored.success:
+            return explored, []
+
+        def over() -> bool:
+            return any(vector.last and vector.exploration_id == explored.exploration_id for vector in vectors)
+
+        self._until(over, FEATURES_DEADLINE_S, "the features of the slide do not arrive on 'features'")
+        own = [vector for vector in vectors if vector.exploration_id == explored.exploration_id]
+        return explored, [vector for vector in own if not vector.last]
+
     def stop(self, deadline_s: float = 5.0) -> str:
         """Stop whatever moves; return what the explorer says."""
         client = self._node.create_client(Trigger, 'stop')
@@ -174,6 +199,25 @@ class Operator:
     def undo_learning(self, deadline_s: float = 30.0) -> str:
         """Let the classifier unlearn the last lesson; return what happened. Raises as `learn` does."""
         return str(self._ask_classifier(Trigger, 'undo_learning', Trigger.Request(), deadline_s).message)
+
+    def _listen_to_features(self) -> list[FeatureVector]:
+        """Return the list to which feature vectors are added as they come, once they would come."""
+        if self._vectors is not None:
+            return self._vectors
+        vectors: list[FeatureVector] = []
+        self._vectors = vectors
+        self._node.create_subscription(
+            msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
+        )
+        self._until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S,
+                    'nobody describes what is felt; is the feature_extractor running?')  # fmt: skip
+        self._settle()
+        return vectors
+
+    def _settle(self) -> None:
+        """Wait until what this process sees is seen by the others."""
+        settled_s = time.monotonic() + DISCOVERY_S
+        self._until(lambda: time.monotonic() > settled_s, 2 * DISCOVERY_S, '')
 
     def _ask_classifier(self, kind: Any, name: str, request: Any, deadline_s: float) -> Any:
         """Return the answer of a service of the classifier that succeeded."""

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from texture_core.arrays import AnyArray, Array
-from texture_estimation.next_motion import Explorations, Motion
+from texture_estimation.motion import Motion
+from texture_estimation.next_motion import Explorations
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.motion_choice_charts import slides_chart

@@ -30,6 +30,7 @@ class SlidePlan:
     speed_m_s: float = param(0.1, 'Speed along the surface.', unit='m/s', low=0.001, high=1.0)
     force_n: float = param(2.0, 'Normal force.', unit='N', low=0.05, high=20.0)
     slide_s: float = param(3.0, 'Length of the steady part.', unit='s', low=0.1, high=600.0)
+    direction_rad: float = param(0.0, 'Direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0)
 
 
 def write_simulated(
@@ -42,7 +43,7 @@ def write_simulated(
     out
         Folder for the bags; made if missing.
     plan
-        How many slides, how fast and how hard.
+        How many slides, how fast, how hard and which way.
     rng
         Decides where the surfaces are touched, errors and noise.
     scene, surfaces
@@ -64,6 +65,7 @@ def _write_surface(path: Path, scene: Scene, plan: SlidePlan, start_ns: int, rng
             states, signals = simulate_exploration(
                 scene, path.name, plan.speed_m_s, plan.force_n, plan.slide_s,
                 start_ns=start_ns, exploration_id=f'{path.name}/slide{number:02d}', rng=rng,
+                direction_rad=plan.direction_rad,
             )  # fmt: skip
             streams = {topic: _running_on(batches, first, topic) for topic, batches in signals.items()}
             for log_ns, topic, value in _in_order(states, streams):

@@ -1,0 +1,69 @@
+"""The emulated bench is explored with motions that are chosen one by one."""
+
+import math
+import os
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.ros
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from texture_bringup.command import main  # noqa: E402
+from texture_bringup.demo.isolation import free_port  # noqa: E402
+from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
+from texture_bringup.ros.operator import Operator  # noqa: E402
+from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
+from texture_evaluation.train import train_from_bags  # noqa: E402
+
+DOMAIN = 221
+DEADLINE_S = 60.0
+PLAN = SlidePlan(slides=6, speed_m_s=0.1, force_n=2.0, slide_s=0.7)
+TEXTURES = ('ridges_x', 'ridges_y')
+
+
+def trained(folder, directions):
+    """Return the path of a model that knows two prints, of which one is the other turned by a quarter."""
+    rng = np.random.default_rng(0)
+    bags = [
+        bag
+        for number, direction in enumerate(directions)
+        for bag in write_simulated(
+            folder / f'bags{number}', replace(PLAN, direction_rad=direction), rng, 'oriented', TEXTURES
+        )
+    ]
+    train_from_bags('fast', bags, out=folder / 'model')
+    return str(folder / 'model.skops')
+
+
+@pytest.fixture(scope='module')
+def model(tmp_path_factory):
+    # An eighth between the two: this way both feel the same.
+    return trained(tmp_path_factory.mktemp('model'), (math.pi / 4, 0.0))
+
+
+@pytest.fixture
+def bench(tmp_path, monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(DOMAIN))
+    monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
+    given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'scene': 'oriented', 'surface': 'ridges_y'}
+    with ChildLauncher('bench', {**given, 'recipe': 'fast'}, dict(os.environ), tmp_path / 'nodes.log') as launcher:
+        with Operator('', DOMAIN, launcher.check) as operator:
+            operator.wait_for_explorer(DEADLINE_S)
+            operator.wait_for_signal(DEADLINE_S)
+            operator.wait_for_listeners(('features',), 1, launcher.check)
+            operator.set_parameters('explorer', {'estimate_timeout_s': 10.0})  # this machine may be busy
+        yield launcher
+
+
+def test_the_slide_that_tells_the_textures_apart_is_made_and_recognises_them(model, bench, capsys) -> None:
+    assert main(['identify', model, '--slides', '2', '--sure', '0.99']) == 0
+    said = capsys.readouterr().out
+    assert 'slide 1: linear_slide, direction 0 rad, 0.1 m/s, 2 N' in said
+    assert 'texture: ridges_y, probability' in said
+
+
+def test_a_model_that_knows_one_motion_alone_leaves_nothing_to_choose(tmp_path, capsys) -> None:
+    assert main(['identify', trained(tmp_path, (0.0,))]) == 2
+    assert 'knows no motions to choose from' in capsys.readouterr().err
