@@ -134,7 +134,7 @@ def test_power_grows_with_the_speed_as_the_waves_of_the_texture_rise_into_the_ba
     force, change = (growth(wave, RATE_HZ, np.array([1e-6]), senses)[0] for senses in ('force', 'change'))
     half = np.searchsorted(SPEEDS, 0.5)
     assert force[half] == pytest.approx(1.0, abs=0.25)  # 100 Hz are passed about as 200 Hz are
-    assert change[half] == pytest.approx(0.25 * force[half])
+    assert change[half] == pytest.approx(0.125 * force[half])  # between a half and a quarter of the amplitude
     assert force[0] == pytest.approx(0.0, abs=1e-6)
 
 

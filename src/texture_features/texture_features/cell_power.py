@@ -21,7 +21,8 @@ LEAST_REST, TINY = 1e-9, 1e-300
 SPECTRUM_S = 0.25
 # What a vibration channel senses, and the powers of the speed with which the amplitude of one and the same wave of a
 # texture then grows: films that hold their charge and hydrophones feel the force, differentiating channels its change.
-SENSES: Mapping[str, tuple[float, ...]] = {'force': (0.0,), 'change': (1.0,), 'either': (0.0, 0.5, 1.0)}
+# Below the corner of its high-pass a change grows as the square of the speed, above as the speed; most waves pass both.
+SENSES: Mapping[str, tuple[float, ...]] = {'force': (0.0,), 'change': (1.5,), 'either': (0.0, 0.5, 1.0, 1.5)}
 SPEEDS = np.linspace(0.0, 1.0, 41)
 
 

@@ -242,7 +242,10 @@ def _refined(
     """Return the sliding whose power stands out in the cells of `run`; NaN in a cell of which nothing is known."""
     first, last = run
     ramp = params.ramp_s / cell_s
-    moving_s = cell_s * _onset(power, power[steady], first, ramp, grows)
+    # A run may begin in the knock of the touch, of which nothing is known: it is seen first after that.
+    pressed = max(first, math.floor(max(touch.pressed_s, 0.0) / cell_s))
+    near = pressed + int(np.isfinite(power[pressed:]).argmax())
+    moving_s = cell_s * _onset(power, power[steady], near, ramp, grows)
     start_s = max(moving_s + params.ramp_s, touch.pressed_s, 0.0)
     if touch.falls_s < last * cell_s + params.ramp_s + params.bridge_s:
         end_s = touch.falls_s
