@@ -3,7 +3,9 @@
 import os
 import re
 import signal
+from fnmatch import fnmatch
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 from texture_bringup.demo.isolation import free_port  # noqa: E402
 from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
 from texture_bringup.ros.operator import Operator  # noqa: E402
+from texture_core import resources  # noqa: E402
 from texture_core.errors import InvalidParameter, LaunchFailed  # noqa: E402
 from texture_core.exploration import ExplorationRequest  # noqa: E402
 from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
@@ -82,6 +85,17 @@ def models(folder, bags):
     for recipe in ('default', 'vibration-and-taxels'):
         train_from_bags(recipe, bags, out=folder / recipe)
     return {'vibration': folder / 'default.skops', 'taxels': folder / 'vibration-and-taxels.skops'}
+
+
+def test_the_security_policy_allows_all_that_the_nodes_use(operator) -> None:
+    policy = ElementTree.parse(resources.folder('texture_bringup', 'config/sros2') / 'policy.xml')
+    allowed = {item.text for kind in ('topic', 'service') for item in policy.iter(kind)}
+    allowed |= {f'{action.text}/_action/*' for action in policy.iter('action')}
+    node = operator._node
+    used = {name for name, _ in (*node.get_topic_names_and_types(), *node.get_service_names_and_types())}
+    names = {name.removeprefix('/left') for name in used}
+    assert {'/signal', '/explore', '/explore/_action/send_goal', '/roughness_features'} <= names
+    assert [name for name in names if not any(fnmatch(name, pattern) for pattern in allowed)] == []
 
 
 def test_an_exploration_without_a_model_ends_well_and_says_what_is_missing(operator) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import sys
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar, cast
 
@@ -39,9 +40,13 @@ def unknown(name: str, known: Iterable[str], kind: str) -> UnknownName:
 
 def _import(name: str, kind: str) -> Any:
     module, _, attribute = name.partition(':')
+    parts = module.split('.')
+    # Names come from files and over the network, too: modules that do something when imported are none of ours.
+    if parts[0] in sys.stdlib_module_names or '__main__' in parts:
+        raise UnknownName(f"no {kind} '{name}': '{module}' is a part or a program of Python; name a module of your own")
     try:
         return getattr(importlib.import_module(module), attribute)
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, ValueError, TypeError) as error:
         raise UnknownName(
             f"no {kind} '{name}': {error}; write 'module:Class' of something that can be imported"
         ) from error

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+MOST_CHARACTERS = 1000
+
 
 class TextureError(Exception):
-    """Base of all errors that a user can cause or meet; its text is shown to the user as it is."""
+    """Base of all errors that a user can cause or meet; its text, always one line, is shown to the user as it is."""
+
+    def __init__(self, sentence: str = '') -> None:
+        line = ' '.join(sentence.split())  # what came, and what others said about it, may be many lines or long ones
+        super().__init__(line if len(line) <= MOST_CHARACTERS else f'{line[: MOST_CHARACTERS - 1]}…')
 
 
 class UnknownName(TextureError):

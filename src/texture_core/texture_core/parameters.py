@@ -8,11 +8,12 @@ from __future__ import annotations
 import dataclasses
 import math
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter, UnknownName
+from texture_core.plain_data import shown
 
 T = TypeVar('T')
 NOUNS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text'}
@@ -69,14 +70,21 @@ class Parameter:
         InvalidParameter
             If its type or range is wrong.
         """
-        if self.type is list or typing.get_origin(self.type) is list:
-            return list(value)
+        if typing.get_origin(self.type) is list:
+            return self._check_list(value)
         if self.type is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if not isinstance(value, self.type) or (self.type is not bool and isinstance(value, bool)):
-            raise InvalidParameter(f"parameter '{self.name}' is {value!r}; {NOUNS[self.type]} is needed")
+            raise InvalidParameter(f"parameter '{self.name}' is {shown(value)}; {NOUNS[self.type]} is needed")
         self._check_range(value)
         return value
+
+    def _check_list(self, values: Any) -> list[Any]:
+        [kind] = typing.get_args(self.type)
+        if isinstance(values, (str, Mapping)) or not isinstance(values, Iterable):
+            raise InvalidParameter(f"parameter '{self.name}' is {shown(values)}; a list is needed")
+        each = dataclasses.replace(self, type=kind)
+        return [each.check(value) for value in values]
 
     def _check_range(self, value: Any) -> None:
         below = self.low is not None and not value >= self.low
@@ -84,7 +92,7 @@ class Parameter:
         unlisted = bool(self.choices) and value not in self.choices
         if below or above or unlisted or (isinstance(value, float) and math.isnan(value)):
             allowed = self.range_text or 'a number that is not NaN'
-            raise InvalidParameter(f"parameter '{self.name}' is {value!r}; allowed is {allowed}")
+            raise InvalidParameter(f"parameter '{self.name}' is {shown(value)}; allowed is {allowed}")
 
 
 def parameters_of(cls: type) -> list[Parameter]:
@@ -106,10 +114,12 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
     InvalidParameter
         If a value has the wrong type or range, or a name is unknown (with the nearest known one).
     """
+    if not (isinstance(cls, type) and dataclasses.is_dataclass(cls)):
+        raise InvalidParameter(f'{where}: {cls!r} is no class with parameters; name a dataclass')
     known = {parameter.name: parameter for parameter in parameters_of(cls)}
     place = f'{where}: ' if where else ''
     if not isinstance(values, Mapping):
-        raise InvalidParameter(f'{place}came {values!r}; a mapping of parameter names to values is needed')
+        raise InvalidParameter(f'{place}came {shown(values)}; a mapping of parameter names to values is needed')
     checked = {}
     for name, value in values.items():
         if name not in known:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any, TypeVar
 
-import yaml
-
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping
+from texture_core.plain_data import BROKEN, load_yaml, parse_yaml, shown
 from texture_core.resources import find_file
 
 T = TypeVar('T')
@@ -35,12 +34,17 @@ def read_settings(config: str) -> dict[str, Any]:
     """Return the mapping that `config` means; see `load_settings`."""
     if not config:
         return {}
-    in_place = config.lstrip().startswith('{')
-    try:
-        text = config if in_place else find_file(config, 'texture_drivers', 'config/sensors', 'settings').read_text()
-        content = yaml.safe_load(text)
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InvalidParameter(f'settings {config} are no YAML: {error}') from error
+    if config.lstrip().startswith('{'):
+        content = _in_place(config)
+    else:
+        content = load_yaml(find_file(config, 'texture_drivers', 'config/sensors', 'settings'), 'settings')
     if not isinstance(content, dict):
-        raise InvalidParameter(f'settings {config} hold {content!r}; a mapping of names to values is needed')
+        raise InvalidParameter(f'settings {config} hold {shown(content)}; a mapping of names to values is needed')
     return content
+
+
+def _in_place(text: str) -> Any:
+    try:
+        return parse_yaml(text)
+    except BROKEN as error:
+        raise InvalidParameter(f'settings {text} are no YAML: {error}') from error

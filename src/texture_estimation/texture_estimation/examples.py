@@ -36,6 +36,14 @@ class Examples:
         kept = np.concatenate([rows[spread(len(rows))] for rows in own])
         return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
 
+    def check(self, n_features: int, n_labels: int) -> None:
+        """Raise ValueError unless they are examples of so many features and labels."""
+        n = len(self.codes)
+        if self.values.shape != (n, n_features) or self.slides.shape != (n,) or self.codes.shape != (n,):
+            raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')
+        if not n or self.codes.min() < 0 or self.codes.max() >= n_labels or not np.isfinite(self.values).all():
+            raise ValueError('examples have labels that the model has not, or values that are not finite')
+
     def of_label(self, code: int) -> Array:
         """Return those of a label, (n, n_features); none of one that came later."""
         rows: Array = self.values[self.codes == code].astype(np.float64)

@@ -11,6 +11,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch
+from texture_core.plain_data import parse_json
 from texture_estimation import model_files
 
 FORMAT = 1
@@ -60,11 +61,13 @@ def read_lessons(model: str | Path, feature_set: str, names: Sequence[str]) -> t
 
 def _read(path: Path, feature_set: str, n_features: int) -> Lesson:
     try:
-        content = json.loads(path.read_text(encoding='utf-8'))
+        content = parse_json(path.read_text(encoding='utf-8'))
         values = np.array(content['values'], dtype=np.float64)
         lesson = Lesson(str(content['label']), str(content['exploration_id']), values)
         of = str(content['feature_set'])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        if not np.isfinite(values).all():
+            raise ValueError('it holds values that are not finite')
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise ModelMismatch(
             f"lesson '{path}' cannot be read: {type(error).__name__}: {error}; remove it and teach it again"
         ) from error

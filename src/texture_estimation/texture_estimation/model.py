@@ -5,7 +5,6 @@ What a model is taught after its training stands in the folder NAME.lessons; the
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_core.errors import ModelMismatch, TextureError
+from texture_core.errors import ModelMismatch
 from texture_estimation import model_files
 from texture_estimation.examples import Examples
 from texture_estimation.familiarity import Familiarity
@@ -151,6 +150,21 @@ class Model:
             head.set_examples(self.labels.index(label), self.examples_of(label))
         return head
 
+    def try_out(self) -> None:
+        """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now."""
+        nothing = np.zeros(len(self.names))
+        answer = self.predict_log_proba(nothing)
+        if answer.shape != (len(self.labels),) or np.isnan(answer).any():
+            raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
+        self.sets.members(np.exp(answer), 1.0)
+        self.stopping.certain(0.5, 1.0)
+        if self.familiarity is not None:
+            self.familiarity.knows(nothing, 1.0)
+        if self.examples is not None:
+            self.examples.check(len(self.names), len(self.labels))
+        if not 0.0 <= self.growth <= 1.0:
+            raise ModelMismatch(f'the exponent of its evidence is {self.growth}; allowed is 0 to 1')
+
     @property
     def card(self) -> dict[str, Any]:
         """What the card says, in the form of JSON."""
@@ -215,20 +229,19 @@ def load_model(path: str | Path) -> Model:
             explorations=Explorations.from_parts(felt) if felt else None,
             examples=Examples.from_parts(examples) if examples else None,
         )
-        answer = model.predict_log_proba(np.zeros(len(model.names)))
-    except (KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile, TextureError) as error:
+        model.try_out()
+    except model_files.BROKEN as error:
         raise ModelMismatch(
             f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
         ) from error
-    if answer.shape != (len(model.labels),):
-        raise ModelMismatch(
-            f"model '{target}' answers for {answer.shape} labels but its card names {len(model.labels)}; train it again"
-        )
     lessons = read_lessons(target, model.feature_set, model.names)
     if not lessons:
         return model
     taught = model.with_lessons(lessons)
-    return replace(taught, taught=taught.taught_head().judge)
+    try:
+        return replace(taught, taught=taught.taught_head().judge)
+    except model_files.BROKEN as error:
+        raise ModelMismatch(f"the lessons of model '{target}' cannot be used: {error}; move them away") from error
 
 
 def _tuples(value: Any) -> Any:

@@ -1,9 +1,13 @@
 import dataclasses
 import math
+import re
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from lz4.frame import compress as lz4_compress
+from rosbags.rosbag2 import ReaderError, storage_mcap
 
 from texture_core.errors import InvalidData
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
@@ -12,6 +16,11 @@ from texture_core.features import FeatureVector
 from texture_core.signal import TactileSignal
 from texture_evaluation.bags import BagWriter, find_bags, read_bag, read_raw
 from texture_evaluation.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode
+
+if sys.version_info >= (3, 14):
+    from compression.zstd import compress as zstd_compress
+else:
+    from backports.zstd import compress as zstd_compress
 
 STAMP_NS = 1_700_000_000_123_456_789
 
@@ -145,6 +154,25 @@ def test_a_damaged_bag_is_refused_or_read_whole_whichever_byte_is_wrong(tmp_path
             assert len(list(read_bag(bag))) == 200
         except InvalidData:
             continue
+
+
+@pytest.mark.parametrize('packed', [zstd_compress(bytes(10**7)), lz4_compress(bytes(10**7))], ids=['zstd', 'lz4'])
+def test_a_chunk_is_unpacked_no_further_than_it_claims(packed: bytes) -> None:
+    kind = 'lz4' if packed.startswith(b'\x04\x22') else 'zstd'
+    assert len(storage_mcap.DECOMPRESSORS[kind](packed, 100)) == 101
+    assert storage_mcap.decompress(packed, kind, 10**7, 0) == bytes(10**7)
+    for claimed in (100, 10**10):
+        with pytest.raises(ReaderError, match=r'claims to unpack|size mismatch'):
+            storage_mcap.decompress(packed, kind, claimed, 0)
+
+
+def test_a_bag_compressed_as_a_whole_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    file = write(tmp_path / 'bag') / 'metadata.yaml'
+    changed = re.sub('compression_mode: .*', 'compression_mode: MESSAGE', file.read_text())
+    assert changed != file.read_text()
+    file.write_text(changed)
+    with pytest.raises(InvalidData, match='ros2 bag convert'):
+        list(read_bag(tmp_path / 'bag'))
 
 
 def test_a_folder_of_bags_stands_for_its_bags(tmp_path: Path) -> None:

@@ -9,6 +9,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
+import apsw
+import yaml
+from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 from rosbags.interfaces import (
     Connection,
     Qos,
@@ -18,23 +21,25 @@ from rosbags.interfaces import (
     QosReliability,
     QosTime,
 )
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, ReaderError, StoragePlugin, Writer
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, ReaderError, StoragePlugin, Writer, storage_mcap
 from rosbags.typesys.base import TypesysError
 
 from texture_core.errors import InvalidData
+from texture_core.plain_data import parse_yaml
 from texture_core.signal import TactileSignal
 from texture_evaluation.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode, typestore
 
 if sys.version_info >= (3, 14):
-    from compression.zstd import ZstdError
+    from compression.zstd import ZstdDecompressor, ZstdError
 else:
-    from backports.zstd import ZstdError
+    from backports.zstd import ZstdDecompressor, ZstdError
 
 # What the reader raises, depending on which byte of a file is wrong.
 BROKEN = (
-    ReaderError, TypesysError, ZstdError, OSError, EOFError, struct.error,
-    ValueError, IndexError, KeyError, TypeError, AssertionError, MemoryError, OverflowError,
+    ReaderError, TypesysError, ZstdError, apsw.Error, yaml.YAMLError, OSError, EOFError, struct.error, RuntimeError,
+    ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
 )  # fmt: skip
+MOST_CHUNK_BYTES = 1_000_000_000
 FOREVER = QosTime(2147483647, 4294967295)
 
 
@@ -222,6 +227,8 @@ def _read(
     if not is_bag(path):
         raise InvalidData(_no_bag(path))
     try:
+        if path.is_dir():
+            _check_metadata(path / 'metadata.yaml')
         with Reader(path) as reader:
             connections = [c for c in _of_namespace(path, reader.connections, namespace) if chosen(c)]
             if not connections or not reader.message_count:
@@ -236,6 +243,27 @@ def _read(
         raise InvalidData(
             f"the bag '{path}' cannot be read, it is damaged or cut off: {error}; record it anew"
         ) from error
+
+
+def _check_metadata(path: Path) -> None:
+    """Raise one of `BROKEN` if it is no metadata, or if the bag as a whole may unpack to anything."""
+    facts = parse_yaml(path.read_text(encoding='utf-8'))['rosbag2_bagfile_information']
+    if str(facts.get('compression_mode') or 'none').lower() != 'none':
+        raise ReaderError('it is compressed as a whole; let `ros2 bag convert` make it MCAP, which compresses inside')
+
+
+def _unpacked(decompressor: Any, data: bytes, size: int) -> bytes:
+    """Return a chunk that claims to unpack to `size`; one byte more is enough to tell that it does not."""
+    if size > MOST_CHUNK_BYTES:
+        raise ReaderError(f'a chunk claims to unpack to {size} bytes')
+    return bytes(decompressor.decompress(data, max_length=size + 1))
+
+
+# rosbags unpacks first and compares afterwards, when a chunk of a kilobyte may have filled the memory.
+storage_mcap.DECOMPRESSORS.update(
+    zstd=lambda data, size: _unpacked(ZstdDecompressor(), data, size),
+    lz4=lambda data, size: _unpacked(LZ4FrameDecompressor(), data, size),
+)
 
 
 def _of_namespace(path: Path, connections: list[Connection], namespace: str | None) -> list[Connection]:

@@ -16,16 +16,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import yaml
-
 from texture_core.catalogue import find, unknown
 from texture_core.errors import InvalidParameter
 from texture_core.exploration import ExplorationRequest
+from texture_core.plain_data import load_yaml, shown
 from texture_core.resources import find_file
 from texture_exploration.motions.catalogue import MOTIONS
 
 KEYS = ('paper', 'motion', 'repeats', 'vary')
 NUMBERS = tuple(name for name, kind in typing.get_type_hints(ExplorationRequest).items() if kind is float)
+MOST = 10_000  # combinations, and repeats of them
 SHORTHANDS = ('direction_deg', 'slide_s')
 
 
@@ -60,12 +60,9 @@ def load_preset(name_or_path: str) -> Preset:
         With the nearest name, or the place in the file and what is allowed there.
     """
     path = find_file(name_or_path, 'texture_exploration', 'config/presets', 'preset')
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except yaml.YAMLError as error:
-        raise InvalidParameter(f"preset '{path.stem}' is no YAML: {error}") from error
+    content = load_yaml(path, 'preset')
     if not isinstance(content, Mapping):
-        raise InvalidParameter(f"preset '{path.stem}': came {content!r}; a mapping with a motion is needed")
+        raise InvalidParameter(f"preset '{path.stem}': came {shown(content)}; a mapping with a motion is needed")
     return read_preset(content, path.stem)
 
 
@@ -73,6 +70,8 @@ def read_preset(content: Mapping[str, Any], name: str) -> Preset:
     """Return the preset in what a preset file holds; raises as `load_preset`."""
     where = f"preset '{name}'"
     vary = content.get('vary', {})
+    if not isinstance(vary, Mapping):
+        raise InvalidParameter(f"{where}: 'vary' is {shown(vary)}; a mapping of numbers to lists is needed")
     given = {key: value for key, value in content.items() if key not in KEYS}
     for key in (*given, *vary):
         if key not in (*NUMBERS, *SHORTHANDS):
@@ -80,11 +79,15 @@ def read_preset(content: Mapping[str, Any], name: str) -> Preset:
     motion = str(content.get('motion', ''))
     find(MOTIONS, motion, 'motion')
     repeats = content.get('repeats', 1)
-    if not isinstance(repeats, int) or repeats < 1:
-        raise InvalidParameter(f"{where}: 'repeats' is {repeats!r}; a whole number of at least 1 is needed")
+    if not isinstance(repeats, int) or not 1 <= repeats <= MOST:
+        raise InvalidParameter(f"{where}: 'repeats' is {shown(repeats)}; a whole number from 1 to {MOST} is needed")
+    varied = [_sequence(key, values, where) for key, values in vary.items()]
+    combinations = math.prod(map(len, varied))
+    if combinations > MOST:
+        raise InvalidParameter(f"{where}: 'vary' makes {combinations} combinations; at most {MOST} are made")
     requests = [
         _request(motion, {**given, **dict(zip(vary, values, strict=True))}, where)
-        for values in itertools.product(*(_sequence(key, value, where) for key, value in vary.items()))
+        for values in itertools.product(*varied)
     ]
     return Preset(name, str(content.get('paper', '')), tuple(requests), repeats)
 
@@ -92,7 +95,7 @@ def read_preset(content: Mapping[str, Any], name: str) -> Preset:
 def _request(motion: str, numbers: Mapping[str, Any], where: str) -> ExplorationRequest:
     for key, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise InvalidParameter(f"{where}: '{key}' is {value!r}; a number is needed")
+            raise InvalidParameter(f"{where}: '{key}' is {shown(value)}; a number is needed")
     values: dict[str, Any] = {key: float(value) for key, value in numbers.items() if key not in SHORTHANDS}
     if 'direction_deg' in numbers:
         values['direction_rad'] = math.radians(numbers['direction_deg'])
@@ -105,5 +108,5 @@ def _request(motion: str, numbers: Mapping[str, Any], where: str) -> Exploration
 
 def _sequence(key: str, values: Any, where: str) -> Sequence[Any]:
     if not isinstance(values, list) or not values:
-        raise InvalidParameter(f"{where}: 'vary' gives {values!r} for '{key}'; a list of numbers is needed")
+        raise InvalidParameter(f"{where}: 'vary' gives {shown(values)} for '{key}'; a list of numbers is needed")
     return values

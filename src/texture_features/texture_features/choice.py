@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 from texture_core.catalogue import find
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_core.parameters import from_mapping
+from texture_core.plain_data import shown
 
 T = TypeVar('T')
 
@@ -23,7 +24,9 @@ def choose(catalogue: Mapping[str, type[T]], entry: Any, kind: str, where: str) 
     if isinstance(entry, str):
         entry = {entry: {}}
     if not isinstance(entry, Mapping) or len(entry) != 1:
-        raise InvalidParameter(f"{where}: came {entry!r}; a {kind} is written 'name' or 'name: {{parameter: value}}'")
+        raise InvalidParameter(
+            f"{where}: came {shown(entry)}; a {kind} is written 'name' or 'name: {{parameter: value}}'"
+        )
     [(name, values)] = entry.items()
     try:
         cls = find(catalogue, str(name), kind)

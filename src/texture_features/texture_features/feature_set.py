@@ -12,12 +12,12 @@ from itertools import chain, groupby
 from typing import Any
 
 import numpy as np
-import yaml
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.features import FeatureVector
 from texture_core.parameters import from_mapping, param
+from texture_core.plain_data import load_card, load_yaml, shown
 from texture_core.resources import find_file
 from texture_core.window import Window
 from texture_features.catalogue import FEATURES
@@ -97,7 +97,8 @@ class FeatureSet:
         inputs = recipe.get('inputs')
         if not isinstance(inputs, Mapping) or not inputs:
             raise InvalidParameter(
-                f"{where}: inputs is {inputs!r}; name one or more, such as 'inputs: {{signal: {{features: [hjorth]}}}}'"
+                f'{where}: inputs is {shown(inputs)}; name one or more, '
+                "such as 'inputs: {signal: {features: [hjorth]}}'"
             )
         return cls(windows, tuple(_input(str(topic), section, where) for topic, section in inputs.items()))
 
@@ -226,14 +227,7 @@ def read_recipe(name_or_path: str) -> Mapping[str, Any]:
     path = find_file(name_or_path, 'texture_estimation', 'config/recipes', 'recipe')
     if path.suffix == '.skops':  # what a model's card says stands beside it
         path = path.with_suffix('.json')
-    try:
-        text = path.read_text(encoding='utf-8')
-        content = json.loads(text).get('recipe') if path.suffix == '.json' else yaml.safe_load(text)
-    except (OSError, ValueError, AttributeError, yaml.YAMLError) as error:
-        reason = ' '.join(str(error).split())
-        raise InvalidParameter(
-            f"recipe '{path}' cannot be read: {reason}; give a YAML file or a model's card"
-        ) from error
+    content = load_card(path) if path.suffix == '.json' else load_yaml(path, 'recipe')
     if not isinstance(content, Mapping):
         raise InvalidParameter(f"'{path}' holds no recipe; a mapping with the key 'inputs' is needed")
     return content
@@ -242,7 +236,7 @@ def read_recipe(name_or_path: str) -> Mapping[str, Any]:
 def _input(topic: str, section: Any, where: str) -> InputFeatures:
     place = f"{where}, input '{topic}'"
     if not isinstance(section, Mapping) or not isinstance(section.get('features'), list) or not section['features']:
-        raise InvalidParameter(f"{place}: came {section!r}; a list under 'features' is needed, such as [hjorth]")
+        raise InvalidParameter(f"{place}: came {shown(section)}; a list under 'features' is needed, such as [hjorth]")
     topics = topic.split(JOINT)
     if not all(topics) or len(set(topics)) < len(topics):
         raise InvalidParameter(f"{place}: inputs are joined by their names, as in 'signal+signal_static', each once")

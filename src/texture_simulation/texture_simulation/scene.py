@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
-import yaml
-
 from texture_core.catalogue import find
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping
+from texture_core.plain_data import load_yaml, shown
 from texture_core.resources import find_file
 from texture_simulation.contact import Contact
 from texture_simulation.effects.catalogue import EFFECTS
@@ -77,11 +76,7 @@ def load_scene(name_or_path: str) -> Scene:
         If there is no such scene, or it contains something unknown or impossible.
     """
     path = find_file(name_or_path, 'texture_simulation', 'config/scenes', 'scene')
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except yaml.YAMLError as error:
-        raise InvalidParameter(f'scene {path} is no YAML: {error}') from error
-    return scene_from(path.stem, content)
+    return scene_from(path.stem, load_yaml(path, 'scene'))
 
 
 def scene_from(name: str, content: Any) -> Scene:
@@ -105,7 +100,7 @@ def scene_from(name: str, content: Any) -> Scene:
 def _effects(effects: Any, where: str) -> dict[str, Any]:
     if not isinstance(effects, Mapping):
         raise InvalidParameter(
-            f'{where}, effects: came {effects!r}; a mapping of effects to their parameters is needed'
+            f'{where}, effects: came {shown(effects)}; a mapping of effects to their parameters is needed'
         )
     return {
         name: from_mapping(find(EFFECTS, str(name), 'effect'), values or {}, f"{where}, effect '{name}'")
@@ -116,7 +111,7 @@ def _effects(effects: Any, where: str) -> dict[str, Any]:
 def _surface(name: str, terms: Any, where: str) -> Surface:
     place = f"{where}, surface '{name}'"
     if not isinstance(terms, list) or not all(isinstance(term, Mapping) and 'kind' in term for term in terms):
-        raise InvalidParameter(f'{place} is {terms!r}; a list of terms, each with a `kind`, is needed')
+        raise InvalidParameter(f'{place} is {shown(terms)}; a list of terms, each with a `kind`, is needed')
     made = [_term(dict(term), place) for term in terms]
     frictions = [term for term in made if type(term) in FRICTIONS.values()]
     if len(frictions) > 1:

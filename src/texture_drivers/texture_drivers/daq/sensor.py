@@ -10,6 +10,7 @@ import numpy as np
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
+from texture_core.plain_data import shown
 from texture_drivers.daq import tables
 from texture_drivers.framed_sensor import FramedSensor
 from texture_drivers.params import SensorParams
@@ -48,7 +49,7 @@ def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:
     content = read_settings(config)
     listed = content.pop('channels', None)
     if not isinstance(listed, list) or not listed:
-        raise InvalidParameter(f'settings {config} have the `channels` {listed!r}; list one for each input')
+        raise InvalidParameter(f'settings {config} have the `channels` {shown(listed)}; list one for each input')
     channels = [from_mapping(DaqChannel, item, f'settings {config}, channel {i + 1}') for i, item in enumerate(listed)]
     if len({channel.name for channel in channels} - {''}) < len(channels):
         raise InvalidParameter(f'settings {config}: give each channel a `name` of its own')

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic
 
-import yaml
-
 from texture_core.catalogue import find, unknown
 from texture_core.errors import InvalidParameter
+from texture_core.plain_data import load_yaml, shown
 from texture_core.resources import find_file
 from texture_estimation.genetic.task import R
 from texture_estimation.genetic.variables import Choice, Individual, Integer, LogReal, SearchSpace, Value, Variable
 
+MOST_INCLUDES = 10
 KEYS = ('description', 'include', 'variables')
 PACKAGE, FOLDER = 'texture_estimation', 'config/search'
 
@@ -139,32 +139,34 @@ class RecipeSpace(Generic[R]):
         return same
 
 
-def _read(name_or_path: str) -> dict[str, Axis]:
+def _read(name_or_path: str, depth: int = 0) -> dict[str, Axis]:
     path = find_file(name_or_path, PACKAGE, FOLDER, 'search space')
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except (OSError, ValueError, yaml.YAMLError) as error:
-        raise InvalidParameter(f"search space '{path}' cannot be read: {' '.join(str(error).split())}") from error
+    content = load_yaml(path, 'search space')
     if not isinstance(content, Mapping):
         raise InvalidParameter(f"search space '{path}' holds no mapping; 'variables' is needed")
     for key in content:
         if key not in KEYS:
             raise InvalidParameter(f"search space '{path}': {unknown(str(key), KEYS, 'key')}")
+    included, variables = content.get('include') or [], content.get('variables') or {}
+    if not isinstance(included, list) or not isinstance(variables, Mapping) or depth > MOST_INCLUDES:
+        raise InvalidParameter(
+            f"search space '{path}': 'include' is a list, at most {MOST_INCLUDES} deep, and 'variables' a mapping"
+        )
     axes: dict[str, Axis] = {}
-    for other in content.get('include') or ():
-        axes.update(_read(str(other)))
-    for name, entry in (content.get('variables') or {}).items():
+    for other in included:
+        axes.update(_read(str(other), depth + 1))
+    for name, entry in variables.items():
         axes[str(name)] = _axis(entry, f"search space '{path.stem}', variable '{name}'")
     return axes
 
 
 def _axis(entry: Any, where: str) -> Axis:
     if not isinstance(entry, Mapping) or 'kind' not in entry:
-        raise InvalidParameter(f"{where}: came {entry!r}; a mapping with 'kind' ({', '.join(KINDS)}) is needed")
+        raise InvalidParameter(f"{where}: came {shown(entry)}; a mapping with 'kind' ({', '.join(KINDS)}) is needed")
     values = {key: value for key, value in entry.items() if key != 'kind'}
     try:
         return find(KINDS, str(entry['kind']), 'kind of variable')(values)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InvalidParameter(f'{where}: {dict(entry)} cannot be used ({type(error).__name__}: {error})') from error
     except InvalidParameter as error:
         raise InvalidParameter(f'{where}: {error}') from error

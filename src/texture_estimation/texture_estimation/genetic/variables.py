@@ -67,8 +67,8 @@ class LogReal:
 
     def __post_init__(self) -> None:
         _check_range(self.low, self.high)
-        if not self.low > 0:
-            raise InvalidParameter(f'a logarithmic range starts at {self.low}; it must start above 0')
+        if not (self.low > 0 and self.high / self.low < math.inf):
+            raise InvalidParameter(f'a logarithmic range is {self.low} to {self.high}; it must start above 0 and end')
 
     @property
     def count(self) -> int:

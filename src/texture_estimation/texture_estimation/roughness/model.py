@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
-from texture_core.errors import ModelMismatch, TextureError
+from texture_core.errors import ModelMismatch
 from texture_estimation import model_files
 from texture_estimation.roughness.checks import Checks, graded_columns
 from texture_estimation.roughness.head import Grader
@@ -149,7 +148,7 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
             training=dict(card['training']),
         )
         grade, std = model.grade(np.zeros(len(model.names)))
-    except (KeyError, TypeError, ValueError, AttributeError, zipfile.BadZipFile, TextureError) as error:
+    except model_files.BROKEN as error:
         raise ModelMismatch(
             f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
         ) from error

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import yaml
-
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
+from texture_core.plain_data import load_card, load_yaml, shown
 from texture_core.resources import find_file
 from texture_estimation.recipe import TrainingParams
 from texture_estimation.roughness.catalogue import HEADS
@@ -111,11 +109,7 @@ def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
         With one sentence that says what is wrong and what is allowed.
     """
     path = find_file(name_or_path, 'texture_estimation', 'config/roughness', 'roughness recipe')
-    try:
-        text = path.read_text(encoding='utf-8')
-        content = json.loads(text).get('recipe') if path.suffix == '.json' else yaml.safe_load(text)
-    except (OSError, ValueError, AttributeError, yaml.YAMLError) as error:
-        raise InvalidParameter(f"roughness recipe '{path}' cannot be read: {' '.join(str(error).split())}") from error
+    content = load_card(path) if path.suffix == '.json' else load_yaml(path, 'roughness recipe')
     if not isinstance(content, Mapping):
-        raise InvalidParameter(f"'{path}' holds {content!r}, no recipe; a mapping with the key inputs is needed")
+        raise InvalidParameter(f"'{path}' holds {shown(content)}, no recipe; a mapping with the key inputs is needed")
     return RoughnessRecipe.from_mapping(content, path.stem)

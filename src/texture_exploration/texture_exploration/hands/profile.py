@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import yaml
-
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter, TextureError
+from texture_core.plain_data import load_yaml
 from texture_core.resources import find_file
 from texture_exploration.hands.protocol import FingerSet
 
@@ -85,13 +84,13 @@ def load_profile(name_or_path: str) -> Profile:
     """
     path = find_file(name_or_path, 'texture_exploration', 'config/hands', 'hand profile')
     try:
-        return read_profile(yaml.safe_load(path.read_text(encoding='utf-8')), path.stem)
+        return read_profile(load_yaml(path, 'hand profile'), path.stem)
     except TextureError:
         raise
-    except (yaml.YAMLError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
         raise InvalidParameter(
-            f"hand profile '{path.stem}' cannot be read ({type(error).__name__}: {error}); compare it with those of "
-            'the package, in config/hands'
+            f"hand profile '{path.stem}' cannot be read ({type(error).__name__}: {error}); compare it with "
+            'those of the package, in config/hands'
         ) from error
 
 
