@@ -76,6 +76,17 @@ def test_the_surface_is_a_parameter_that_refuses_unknown_names(bed: Bed) -> None
     assert not bed.set(bed.bench, seed=5).successful
 
 
+def test_the_plug_and_the_line_are_parameters(bed: Bed) -> None:
+    bed.until(lambda: bed.level == 0)
+    assert bed.set(bed.bench, plugged=False).successful
+    bed.until(lambda: bed.level == 2)
+    assert bed.set(bed.bench, plugged=True, bit_flips=0.02).successful
+    bed.until(lambda: bed.sensor._sensor.counts['bogus'] > 5)
+    assert bed.set(bed.bench, bit_flips=0.0).successful
+    bed.until(lambda: bed.level == 0)
+    assert not bed.set(bed.bench, bit_flips=2.0).successful
+
+
 def test_deactivating_stops_the_stream_and_activating_brings_it_back(bed: Bed) -> None:
     bed.until(lambda: len(bed.batches) > 5)
     bed.sensor.trigger_deactivate()

@@ -14,6 +14,7 @@ import numpy as np
 from texture_core.catalogue import find
 from texture_core.parameters import param
 from texture_simulation.devices.device import Device
+from texture_simulation.devices.faults import ByteFaults
 from texture_simulation.finger_link import FingerLink
 from texture_simulation.live_sensor import LIVE_SENSORS, MakeLive, live_tsf85
 from texture_simulation.scene import Scene, load_scene
@@ -37,6 +38,13 @@ class BenchParams:
     long_stamps: bool = param(True, 'TSF-85 with 64-bit stamps (firmware from 1.1.7 on); false: older, with 16 bits.')
     daq_link: str = param('', 'The same for a data acquisition finger beside it; empty: it is not there.')
     pvdf_link: str = param('', 'The same for a PVDF finger beside it; empty: it is not there.')
+    plugged: bool = param(True, 'Whether the sensor is plugged in; may be set while running.')
+    bit_flips: float = param(
+        0.0,
+        'Probability that a bit of a byte flips on the line of the sensor; may be set while running.',
+        low=0.0,
+        high=1.0,
+    )
     finger_port: int = param(28500, 'UDP port on loopback where finger states arrive; 0: any.', low=0, high=65535)
 
 
@@ -72,6 +80,8 @@ class Bench:
         self._sensors = [
             makers[name](self.scene, surface, Path(link).expanduser(), rng) for name, link in links if link
         ]
+        self.flip_bits(params.bit_flips)
+        self._starts_plugged = params.plugged
         self._link = FingerLink(params.finger_port)
         self._commands: list[Callable[[], None]] = []
         self._stop = threading.Event()
@@ -114,6 +124,8 @@ class Bench:
         """Plug the devices in and let time run."""
         for sensor in self._sensors:
             sensor.device.plug()
+        if not self._starts_plugged:
+            self.unplug()
         self._thread.start()
 
     def stop(self) -> None:
@@ -132,6 +144,10 @@ class Bench:
     def replug(self) -> None:
         """Plug the sensor in again; it gets another device name and counts from 0."""
         self._in_thread(self.device.plug)
+
+    def flip_bits(self, probability: float) -> None:
+        """Make the line of the sensor a bad one; 0 makes it a good one again."""
+        self.device.faults = ByteFaults(flip=probability)
 
     @property
     def counts(self) -> Mapping[str, int]:

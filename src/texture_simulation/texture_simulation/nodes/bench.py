@@ -13,9 +13,12 @@ from texture_core.ros.parameters import declare, on_change
 from texture_core.ros.run import run
 from texture_simulation.bench import Bench, BenchParams
 
+# What an operator of a real bench can do while it runs: swap the sample, pull the plug, spoil the line.
+LIVE = ('surface', 'plugged', 'bit_flips')
+
 
 class BenchNode(Node):
-    """Hold the bench, and let its operator swap the sample by setting `surface`."""
+    """Hold the bench, and let its operator swap the sample by setting `surface`, or pull the sensor's plug."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('bench', **kwargs)
@@ -34,12 +37,17 @@ class BenchNode(Node):
         self._bench.stop()
 
     def _change(self, params: BenchParams) -> None:
-        if dataclasses.replace(params, surface=self._params.surface) != self._params:
-            raise InvalidParameter("only 'surface' can be changed while the bench runs; start it again for the others")
+        if dataclasses.replace(params, **{name: getattr(self._params, name) for name in LIVE}) != self._params:
+            raise InvalidParameter(
+                f'only {", ".join(LIVE)} can be changed while the bench runs; start it again for others'
+            )
         try:
             self._bench.set_surface(params.surface)
         except UnknownName as error:
             raise InvalidParameter(str(error)) from error
+        self._bench.flip_bits(params.bit_flips)
+        if params.plugged != self._params.plugged:
+            (self._bench.replug if params.plugged else self._bench.unplug)()
         self._params = params
 
     def _report(self) -> tuple[str, str, dict[str, Any]]:
