@@ -18,9 +18,9 @@ DEADLINE_S = 20.0
 class Launched:
     """A running launcher."""
 
-    def __init__(self, file: Path, prefix: Path) -> None:
+    def __init__(self, file: Path, prefix: Path, options: tuple[str, ...] = ()) -> None:
         environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix), 'TMPDIR': str(prefix)}
-        command = [sys.executable, '-m', 'texture_bringup.command', 'launch', str(file)]
+        command = [sys.executable, '-m', 'texture_bringup.command', 'launch', *options, str(file)]
         self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
         self.lines = []
 
@@ -51,14 +51,14 @@ def launch(tmp_path):
     (tmp_path / 'lib/p').mkdir(parents=True)
     started = []
 
-    def start(scripts: dict[str, str], **attributes: str) -> Launched:
+    def start(scripts: dict[str, str], *options: str, **attributes: str) -> Launched:
         nodes = ''
         for name, script in scripts.items():
             (tmp_path / 'lib/p' / name).write_text(f'#!/bin/sh\n{script}\n')
             (tmp_path / 'lib/p' / name).chmod(0o755)
             nodes += f'<node pkg="p" exec="{name}" output="screen" {attributes.get(name, "")}/>'
         (tmp_path / 'a.launch.xml').write_text(f'<launch>{nodes}</launch>')
-        started.append(Launched(tmp_path / 'a.launch.xml', tmp_path))
+        started.append(Launched(tmp_path / 'a.launch.xml', tmp_path, options))
         return started[-1]
 
     yield start
@@ -131,6 +131,22 @@ def test_a_node_that_may_be_restarted_comes_back(launch) -> None:
     assert second != first
     launched.process.send_signal(signal.SIGINT)
     assert launched.end() == 0
+
+
+def test_a_node_that_was_started_wrongly_is_not_restarted_and_stops_the_others(launch) -> None:
+    launched = launch({'good': GOOD, 'wrong': 'echo why; exit 2'}, wrong='respawn="true"')
+    assert launched.end() == 1
+    assert launched.lines.count('[wrong] why') == 1
+    assert any('wrong is needed' in line for line in launched.lines)
+
+
+def test_together_the_death_of_any_node_stops_all_and_none_is_restarted(launch) -> None:
+    launched = launch({'good': GOOD, 'phoenix': GOOD}, '--together', phoenix='respawn="true"')
+    pids = [launched.ready(), launched.ready()]
+    phoenix = next(line for line in launched.lines if line.startswith('[phoenix] ready'))
+    os.kill(int(phoenix.split()[-1]), signal.SIGKILL)
+    assert launched.end() == 1
+    assert all(gone(pid) for pid in pids)
 
 
 def test_nodes_end_with_a_launcher_that_is_killed(launch) -> None:

@@ -19,6 +19,11 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('file', help="path of a launch file, or the name of one of the suite's, such as bench")
     parser.add_argument('arguments', nargs='*', metavar='NAME:=VALUE', help='arguments of the launch file')
     parser.add_argument('--parent', type=int, help=argparse.SUPPRESS)
+    parser.add_argument(
+        '--together',
+        action='store_true',
+        help='stop all nodes when one dies; otherwise it is started again if it may be',
+    )
     parser.add_argument('--show-args', action='store_true', help='show the arguments of the launch file')
 
 
@@ -31,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
         print(arguments_text(path))
         return 0
     nodes = read(path, given_arguments(options.arguments), os.environ)
-    return Supervisor(nodes, _say).run()
+    return Supervisor(nodes, _say, together=options.together).run()
 
 
 def arguments_text(path: Path) -> str:

@@ -30,17 +30,28 @@ class ChildLauncher:
         Environment of the nodes.
     log
         File for everything the nodes say.
+    together
+        Whether the launch ends when one node dies, even if the launch file would start it again.
     """
 
-    def __init__(self, file: str, arguments: Mapping[str, object], environment: Mapping[str, str], log: Path) -> None:
+    def __init__(
+        self,
+        file: str,
+        arguments: Mapping[str, object],
+        environment: Mapping[str, str],
+        log: Path,
+        *,
+        together: bool = True,
+    ) -> None:
         self.log = log
+        self._options = ['--parent', str(os.getpid()), *['--together'] * together]
         self._given = [f'{name}:={value}' for name, value in arguments.items()]
         self._file = file
         self._environment = environment
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> ChildLauncher:
-        command = [sys.executable, '-m', 'texture_bringup.command', 'launch', '--parent', str(os.getpid())]
+        command = [sys.executable, '-m', 'texture_bringup.command', 'launch', *self._options]
         with self.log.open('wb') as log:
             self._process = subprocess.Popen(
                 [*command, self._file, *self._given],

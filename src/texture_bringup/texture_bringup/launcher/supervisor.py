@@ -19,6 +19,7 @@ from texture_bringup.launcher.output import Output
 STOP = ((0.0, signal.SIGINT), (5.0, signal.SIGTERM), (8.0, signal.SIGKILL))
 STOPPING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 POLL_S = 0.1
+MISTAKE = 2  # exit code of a node that was given something it cannot use, and said so
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +53,14 @@ class Supervisor:
         What to run.
     say
         Receives each line to show, without its line end.
+    together
+        Whether all are stopped when one dies, whatever the launch file says about it, and none is started again.
     """
 
-    def __init__(self, nodes: Sequence[NodeDescription], say: Callable[[str], None]) -> None:
+    def __init__(self, nodes: Sequence[NodeDescription], say: Callable[[str], None], *, together: bool = False) -> None:
         self._nodes = nodes
         self._say = say
+        self._together = together
         self._due: list[tuple[float, Job]] = []  # when to start it
         self._running: list[Running] = []
         self._selector = selectors.DefaultSelector()
@@ -135,12 +139,14 @@ class Supervisor:
         self._forget(running)
         node, returncode = running.job.node, running.process.returncode
         asked_for = self._stopping_since_s is not None
-        restart = node.respawn and not asked_for
+        # What was started wrongly would only end again.
+        restart = node.respawn and returncode != MISTAKE and not (asked_for or self._together)
+        needed = node.needed or node.respawn or (self._together and returncode != 0)
         self._failed |= returncode != 0 and not (asked_for or restart)
         self._say(f'[launch] {running.label} {process.ending(returncode)}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, running.job))
-        elif node.needed and not asked_for:
+        elif needed and not asked_for:
             self._say(f'[launch] {running.label} is needed by the others, which are stopped now')
             self.stop()
 
