@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
-from sklearn.covariance import ledoit_wolf
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
@@ -308,6 +307,8 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> _Fit:
     cells : (n_slides,)
         Number of the motion times the number of textures, and number of the texture.
     """
+    from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and who judges does not need it
+
     counts = np.bincount(cells)
     means = np.zeros((len(counts), values.shape[1]))
     np.add.at(means, cells, values)
