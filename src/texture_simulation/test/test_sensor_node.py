@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from texture_msgs import msg
 
 from texture_core.ros.local_graph import LocalGraph
@@ -41,7 +41,7 @@ def test_a_finger_of_a_biotac_board_is_published_and_replugging_survived(graph: 
         rig.do(device.plug)
         fast.clear()
         graph.until(lambda: fast)
-        graph.until(lambda: {value.key: value.value for value in reports[-1].status[0].values}.get('reopened') == '1')
+        graph.until(lambda: reports and KeyValue(key='reopened', value='1') in reports[-1].status[0].values)
         assert fast[-1].first_sample > before
 
 
