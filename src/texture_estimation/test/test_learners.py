@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from sklearn.mixture import GaussianMixture
-from sklearn.naive_bayes import GaussianNB
+from sklearn.naive_bayes import CategoricalNB, GaussianNB
 from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
@@ -14,7 +14,7 @@ from texture_estimation.learners.ann_pairs import AnnPairs
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.em_mixture import EmMixture
 from texture_estimation.learners.levenberg_marquardt import Network, _by_examples, _by_weights, fit_network
-from texture_estimation.learners.naive_bayes import NaiveBayes
+from texture_estimation.learners.naive_bayes import NaiveBayes, bins_of
 from texture_estimation.learners.pair_votes import PairVotes
 from texture_estimation.learners.passive_aggressive import OnlinePlanes, PassiveAggressive
 from texture_estimation.learners.svm_linear import SvmLinear
@@ -186,6 +186,35 @@ def test_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
     np.testing.assert_allclose(answers, expected.predict_log_proba(scaler.transform(fresh)), atol=1e-6)
 
 
+def test_counted_naive_bayes_tells_labels_of_one_mean_and_width_apart_that_normal_distributions_cannot():
+    rng = np.random.default_rng(0)
+    flat, forked = rng.uniform(-1.0, 1.0, (300, 1)), rng.choice([-0.577, 0.577], (300, 1))  # variance 1/3 both
+    values, codes = np.concatenate((flat, forked)), np.repeat([0, 1], 300)
+    parts = NaiveBayes(bins=9).fit(values, codes, np.arange(600)).parts
+    judge = NaiveBayes.array_form(parts)
+    assert judge(np.array([[0.577], [0.0]])).argmax(axis=1).tolist() == [1, 0]
+    np.testing.assert_allclose(np.exp(parts['log_shares']).sum(axis=1), 1.0)
+    np.testing.assert_array_equal(judge(values[:5]), [judge(row) for row in values[:5]])
+    assert np.isfinite(judge(np.array([1e9, -1e9])[:, None])).all()
+
+
+def test_counted_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
+    examples, codes, _, fresh = task
+    parts = NaiveBayes(bins=4).fit(examples.values, codes, np.arange(len(codes))).parts
+    known = [bins_of(values, parts['edges']) for values in (examples.values, fresh)]
+    expected = CategoricalNB(min_categories=4).fit(known[0], codes)
+    np.testing.assert_allclose(NaiveBayes.array_form(parts)(fresh), expected.predict_log_proba(known[1]), atol=1e-9)
+
+
+@pytest.mark.parametrize('learner', [SvmPairs(ties='nearest'), AnnPairs(ties='nearest', iterations=3)])
+def test_pairwise_learners_give_ties_to_the_clearer_label_if_asked_and_change_nothing_else(task, learner):
+    strict = judged(dataclasses.replace(learner, ties='unclassified'), *task)[1]
+    nearest = judged(learner, *task)[1]
+    clear = ~undecided(strict)
+    np.testing.assert_array_equal(nearest.argmax(axis=1)[clear], strict.argmax(axis=1)[clear])
+    assert not undecided(nearest).any()
+
+
 def test_linear_machines_decide_every_window_as_scikit_learn(task):
     examples, codes, _, fresh = task
     learner = SvmLinear(least_c=0.5, most_c=0.5, candidates=1, repeats=1)
@@ -203,9 +232,9 @@ def test_the_penalty_is_the_smallest_of_those_that_do_best(examples):
 
 def test_max_wins_on_principal_components_decides_every_window_as_scikit_learn(task):
     examples, codes, _, fresh = task
-    judge, answers = judged(SvmMaxWins(variance=0.9, gamma=0.02, c=3.0), *task)
+    judge, answers = judged(SvmMaxWins(variance=0.9, gamma=1.0, c=3.0), *task)
     project = lambda values: (values - examples.values.mean(axis=0)) @ judge.components  # noqa: E731
-    svc = SVC(C=3.0, gamma=0.02, break_ties=True).fit(project(examples.values), codes)
+    svc = SVC(C=3.0, gamma='scale', break_ties=True).fit(project(examples.values), codes)
     np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(project(fresh)))
 
 

@@ -4,15 +4,16 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from texture_core.errors import UnknownName
+from texture_core.errors import InvalidParameter, UnknownName
 from texture_estimation.genetic.fitness import UNDECIDED
-from texture_evaluation.experiments import PROTOCOLS, Experiment, run_experiment
+from texture_estimation.recipe import load_recipe
+from texture_evaluation.experiments import PROTOCOLS, Experiment, report, run_experiment
 from texture_evaluation.experiments.check import at_least, higher, lower_in, most_errors, seldom
 from texture_evaluation.experiments.gather import gather
 from texture_evaluation.experiments.interval import apart, mean, share
 from texture_evaluation.experiments.outcome import Outcome
 from texture_evaluation.experiments.protocol import Protocol, drawn, folds, halves, learnt_in
-from texture_evaluation.experiments.trial import judge, recipe_of, reduced
+from texture_evaluation.experiments.trial import judge, outcomes, recipe_of, reduced
 from texture_simulation.scene import load_scene
 
 CODES = np.repeat([0, 1, 2], 20)
@@ -46,6 +47,42 @@ def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(protoc
 def test_an_unknown_experiment_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="did you mean 'jamali'"):
         run_experiment('jamalli', Experiment(tmp_path))
+
+
+@pytest.mark.parametrize('name', ['jamali', 'kaboli', 'hu'])
+def test_an_experiment_whose_paper_searches_for_nothing_refuses_to_tune(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidParameter, match=f"'{name}' has nothing to tune"):
+        run_experiment(name, Experiment(tmp_path, quick=True, tune=True))
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_search_sees_what_is_learnt_from_alone_and_its_recipe_is_tried_on_the_rest(tmp_path, monkeypatch) -> None:
+    seen: dict = {}
+    monkeypatch.setattr(report, 'outcomes', lambda *args, **kwargs: seen.update(outcomes(*args, **kwargs)) or seen)
+    result, path = run_experiment('ets-fine', Experiment(tmp_path, seed=1, quick=True, tune=True))
+    assert path.name == 'ets-fine-tuned.json'
+    figures = result.numbers['tuning']['ets-fine-svm, ten textures']
+    assert figures['scans'] == 10 * 16 // 2
+    assert seen['ten textures', 'ets-fine-svm'].tested.sum() == figures['scans']
+    assert seen['ten textures', 'default'].tested.sum() > figures['scans']  # nothing was searched for ours
+    found = load_recipe(str(tmp_path / 'ets-fine-svm-tuned-ten-textures.yaml'))
+    assert 0.01 <= found.learner.box_constraint <= 10.0
+
+
+def test_two_directions_are_joined_into_one_vector_with_components_of_their_own() -> None:
+    protocol = next(protocol for protocol in PROTOCOLS if protocol.name == 'hu')
+    task = reduced(protocol.tasks[0], 4)
+    slides = gather(load_scene(protocol.scene), task, 0, slow=False)
+    both, x_only, y_only = (recipe_of(method) for method in task.methods[:3])
+    values, owner = slides.describe(both.feature_set, task.methods[0].views)
+    assert values.shape == (20, 2 * 12_288)  # one vector a place
+    assert len(np.unique(owner)) == 20
+    halves_of = [slides.describe(recipe.feature_set, task.methods[place].views)[0] for place, recipe in
+                 ((1, x_only), (2, y_only))]  # fmt: skip
+    np.testing.assert_array_equal(values, np.concatenate(halves_of, axis=1))
+    kept = [recipe.learner.fit(own, slides.codes, owner).parts['components'].shape[1]
+            for recipe, own in ((both, values), (x_only, halves_of[0]), (y_only, halves_of[1]))]  # fmt: skip
+    assert kept[0] == kept[1] + kept[2]  # the paper: 39 and 39 make 78
 
 
 def test_every_paper_figure_is_a_share_and_every_table_has_a_row_for_each_surface() -> None:

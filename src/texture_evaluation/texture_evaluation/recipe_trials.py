@@ -33,7 +33,7 @@ from texture_features.features.force import Force
 from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.speed import Speed
 from texture_features.stretch import Stretched
-from texture_features.windows import Piece, cut_recording
+from texture_features.windows import Piece, WindowParams, cut_recording
 
 # Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and learns from
 # windows this far apart.
@@ -48,6 +48,9 @@ class Recorded:
     slide: Slide
     signals: Mapping[str, Sequence[TactileSignal]]
     states: Sequence[ExplorationState]
+    _cut: dict[tuple[WindowParams, tuple[str, ...]], list[Piece]] = dataclasses.field(
+        default_factory=dict, init=False, repr=False
+    )
 
     def at_rate(self, topic: str, rate_hz: float) -> Recorded:
         """Return the slide with one topic brought to another rate, stretch by stretch between losses."""
@@ -59,8 +62,12 @@ class Recorded:
         missing = [topic for topic in features.topics if topic not in self.signals]
         if missing:
             raise InvalidData(f"slide '{self.slide.name}' has no '{missing[0]}', which recipe '{recipe.name}' needs")
-        used = {topic: self.signals[topic] for topic in features.topics}
-        return list(cut_recording(used, self.states, features.windows))
+        asked = features.windows, features.topics
+        if asked not in self._cut:
+            used = {topic: self.signals[topic] for topic in features.topics}
+            self._cut.clear()  # the last ones alone: those of all recipes would fill the memory
+            self._cut[asked] = list(cut_recording(used, self.states, features.windows))
+        return self._cut[asked]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +100,7 @@ class Outcome:
         }
 
 
+Described = Mapping[Slide, Sequence[FeatureVector]]
 Division = tuple[frozenset[str], frozenset[str]]  # names of the slides learnt from, and tested on
 
 
@@ -128,16 +136,40 @@ def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: flo
 
 def try_recipe(recipe: Recipe, recorded: Sequence[Recorded], divisions: Sequence[Division]) -> Outcome:
     """Train and test a recipe on each division of the slides."""
-    described = {item.slide: _describe(recipe, item) for item in recorded}
+    return try_described(recipe, describe_all(recipe, recorded), divisions)
+
+
+def describe_all(recipe: Recipe, recorded: Sequence[Recorded]) -> Described:
+    """Return the features of all windows of all slides."""
+    return {item.slide: describe(recipe, item) for item in recorded}
+
+
+def try_described(recipe: Recipe, described: Described, divisions: Sequence[Division]) -> Outcome:
+    """Train and test a recipe on each division of slides that it has described."""
     results: list[SlideResult] = []
     taken: list[float] = []
     for learnt, tested in divisions:
-        examples = _examples({slide: vectors for slide, vectors in described.items() if slide.name in learnt})
+        examples = examples_of({slide: vectors for slide, vectors in described.items() if slide.name in learnt})
         start = time.process_time()
         model = train(recipe, examples)
         taken.append(time.process_time() - start)
         results += [_judged(model, slide, vectors) for slide, vectors in described.items() if slide.name in tested]
     return Outcome([result for result in results if result.estimates], taken, model)
+
+
+def describe(recipe: Recipe, item: Recorded) -> list[FeatureVector]:
+    """Return the features of all windows of a slide, named after it."""
+    vectors = recipe.feature_set.describe_many(item.cut(recipe))
+    return [dataclasses.replace(vector, exploration_id=item.slide.name) for vector in vectors if not vector.last]
+
+
+def examples_of(described: Described) -> LabelledFeatures:
+    """Return windows that begin at least LENGTH_S apart, of all slides."""
+    chosen = [vector for vectors in described.values() for vector in _apart(vectors)]
+    if not chosen:
+        raise InvalidData('no slide to learn from has a whole window; record longer slides')
+    examples = LabelledFeatures.from_vectors(chosen, {slide.name: slide.surface for slide in described})
+    return dataclasses.replace(examples, hop_s=max(LENGTH_S, examples.hop_s))
 
 
 def latency_us(recipe: Recipe, model: Model, recorded: Sequence[Recorded]) -> dict[str, float]:
@@ -217,20 +249,6 @@ def _adapted_feature(feature: Feature, n_samples: int, of_motion: bool) -> Featu
     if isinstance(feature, LogSpectrum):  # padding a window with zeros adds points, but nothing to them
         return dataclasses.replace(feature, points=min(feature.points, max(2, n_samples // 2)))
     return feature
-
-
-def _describe(recipe: Recipe, item: Recorded) -> list[FeatureVector]:
-    vectors = recipe.feature_set.describe_many(item.cut(recipe))
-    return [dataclasses.replace(vector, exploration_id=item.slide.name) for vector in vectors if not vector.last]
-
-
-def _examples(described: Mapping[Slide, Sequence[FeatureVector]]) -> LabelledFeatures:
-    """Return windows that begin at least LENGTH_S apart, of all slides."""
-    chosen = [vector for vectors in described.values() for vector in _apart(vectors)]
-    if not chosen:
-        raise InvalidData('no slide to learn from has a whole window; record longer slides')
-    examples = LabelledFeatures.from_vectors(chosen, {slide.name: slide.surface for slide in described})
-    return dataclasses.replace(examples, hop_s=max(LENGTH_S, examples.hop_s))
 
 
 def _apart(vectors: Sequence[FeatureVector]) -> list[FeatureVector]:

@@ -89,6 +89,14 @@ def test_region_peaks_find_the_tones_by_strength_or_by_frequency():
         np.testing.assert_allclose(values, expected, atol=1.0)
 
 
+def test_region_peaks_give_the_heights_of_the_tones_if_asked():
+    samples = tone(310.0) + tone(120.0, amplitude=0.5)
+    feature = RegionPeaks(peaks=2, heights=True)
+    assert feature.names == ('1/frequency_hz', '1/amplitude', '2/frequency_hz', '2/amplitude')
+    np.testing.assert_allclose(feature(windows(samples))[0], [310.0, 1.0, 120.0, 0.5], atol=1.0, rtol=0.05)
+    assert not RegionPeaks(heights=True)(windows(np.zeros_like(samples))).any()
+
+
 def test_spectral_peaks_have_the_transform_of_2048_points():
     values = SpectralPeaks(peaks=1)(windows(tone(125.3, 500)))[0]
     step_hz = RATE_HZ / 2048

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,11 @@ class Scans:
     speed_m_s: Array
     force_n: Array
     _known: dict[WindowParams, Examples] = field(default_factory=dict, repr=False)
+
+    def of(self, chosen: NDArray[np.bool_]) -> Scans:
+        """Return some of the scans; `chosen` is (n_scans,)."""
+        streams = {topic: replace(stream, samples=stream.samples[chosen]) for topic, stream in self.streams.items()}
+        return Scans(streams, self.labels[chosen], self.speed_m_s[chosen], self.force_n[chosen])
 
     def __call__(self, windows: WindowParams) -> Examples:
         """Return the windows, scan by scan.

@@ -14,18 +14,19 @@ from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.levenberg_marquardt import Network, fit_network
-from texture_estimation.learners.pair_votes import PairVotes
+from texture_estimation.learners.pair_votes import TIES, PairVotes
 from texture_estimation.learners.standardisation import standardisation
 from texture_estimation.log_probabilities import log_softmax
 
 NOTE = 'not calibrated: the pairs won are counted'
+ROUNDED_UP = 0.5  # an output above it is 1, which is the first label of the pair
 # One of so many is held out of each network's training to stop it: MATLAB holds out 15 %.
 HELD_OUT = 7
 
 
 @dataclass(frozen=True)
 class AnnPairs:
-    """A network with a sigmoid hidden layer and a linear, rounded output for each pair; most pairs won, or a tie.
+    """A network with a sigmoid hidden layer and a linear, rounded output for each pair; most pairs won.
 
     Trained by the Levenberg-Marquardt method with early stopping on every seventh slide, as MATLAB does by default.
 
@@ -35,6 +36,9 @@ class AnnPairs:
     hidden: int = param(10, 'Neurons in the hidden layer.', low=1, high=200)
     iterations: int = param(30, 'Steps of the training at most.', low=1, high=10_000)
     seed: int = param(0, 'Of the weights before the training.', low=0)
+    ties: str = param(
+        'unclassified', "Labels that win as many pairs: none of them, or 'nearest', the clearer one.", choices=TIES
+    )
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
@@ -56,6 +60,7 @@ class AnnPairs:
             'hidden_bias': np.stack([network.hidden_bias for network in networks]),
             'out': np.stack([network.out for network in networks]),
             'out_bias': np.array([network.out_bias for network in networks]),
+            'ties': self.ties,
         }
         return Fitted(parts, None, NOTE)
 
@@ -76,6 +81,8 @@ class PairNetworks:
     hidden : (n_pairs, n_hidden, n_features)
     hidden_bias, out : (n_pairs, n_hidden)
     out_bias : (n_pairs,)
+    ties
+        One of TIES.
     """
 
     mean: Array
@@ -84,6 +91,7 @@ class PairNetworks:
     hidden_bias: Array
     out: Array
     out_bias: Array
+    ties: str
 
     def __post_init__(self) -> None:
         n_pairs = len(self.out_bias)
@@ -93,8 +101,8 @@ class PairNetworks:
 
     def __call__(self, values: Array) -> Array:
         """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
-        wins: Array = self._votes.won(self.outputs(values) > 0.5)  # type: ignore[attr-defined]  # rounded to 1
-        return log_softmax(wins)
+        votes: PairVotes = self._votes  # type: ignore[attr-defined]
+        return log_softmax(votes.counted(self.outputs(values) - ROUNDED_UP, self.ties))
 
     def outputs(self, values: Array) -> Array:
         """Return the output of each pair's network, (..., n_pairs): about 1 for its first label, 0 for its second."""

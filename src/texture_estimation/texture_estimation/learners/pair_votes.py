@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from texture_core.arrays import Array
 
+TIES = ('unclassified', 'nearest')
+
 
 @dataclass(frozen=True)
 class PairVotes:
@@ -38,7 +40,11 @@ class PairVotes:
         wins: Array = first_wins @ self._swing + self._second_wins_all  # type: ignore[attr-defined]
         return wins
 
-    def won_clearly(self, decisions: Array) -> Array:
+    def counted(self, decisions: Array | NDArray[np.float32], ties: str) -> Array:
+        """Return the pairs won, (..., n_labels), of decisions, (..., n_pairs); `ties` is one of TIES."""
+        return self.won_clearly(decisions) if ties == 'nearest' else self.won(decisions > 0)
+
+    def won_clearly(self, decisions: Array | NDArray[np.float32]) -> Array:
         """Return the pairs won, and less than half a pair more for the clearer decisions, which breaks ties.
 
         Parameters

@@ -36,7 +36,7 @@ class SvmMaxWins:
     )
     c: float = param(10.0, 'Penalty of a training error (box constraint).', low=1e-6, high=1e9)
     gamma: float = param(
-        0.0, 'Width of the kernel exp(-gamma d²); 0 means 1 / (n_components · variance).', low=0.0, high=1e9
+        1.0, 'Of the kernel exp(-gamma d² / (n_components · variance)): a larger one is narrower.', low=1e-9, high=1e9
     )
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
@@ -56,7 +56,7 @@ class SvmMaxWins:
         unit = float(projected.std()) or 1.0
         scaler = StandardScaler().fit(projected)
         scaler.mean_, scaler.scale_ = np.zeros(projected.shape[1]), np.full(projected.shape[1], unit)
-        gamma = self.gamma * unit**2 or 1.0 / projected.shape[1]
+        gamma = self.gamma / projected.shape[1]
         svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(projected / unit, codes)
         parts = {'mean': mean, 'components': components, 'scaler': scaler, 'svc': svc}
         return Fitted(parts, None, f'not calibrated: pairs won; {components.shape[1]} principal components')

@@ -13,7 +13,7 @@ from texture_core.parameters import param
 from texture_estimation.learners.array_svm import ArraySvm, export
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.pair_coupling import uncalibrated
-from texture_estimation.learners.pair_votes import PairVotes
+from texture_estimation.learners.pair_votes import TIES, PairVotes
 from texture_estimation.log_probabilities import log_softmax
 
 NOTE = 'not calibrated: the pairs won are counted'
@@ -22,7 +22,7 @@ CACHE_MB = 500
 
 @dataclass(frozen=True)
 class SvmPairs:
-    """RBF machines for all pairs with one box constraint and kernel scale; most pairs won, or a tie.
+    """RBF machines for all pairs with one box constraint and kernel scale; most pairs won.
 
     The kernel is exp(-|x - s|² / kernel_scale²), MATLAB's sense of the scale: gamma = 1 / kernel_scale².
 
@@ -32,6 +32,9 @@ class SvmPairs:
     box_constraint: float = param(10.0, 'Penalty of a training error.', low=1e-6, high=1e9)
     kernel_scale: float = param(3.0, "Width of the kernel, MATLAB's KernelScale.", low=1e-9, high=1e9)
     standardise: bool = param(True, 'Bring the features to zero mean and unit variance first.')
+    ties: str = param(
+        'unclassified', "Labels that win as many pairs: none of them, or 'nearest', the clearer one.", choices=TIES
+    )
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
@@ -43,13 +46,15 @@ class SvmPairs:
         if not self.standardise:
             scaler.mean_, scaler.scale_ = np.zeros(values.shape[1]), np.ones(values.shape[1])
         svc = SVC(C=self.box_constraint, kernel='rbf', gamma=self.kernel_scale**-2, cache_size=CACHE_MB)
-        return Fitted({'scaler': scaler, 'svc': svc.fit(scaler.transform(values), codes)}, None, NOTE)
+        parts = {'scaler': scaler, 'svc': svc.fit(scaler.transform(values), codes), 'ties': self.ties}
+        return Fitted(parts, None, NOTE)
 
     @staticmethod
     def array_form(parts: Mapping[str, Any]) -> PairMachines:
         """Return what judges, from the stored parts."""
         n_labels = len(parts['svc'].n_support_)
-        return PairMachines(export(parts['scaler'], parts['svc'], uncalibrated(n_labels)), PairVotes(n_labels))
+        svm = export(parts['scaler'], parts['svc'], uncalibrated(n_labels))
+        return PairMachines(svm, PairVotes(n_labels), str(parts['ties']))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +63,8 @@ class PairMachines:
 
     svm: ArraySvm
     votes: PairVotes
+    ties: str
 
     def __call__(self, values: Array) -> Array:
         """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self.votes.won(self.svm.decisions(values) > 0))
+        return log_softmax(self.votes.counted(self.svm.decisions(values), self.ties))

@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 from texture_evaluation.experiments.check import higher_elsewhere, lower_in, most_errors
+from texture_evaluation.experiments.ets_linear import PEAKS
 from texture_evaluation.experiments.interval import apart
 from texture_evaluation.experiments.protocol import (
     FEW,
@@ -95,8 +96,8 @@ PROTOCOL = Protocol(
             LINES,
             _visits(0.0),
             (
-                Method('ets-linear-ann', Figures(0.809, 0.715, 0.142)),
-                Method('ets-linear-svm', Figures(0.963, 0.764, 0.134)),
+                Method('ets-linear-ann', Figures(0.809, 0.715, 0.142), features=PEAKS),
+                Method('ets-linear-svm', Figures(0.963, 0.764, 0.134), features=PEAKS, learner={'kernel_scale': 4.0}),
                 replace(OURS, divisions=FEW),
                 Method('vibration-and-taxels', divisions=FEW),
             ),

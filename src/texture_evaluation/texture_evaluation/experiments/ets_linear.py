@@ -32,9 +32,11 @@ ANN, SVM, ANN_VOTE, SVM_VOTE = 'ets-linear-ann', 'ets-linear-svm', 'ets-linear-a
 # The paper speaks of a larger database when it votes: were the parts dealt out to the halves one by one?
 ANN_SINGLY, SVM_SINGLY = f'{ANN_VOTE}, parts dealt', f'{SVM_VOTE}, parts dealt'
 TOLD = 'default, told speed and force'
+# By these the noise was set; the recipes' own were chosen on recordings.
+PEAKS = {'spectral_peaks': {'gap_hz': 10.0, 'order': 'intensity'}}
 METHODS = (
-    Method(ANN, Figures(0.851, 0.787, 0.088)),
-    Method(SVM, Figures(0.948, 0.750, 0.110)),
+    Method(ANN, Figures(0.851, 0.787, 0.088), features=PEAKS),
+    Method(SVM, Figures(0.948, 0.750, 0.110), features=PEAKS, learner={'kernel_scale': 4.0}),
     Method(ANN_VOTE, Figures(0.849, 0.840, 0.054)),
     Method(SVM_VOTE, Figures(0.991, 0.973, 0.016), confusion=TABLE_1),
     Method(ANN_VOTE, label=ANN_SINGLY, singly=True),

@@ -22,7 +22,7 @@ class Experiment:
     quick
         Fewer slides, for tests; such numbers are not for publishing.
     tune
-        Search the parameters first, as the paper does; experiments without a search leave it alone.
+        Search the parameters first, as the paper does; refused where the paper has no search.
     """
 
     out: Path

@@ -14,34 +14,39 @@ from texture_evaluation.experiments.experiment import Experiment, ExperimentResu
 from texture_evaluation.experiments.outcome import Outcome
 from texture_evaluation.experiments.paper_charts import accuracy_chart, confusions_chart
 from texture_evaluation.experiments.protocol import Finding, Method, Outcomes, Protocol, Table, Task
-from texture_evaluation.experiments.trial import outcomes
+from texture_evaluation.experiments.trial import NONE, TunedRecipes, outcomes, searched
 from texture_simulation.scene import load_scene
 
+TUNED = '-tuned'
+SEARCHED = '; recipes that were searched for: the first alone, whose slides to learn from the search was given'
 VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 
 
 def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
     """Rebuild a paper's experiment on simulated surfaces."""
     scene = load_scene(protocol.scene)
-    found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick)
+    tuned = searched(protocol, scene, experiment.seed, quick=experiment.quick) if experiment.tune else NONE
+    found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
+    name = f'{protocol.name}{TUNED if tuned else ""}'
     checked = protocol.findings(found)
     slides = {task.name: _slides(found[task.name, task.methods[0].name]) for task in protocol.tasks}
     return ExperimentResult(
-        name=protocol.name,
+        name=name,
         measured=f'slides recognised, as in {protocol.paper}; intervals of 95 % over slides',
         data=(
             f"simulated: scene '{scene.name}' ({scene.about}); "
             f'slides a surface: {", ".join(f"{count} ({name})" for name, count in slides.items())}'
         ),
-        split=protocol.split,
+        split=f'{protocol.split}{SEARCHED if tuned else ""}',
         numbers={
             'difficulty': _difficulty(protocol, found),
             'tasks': {task.name: {m.name: _figures(m, found[task.name, m.name]) for m in task.methods}
                       for task in protocol.tasks},
             'findings': [_as_json(finding) for finding in checked],
+            'tuning': {f'{recipe}, {task}': one.figures() for (task, recipe), one in tuned.items()},
         },
-        charts=_charts(protocol, found, experiment.out),
-        lines=tuple(_lines(protocol, found, checked)),
+        charts=_charts(protocol, found, name, experiment.out),
+        lines=(*_lines(protocol, found, checked), *_tuning_lines(tuned, experiment.out)),
     )  # fmt: skip
 
 
@@ -84,13 +89,13 @@ def _as_json(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _charts(protocol: Protocol, found: Outcomes, out: Path) -> tuple[Path, ...]:
-    stem = f'experiment_{protocol.name.replace("-", "_")}'
+def _charts(protocol: Protocol, found: Outcomes, name: str, out: Path) -> tuple[Path, ...]:
+    stem = f'experiment_{name.replace("-", "_")}'
     panels = {
         task.name: {m.name: (m.paper.test, found[task.name, m.name].test) for m in task.methods}
         for task in protocol.tasks
     }
-    charts = [accuracy_chart(panels, f'{protocol.name}: slides recognised, paper and simulation', out / f'{stem}.png')]
+    charts = [accuracy_chart(panels, f'{name}: slides recognised, paper and simulation', out / f'{stem}.png')]
     several = len(protocol.tasks) > 1
     tables = {
         f'{method.name}, {task.name}' if several else method.name: (
@@ -105,7 +110,7 @@ def _charts(protocol: Protocol, found: Outcomes, out: Path) -> tuple[Path, ...]:
     }
     if tables:
         path = out / f'{stem}_confusion.png'
-        charts.append(confusions_chart(tables, f'{protocol.name}: what was taken for what, %', path))
+        charts.append(confusions_chart(tables, f'{name}: what was taken for what, %', path))
     return tuple(charts)
 
 
@@ -134,6 +139,17 @@ def _lines(protocol: Protocol, found: Outcomes, checked: Sequence[Finding]) -> I
         for method in task.methods:
             if method.confusion is not None:
                 yield from _confusion_lines(task, method, found[task.name, method.name])
+
+
+def _tuning_lines(tuned: TunedRecipes, out: Path) -> Iterator[str]:
+    """Write the recipes that were searched for, and tell where they are and what they took."""
+    for (task, recipe), one in tuned.items():
+        path = one.write(out / f'{recipe}{TUNED}-{task.replace(" ", "-")}.yaml')
+        facts = one.figures()
+        yield (
+            f'searched: {path}: learnt {100 * facts["learning"]:.1f} %, tested {100 * facts["test"]:.1f} % within the '
+            f'search; {facts["individuals_tried"]} individuals on {facts["scans"]} slides in {facts["seconds"]:.0f} s'
+        )
 
 
 def _row(method: Method, outcome: Outcome) -> str:

@@ -18,6 +18,9 @@ from texture_features.spectrum import amplitudes_of
 class RegionPeaks:
     """Frequency (Hz) of the largest Fourier coefficient in each of the peaks that the regions of highest energy form.
 
+    The paper takes "the Fourier coefficients" in one place and "one frequency for each peak" in another: `heights`
+    gives the amplitudes of the coefficients, too.
+
     Source: Jamali & Sammut 2010, Algorithm 1.
     """
 
@@ -30,18 +33,23 @@ class RegionPeaks:
         "How the peaks are ranked: 'intensity' as found, by their strongest region; by 'frequency', the lowest first.",
         choices=('intensity', 'frequency'),
     )
+    heights: bool = param(False, 'Give the amplitude of that coefficient, too.')
     points: int = param(2048, 'Samples of the transform; a shorter window is padded with zeros.', low=8, high=1 << 20)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Number of the peak, from 1."""
-        return tuple(f'{number + 1}/frequency_hz' for number in range(self.peaks))
+        """Frequency of each peak in turn, with its amplitude if that is wanted; peaks are numbered from 1."""
+        told = ('frequency_hz', 'amplitude') if self.heights else ('frequency_hz',)
+        return tuple(f'{number + 1}/{what}' for number in range(self.peaks) for what in told)
 
     def __call__(self, windows: Windows) -> Array:
-        """Return the frequency of each peak."""
+        """Return the frequency of each peak, each followed by its amplitude if that is wanted."""
         amplitudes, step_hz = amplitudes_of(windows, self.points)
         bins = region_peaks(amplitudes, self.peaks, self.regions, by_frequency=self.order == 'frequency')
-        return bins * step_hz
+        if not self.heights:
+            return bins * step_hz
+        heights = np.where(bins > 0, np.take_along_axis(amplitudes, bins.astype(np.intp), axis=-1), 0.0)
+        return np.stack((bins * step_hz, heights), axis=-1).reshape(*bins.shape[:-1], -1)
 
 
 def region_peaks(spectrum: Array, count: int, regions: int, *, by_frequency: bool = False) -> Array:

@@ -8,7 +8,7 @@ from texture_core.arrays import Array
 from texture_estimation.genetic.halves import Mask
 from texture_estimation.genetic.judges.judge import ScoresOfHalf
 from texture_estimation.genetic.judges.networks import Networks, drawn
-from texture_estimation.learners.ann_pairs import AnnPairs
+from texture_estimation.learners.ann_pairs import ROUNDED_UP, AnnPairs
 from texture_estimation.learners.learner import Codes
 from texture_estimation.learners.pair_votes import PairVotes
 from texture_estimation.learners.standardisation import standardisation
@@ -37,6 +37,6 @@ def ann_pairs(learner: AnnPairs, values: Array, codes: Codes, groups: Codes) -> 
         # 1 for the first label of a pair, 0 for the second
         targets = np.tile(np.repeat([1.0, 0.0], rows.shape[1]), (len(first), 1))
         networks = Networks.fitted(of_pairs, targets, learner.hidden, rng)
-        return votes.won(networks.outputs(standard) > 0.5)
+        return votes.counted(networks.outputs(standard) - ROUNDED_UP, learner.ties)
 
     return scores

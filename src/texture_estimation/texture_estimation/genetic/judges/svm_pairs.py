@@ -33,7 +33,8 @@ def svm_pairs(learner: SvmPairs, values: Array, codes: Codes, groups: Codes) -> 
     votes = PairVotes(int(codes.max()) + 1)
 
     def scores(learnt: Mask) -> Array:
-        return votes.won(pair_decisions(kernel, codes, learnt, learner.box_constraint) > 0)
+        decisions = pair_decisions(kernel, codes, learnt, learner.box_constraint)
+        return votes.counted(decisions, learner.ties)
 
     return scores
 
