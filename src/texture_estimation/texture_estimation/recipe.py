@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from texture_core.catalogue import unknown
@@ -15,7 +14,8 @@ from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
 from texture_features.choice import choose
-from texture_features.feature_set import FeatureSet, read_recipe
+from texture_features.feature_set import FeatureSet
+from texture_features.recipe_file import read_recipe
 from texture_features.windows import WindowParams
 
 KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
@@ -116,4 +116,5 @@ def load_recipe(name_or_path: str) -> Recipe:
     UnknownName, InvalidParameter
         With one sentence that says what is wrong and what is allowed.
     """
-    return Recipe.from_mapping(read_recipe(name_or_path), Path(name_or_path).stem)
+    name, content = read_recipe(name_or_path)
+    return Recipe.from_mapping(content, name)

@@ -5,7 +5,7 @@ import pytest
 from texture_core.errors import UnknownName
 from texture_estimation.roughness.model import load_roughness_model
 from texture_evaluation.train_grades import train_grades_from_bags
-from texture_features.feature_set import read_recipe
+from texture_features.recipe_file import read_recipe
 
 GRADES = ('texture,grade', 'glass,1', 'leather,3', 'ridge_2mm_deep,5')
 
@@ -28,7 +28,7 @@ def test_bags_and_grades_make_a_model_whose_card_says_from_what(simulated, tmp_p
 
 def test_both_files_of_a_model_tell_the_extractor_how_to_describe(simulated, tmp_path) -> None:
     train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-2', tmp_path / 'rough')
-    by_card, by_model = (read_recipe(str(tmp_path / name)) for name in ('rough.json', 'rough.skops'))
+    by_card, by_model = (read_recipe(str(tmp_path / name))[1] for name in ('rough.json', 'rough.skops'))
     assert by_card == by_model
     assert 'inputs' in by_card
 

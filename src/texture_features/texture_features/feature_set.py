@@ -17,14 +17,14 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.features import FeatureVector
 from texture_core.parameters import from_mapping, param
-from texture_core.plain_data import load_card, load_yaml, shown
-from texture_core.resources import find_file
+from texture_core.plain_data import shown
 from texture_core.window import Window
 from texture_features.catalogue import FEATURES
 from texture_features.choice import choose
 from texture_features.feature import Feature, Windows
 from texture_features.features.force import Force
 from texture_features.features.speed import Speed
+from texture_features.recipe_file import read_recipe
 from texture_features.stretch import Stretched
 from texture_features.windows import CutWindow, Piece, SlideEnd, WindowParams
 
@@ -88,7 +88,8 @@ class FeatureSet:
         UnknownName, InvalidParameter
             If there is no such file or it does not hold a feature set.
         """
-        return cls.from_mapping(read_recipe(name_or_path), f"recipe '{name_or_path}'")
+        _, recipe = read_recipe(name_or_path)
+        return cls.from_mapping(recipe, f"recipe '{name_or_path}'")
 
     @classmethod
     def from_mapping(cls, recipe: Mapping[str, Any], where: str = 'recipe') -> FeatureSet:
@@ -214,23 +215,6 @@ class FeatureSet:
             f'{topic}={rate:.6g}Hz*{len(channels)}' for topic, (rate, channels) in zip(self.topics, layout, strict=True)
         ]
         return ' '.join([digest, *met])
-
-
-def read_recipe(name_or_path: str) -> Mapping[str, Any]:
-    """Return the mapping in a recipe (YAML) or under `recipe` in a model's card (JSON).
-
-    Raises
-    ------
-    UnknownName, InvalidParameter
-        If there is no such file or it cannot be read.
-    """
-    path = find_file(name_or_path, 'texture_estimation', 'config/recipes', 'recipe')
-    if path.suffix == '.skops':  # what a model's card says stands beside it
-        path = path.with_suffix('.json')
-    content = load_card(path) if path.suffix == '.json' else load_yaml(path, 'recipe')
-    if not isinstance(content, Mapping):
-        raise InvalidParameter(f"'{path}' holds no recipe; a mapping with the key 'inputs' is needed")
-    return content
 
 
 def _input(topic: str, section: Any, where: str) -> InputFeatures:

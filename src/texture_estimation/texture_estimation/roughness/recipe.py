@@ -10,14 +10,13 @@ from typing import Any
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
-from texture_core.plain_data import load_card, load_yaml, shown
-from texture_core.resources import find_file
 from texture_estimation.recipe import TrainingParams
 from texture_estimation.roughness.catalogue import HEADS
 from texture_estimation.roughness.checks import CheckParams
 from texture_estimation.roughness.head import Head
 from texture_features.choice import choose
 from texture_features.feature_set import FeatureSet
+from texture_features.recipe_file import read_recipe
 from texture_features.windows import WindowParams
 
 KEYS = ('description', 'windows', 'inputs', 'head', 'checks', 'evidence', 'training')
@@ -108,8 +107,5 @@ def load_roughness_recipe(name_or_path: str) -> RoughnessRecipe:
     UnknownName, InvalidParameter
         With one sentence that says what is wrong and what is allowed.
     """
-    path = find_file(name_or_path, 'texture_estimation', 'config/roughness', 'roughness recipe')
-    content = load_card(path) if path.suffix == '.json' else load_yaml(path, 'roughness recipe')
-    if not isinstance(content, Mapping):
-        raise InvalidParameter(f"'{path}' holds {shown(content)}, no recipe; a mapping with the key inputs is needed")
-    return RoughnessRecipe.from_mapping(content, path.stem)
+    name, content = read_recipe(name_or_path, 'config/roughness', 'roughness recipe')
+    return RoughnessRecipe.from_mapping(content, name)
