@@ -96,11 +96,10 @@ class Evidence:
         # Windows count alike, as the first of a slide is the least typical; together they are worth their sliding time.
         worth = self._evidence_ns / self._window_ns
         mean = self._sum / self._windows
-        posterior = model.recipe.evidence.log_posterior(mean, worth, model.growth)
-        best = int(posterior.argmax())
-        decided = np.count_nonzero(posterior == posterior[best]) == 1
-        probabilities = np.exp(posterior)
-        confidence = float(probabilities[best])
+        probabilities = model.recipe.evidence.posterior(mean, worth, model.growth)
+        listed = probabilities.tolist()
+        confidence = max(listed)
+        best, decided = listed.index(confidence), listed.count(confidence) == 1
         certain = decided and model.stopping.certain(confidence, worth)
         if (certain and not self._known) or final:
             self._known = model.familiar is None or model.familiar.knows(self._values / self._familiar_windows, worth)
@@ -111,7 +110,7 @@ class Evidence:
             known=decided and self._known is not False,
             confidence=confidence,
             labels=model.labels,
-            probabilities=tuple(probabilities.tolist()),
+            probabilities=tuple(listed),
             certain=certain,
             candidates=self._candidates(model, probabilities, worth) if final else (),
             windows=self._windows,

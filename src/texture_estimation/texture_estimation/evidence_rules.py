@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_estimation.log_probabilities import log_softmax
+from texture_estimation.log_probabilities import log_softmax, softmax
 
 # A label without a single vote keeps so much, so that its logarithm is finite.
 LEAST_SHARE = 1e-6
@@ -40,6 +40,9 @@ class EvidenceRule(Protocol):
             Exponent with which the evidence of one slide grows, learnt from slides held out of the training.
         """
 
+    def posterior(self, mean_voice: Array, independent_windows: float, growth: float) -> Array:
+        """Return the probabilities of which `log_posterior` gives the logarithms; it costs half of that."""
+
 
 @dataclass(frozen=True)
 class SoftVote:
@@ -56,6 +59,10 @@ class SoftVote:
     def log_posterior(self, mean_voice: Array, independent_windows: float | Array, growth: float) -> Array:
         """Return log softmax(n^growth · mean log p), the last axis being the textures."""
         return log_softmax(mean_voice * independent_windows**growth)
+
+    def posterior(self, mean_voice: Array, independent_windows: float, growth: float) -> Array:
+        """Return softmax(n^growth · mean log p)."""
+        return softmax(mean_voice * independent_windows**growth)
 
 
 @dataclass(frozen=True)
@@ -87,6 +94,11 @@ class MajorityVote:
         abstained = 1.0 - np.add.reduce(mean_voice, axis=-1, keepdims=True)
         shares = np.maximum(mean_voice + abstained / n_labels, LEAST_SHARE)
         return log_softmax(np.where(won, np.log(shares), 0.0))
+
+    def posterior(self, mean_voice: Array, independent_windows: float, growth: float) -> Array:
+        """Return the shares of the votes; equal ones for all labels where the majority is lacking."""
+        probabilities: Array = np.exp(self.log_posterior(mean_voice, independent_windows, growth))
+        return probabilities
 
 
 EVIDENCE_RULES: Mapping[str, type[EvidenceRule]] = {

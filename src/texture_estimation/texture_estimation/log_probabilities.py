@@ -15,6 +15,13 @@ def log_softmax(scores: Array) -> Array:
     return result
 
 
+def softmax(scores: Array) -> Array:
+    """Return the exponentials of scores less what makes their sum 1, (..., n_labels)."""
+    shares: Array = np.exp(scores - np.maximum.reduce(scores, axis=-1, keepdims=True))
+    shares /= np.add.reduce(shares, axis=-1, keepdims=True)
+    return shares
+
+
 def undecided(log_probabilities: Array) -> NDArray[np.bool_]:
     """Return whether several textures share the highest log-probability to the last bit, (...): nothing is decided."""
     best = np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)

@@ -15,7 +15,7 @@ def differences(windows: Windows) -> Array:
 
 def squares(windows: Windows) -> Array:
     """Return the squares of `differences`."""
-    return windows.shared('squares', lambda: differences(windows) ** 2)
+    return windows.shared('squares', lambda: np.square(differences(windows)))
 
 
 def _differences(rows: Array) -> Array:

@@ -35,41 +35,48 @@ def segment_densities(rows: Array, rate_hz: float, segment: int, step: int, bins
     Source: Welch 1967; the mean over the segments is scipy.signal.welch(detrend='constant').
     """
     squares = _squares(rows, rate_hz, segment, step, bins)
-    densities: Array = squares[..., :bins] + squares[..., bins:]
-    return densities
+    densities: Array = squares[..., :bins, :] + squares[..., bins:, :]
+    return densities.swapaxes(-1, -2)
 
 
 def mean_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
     """Return the mean of `segment_densities` over the segments, (..., bins); it costs less than all of them."""
-    means = mean_over_segments(_squares(rows, rate_hz, segment, step, bins))
+    squares = _squares(rows, rate_hz, segment, step, bins)
+    means = squares @ shares(squares.shape[-1])
     densities: Array = means[..., :bins] + means[..., bins:]
     return densities
 
 
 def _squares(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
-    """Return the densities as their shares of cosines, then of sines, (..., n_segments, 2 · bins)."""
+    """Return the densities as their shares of cosines, then of sines, (..., 2 · bins, n_segments).
+
+    Each half lies in one piece of memory, which makes the sum of both three times as fast as side by side.
+    """
     cut = segments(rows, segment, step)
-    parts: Array = cut @ _transform(cut.shape[-1], segment, bins, rate_hz)
+    parts: Array = _transform(cut.shape[-1], segment, bins, rate_hz).T @ cut.swapaxes(-1, -2)
     parts *= parts
     return parts
 
 
 def segments(rows: Array, length: int, step: int) -> Array:
     """Return the segments of rows (..., n_samples), (..., n_segments, length); a shorter row is its only segment."""
-    n_samples = rows.shape[-1]
-    if n_samples <= length:
+    if rows.shape[-1] <= length:
         return rows[..., None, :]
+    return overlapping(rows, length, step).copy()  # a product of the view itself would crawl
+
+
+def overlapping(rows: Array, length: int, step: int) -> Array:
+    """Return the segments of rows at least one segment long, (..., n_segments, length), as a view not to be changed."""
     rows = np.ascontiguousarray(rows)
-    count = (n_samples - length) // step + 1
-    # The bare constructor: numpy's as_strided takes longer than the copy. A product of the view itself would crawl.
-    overlapping: Array = np.ndarray(
+    count = (rows.shape[-1] - length) // step + 1
+    # The bare constructor: numpy's as_strided takes longer than a copy of all segments.
+    return np.ndarray(
         (*rows.shape[:-1], count, length),
         rows.dtype,
         rows,
         0,
         (*rows.strides[:-1], step * rows.itemsize, rows.itemsize),
     )
-    return overlapping.copy()
 
 
 def densities_of(windows: Windows, segment: int, step: int, bins: int) -> Array:

@@ -63,7 +63,9 @@ class Mlp:
     @staticmethod
     def array_form(parts: Mapping[str, Any]) -> ArrayMlp:
         """Return what judges, from the stored parts."""
-        return ArrayMlp(*(np.asarray(parts[name], dtype=np.float64) for name in ArrayMlp.__dataclass_fields__))
+        # Column by column a product with one window is a quarter faster.
+        names = ArrayMlp.__dataclass_fields__
+        return ArrayMlp(*(np.asarray(parts[name], dtype=np.float64, order='F') for name in names))
 
     def _fit(self, values: Array, codes: Codes, n_labels: int, temperature: float = 1.0) -> dict[str, Array]:
         """Return the layers, with standardisation and temperature worked into them."""

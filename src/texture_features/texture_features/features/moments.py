@@ -37,16 +37,12 @@ class Moments:
     def __call__(self, windows: Windows) -> Array:
         """Return the values; skewness and log kurtosis of a constant signal are 0."""
         signals, powers = differences(windows), squares(windows)
-        count = signals.shape[-1]
-        square = powers @ shares(count)
-        amplitude = np.abs(signals) @ shares(count)
-        # Products of vectors: no arrays of cubes, and the same rounding for one window as for many.
-        cube = (powers[..., None, :] @ signals[..., :, None])[..., 0, 0] / count
-        fourth = (powers[..., None, :] @ powers[..., :, None])[..., 0, 0] / count
+        mean = shares(signals.shape[-1])
+        square = powers @ mean
         values = (
             np.log(square + self.floor * self.floor),
-            np.log(amplitude + self.floor),
-            cube / (square * np.sqrt(square) + TINY),
-            np.log((fourth + TINY) / (square * square + TINY)),
+            np.log(np.abs(signals) @ mean + self.floor),
+            ((powers * signals) @ mean) / (square * np.sqrt(square) + TINY),
+            np.log(((powers * powers) @ mean + TINY) / (square * square + TINY)),
         )
         return np.concatenate(values, axis=-1)

@@ -13,6 +13,7 @@ from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.differences import squares
 from texture_features.feature import Windows, shares
+from texture_features.spectrum import overlapping
 
 # Of a power squared: far below any, far above the smallest number, so that nothing over nothing is 1.
 TINY = 1e-200
@@ -32,8 +33,8 @@ class PowerEcho:
     floor: float = param(1e-3, 'Ratio added before the logarithm.', low=1e-12, high=1.0)
 
     @cached_property
-    def _lags(self) -> tuple[int, ...]:
-        return (1, *chain.from_iterable((2 << octave, 3 << octave) for octave in range(self.lags // 2)))[: self.lags]
+    def _lags(self) -> list[int]:
+        return [1, *chain.from_iterable((2 << octave, 3 << octave) for octave in range(self.lags // 2))][: self.lags]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -42,16 +43,14 @@ class PowerEcho:
 
     def __call__(self, windows: Windows) -> Array:
         """Return the values; 0 for all if the window is not two samples longer than the longest lag."""
-        powers = squares(windows)[..., :2, :-1]  # there is one step less than samples
-        leading = powers.shape[:-2]
-        n_steps = powers.shape[-1]
+        powers = squares(windows)[..., :2, :]
+        n_steps = powers.shape[-1] - 1  # one less than samples
         count = n_steps - self._lags[-1]
         if count < 1:
-            return np.zeros((*leading, len(self.names)))
-        later = np.empty((*leading, 2, len(self._lags), count))
-        for place, lag in enumerate(self._lags):
-            later[..., place, :] = powers[..., lag : lag + count]
+            return np.zeros((*powers.shape[:-2], len(self.names)))
+        # The axis of lags in front, where picking some copies whole blocks: a third of the time of doing so behind.
+        later = overlapping(powers, count, 1).swapaxes(0, -2)[self._lags].swapaxes(0, -2)
         products = (later @ powers[..., :count, None])[..., 0] / count
-        mean = (powers @ shares(n_steps))[..., None]
+        mean = (powers[..., :-1] @ shares(n_steps))[..., None]
         echoes = np.log((products + TINY) / (mean * mean + TINY) + self.floor)
-        return echoes.reshape(*leading, -1)
+        return echoes.reshape(*powers.shape[:-2], -1)
