@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from texture_evaluation.ablation import (
+    ADDED,
     FRICTION,
     PATCH,
     TOUCHINGS,
@@ -18,9 +19,11 @@ from texture_evaluation.ablation import (
     describe,
     feel,
     variants,
+    with_one_more,
 )
 from texture_evaluation.benches import scenes
 from texture_evaluation.benches.result import Bench
+from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.effects.noise import Noise
 from texture_simulation.scene import Scene, load_scene, scene_from
 
@@ -47,7 +50,7 @@ def test_a_term_that_decides_is_found_and_one_that_does_nothing_is_idle() -> Non
     scene = two_ridges(noise={'fast_count': 300.0}, drift={'count_per_sqrt_s': 1e-6})
     worths = {worth.term: worth for worth in ablate(scene, TOUCHING, 80, 4, 0).worths}
     assert worths['noise'].easier.mean > 0.05
-    assert not worths['noise'].idle
+    assert worths['noise'].verdict == 'decides'
     assert abs(worths['drift'].unprepared.mean) < 0.05
 
 
@@ -81,10 +84,18 @@ def test_a_difference_matters_if_it_is_certain_and_large() -> None:
     assert Difference(0.02, 0.01).matters
     assert not Difference(0.02, 0.03).matters
     assert not Difference(0.002, 0.001).matters
-    nothing = Difference(0.0, 0.01)
-    assert Worth('quiet', nothing, nothing, Difference(-0.1, 0.01)).idle
-    assert not Worth('loud', nothing, Difference(-0.1, 0.01), nothing).idle
-    assert not Worth('unclear', Difference(0.03, 0.05), nothing, nothing).idle
+    nothing = Difference(0.0, 0.005)
+    assert Worth('quiet', nothing, nothing, Difference(-0.1, 0.01)).verdict == 'idle'
+    assert Worth('loud', nothing, Difference(-0.1, 0.01), nothing).verdict == 'decides'
+    assert Worth('unclear', Difference(0.003, 0.05), nothing, nothing).verdict == 'open'
+
+
+def test_every_effect_is_named_by_a_scene_or_measured_by_itself() -> None:
+    scenes_of_all = [completed(load_scene(name), touching) for name, touching in TOUCHINGS.items()]
+    named = {effect for scene in scenes_of_all for effect in scene.effects}
+    assert named | set(ADDED) == set(EFFECTS)
+    assert not named & set(ADDED)
+    assert {name for scene in with_one_more(two_ridges()).values() for name in scene.effects} == set(ADDED)
 
 
 def test_scenes_are_cheap_drive_devices_in_time_and_every_term_is_weighed(tmp_path: Path) -> None:
@@ -95,3 +106,5 @@ def test_scenes_are_cheap_drive_devices_in_time_and_every_term_is_weighed(tmp_pa
     assert numbers['scan_ms']['ets_linear']['together_ms'] < 10 * numbers['target_ms']['without stick-slip']
     assert numbers['live']['ets_linear']['cpu'] > 0.0
     assert set(load_scene('ets_linear').effects) < set(numbers['terms']['ets_linear'])
+    assert set(numbers['added']) == set(ADDED)
+    assert (tmp_path / 'scenes.md').read_text(encoding='utf-8').count('`skids`') == 1

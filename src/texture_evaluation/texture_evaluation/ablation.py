@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import time
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
 from texture_core.arrays import Array, Samples
 from texture_simulation.contact import Contact
+from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.effects.finger_spread import FingerSpread
 from texture_simulation.effects.growth import ForceGain, PatchGrowth
 from texture_simulation.effects.slide_error import SlideError
@@ -32,7 +33,7 @@ LOWEST_HZ = 5.0
 LEAST_POWER = 1e-12
 CONFIDENCE = 0.95
 LEAST_CHANGE = 0.005  # of the accuracy, or of the decisions: what is less changes nothing that a user would see
-MOST_IDLE = 0.01  # of the accuracy: what may be more is not called idle, however uncertain
+MOST_IDLE = 0.01  # of the accuracy: what may be more is not called idle
 PATCH = 'patch filter'
 FRICTION = 'friction'
 
@@ -92,6 +93,7 @@ LEFT: Mapping[str, Mapping[str, Any]] = {
     'bench': {'slide_error': SlideError(0.01, 0.04), 'unevenness': Unevenness(0.15)},
     'ets_circular': {'patch_growth': PatchGrowth(), 'force_gain': ForceGain(), 'unevenness': Unevenness(0.15)},
     'ets_fine': {'patch_growth': PatchGrowth(), 'force_gain': ForceGain(), 'unevenness': Unevenness(0.1)},
+    'jamali': {'patch_growth': PatchGrowth()},
     'kaboli': {
         'patch_growth': PatchGrowth(),
         'force_gain': ForceGain(),
@@ -104,7 +106,13 @@ LEFT: Mapping[str, Mapping[str, Any]] = {
         'slide_error': SlideError(0.005, 0.03),
         'unevenness': Unevenness(0.2),
     },
+    'sticky': {'patch_growth': PatchGrowth(), 'unevenness': Unevenness(0.1)},
 }
+
+
+# Effects that no scene names: each is put into `HOST` by itself, as strong as the catalogue has it, to be measured.
+HOST = 'bench'
+ADDED = ('skids', 'motor_vibration', 'skin', 'mains_hum', 'drift', 'dropouts', 'quantisation')
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +135,11 @@ class Difference:
         """Whether it is certain, and large enough to be seen."""
         return bool(abs(self.mean) > self.half and abs(self.mean) >= LEAST_CHANGE)
 
+    @property
+    def most(self) -> float:
+        """How large it may be, whichever sign it has."""
+        return abs(self.mean) + self.half
+
 
 @dataclass(frozen=True, eq=False)
 class Worth:
@@ -143,31 +156,52 @@ class Worth:
     changed
         Share of the test slides decided otherwise by what learnt without it, less that by what learnt with it from
         other slides.
-    time_share
-        Time to simulate without the term, less that with it, as share of the latter.
+    paper
+        Accuracy of the paper's method without the term, in learning and in the test, less that with it, if known.
+    cost_us
+        What the term adds to the computing time of a slide.
     """
 
     term: str
     easier: Difference
     unprepared: Difference
     changed: Difference
-    time_share: float = 0.0
+    paper: Difference | None = None
+    cost_us: float = 0.0
 
     @property
-    def idle(self) -> bool:
-        """Whether the term changes no decision: nothing certain, and no accuracy by `MOST_IDLE` or more."""
-        certain = self.easier.matters or self.unprepared.matters or (self.changed.matters and self.changed.mean > 0)
-        return not certain and max(abs(self.easier.mean), abs(self.unprepared.mean)) < MOST_IDLE
+    def verdict(self) -> str:
+        """Return 'decides' if it certainly changes something, 'idle' if certainly nothing of note, else 'open'."""
+        known = [self.easier, self.unprepared, *([self.paper] if self.paper else [])]
+        if any(item.matters for item in known) or (self.changed.matters and self.changed.mean > 0):
+            return 'decides'
+        return 'idle' if max(self.easier.most, self.unprepared.most) < MOST_IDLE else 'open'
 
 
 @dataclass(frozen=True, eq=False)
 class Ablation:
-    """A scene, how well its surfaces are told apart, and the worth of each of its terms."""
+    """A scene and the worth of each of its terms.
+
+    Parameters
+    ----------
+    scene
+        Name.
+    accuracy, paper
+        With which its surfaces are told apart, and by the paper's method, if known.
+    tested
+        How many slides.
+    worths
+        Of its terms.
+    slide_us
+        Computing time of a slide.
+    """
 
     scene: str
     accuracy: float
     tested: int
     worths: Sequence[Worth] = field(default=())
+    slide_us: float = 0.0
+    paper: float | None = None
 
 
 def completed(scene: Scene, touching: Touching) -> Scene:
@@ -184,7 +218,7 @@ def variants(scene: Scene, touching: Touching) -> dict[str, Scene]:
     What grows with the force stays as large as at the mean force: a term that only sets a constant is none.
     """
     made = {
-        name: replace(scene.without(name), contact=_grown(scene.contact, effect, touching, 1))
+        name: replace(_without(scene, name), contact=_grown(scene.contact, effect, touching, 1))
         for name, effect in scene.effects.items()
     }
     made[PATCH] = replace(scene, contact=replace(scene.contact, blur_m=LEAST_BLUR_M))
@@ -192,6 +226,13 @@ def variants(scene: Scene, touching: Touching) -> dict[str, Scene]:
         bare = {name: replace(surface, friction=None) for name, surface in scene.surfaces.items()}
         made[FRICTION] = replace(scene, surfaces=bare)
     return made
+
+
+def _without(scene: Scene, name: str) -> Scene:
+    """Return a scene without an effect; what else is random stays as it was, so that slides are compared one by one."""
+    if isinstance(scene.effects[name], SlideError):
+        return replace(scene, effects={**scene.effects, name: SlideError(0.0, 0.0)})
+    return scene.without(name)
 
 
 def _grown(contact: Contact, effect: Any, touching: Touching, sign: int) -> Contact:
@@ -203,7 +244,14 @@ def _grown(contact: Contact, effect: Any, touching: Touching, sign: int) -> Cont
     return replace(contact, blur_m=contact.blur_m * blur, stiffness_n_m=contact.stiffness_n_m * gain)
 
 
-def ablate(scene: Scene, touching: Touching, slides: int, repeats: int, seed: int) -> Ablation:
+def with_one_more(scene: Scene) -> dict[str, Scene]:
+    """Return the scene with each of the effects that no scene names (`ADDED`)."""
+    return {name: replace(scene, effects={**scene.effects, name: EFFECTS[name]()}) for name in ADDED}
+
+
+def ablate(
+    scene: Scene, touching: Touching, slides: int, repeats: int, seed: int, *, terms: Collection[str] = ()
+) -> Ablation:
     """Return the worth of each term of a scene.
 
     Parameters
@@ -216,8 +264,10 @@ def ablate(scene: Scene, touching: Touching, slides: int, repeats: int, seed: in
         How often all is done anew.
     seed
         Of everything random.
+    terms
+        Those to remove, one at a time; all if empty.
     """
-    others = variants(scene, touching)
+    others = {term: other for term, other in variants(scene, touching).items() if not terms or term in terms}
     rows = [_repeat(scene, others, touching, slides, [seed, number]) for number in range(repeats)]
     accuracy = float(np.mean([row.right for row in rows]))
     worths = [_worth(term, rows) for term in others]
@@ -235,11 +285,12 @@ def scan_s(scene: Scene, touching: Touching, count: int) -> float:
 
 def timed(ablation: Ablation, scene: Scene, touching: Touching, count: int, repeats: int) -> Ablation:
     """Return the same with the time that each term takes: medians of measurements taken in turn."""
-    compared = {'': scene, **variants(scene, touching)}
-    rows = [{name: scan_s(made, touching, count) for name, made in compared.items()} for _ in range(repeats)]
-    medians = {name: float(np.median([row[name] for row in rows])) for name in compared}
-    worths = [replace(worth, time_share=medians[worth.term] / medians[''] - 1.0) for worth in ablation.worths]
-    return replace(ablation, worths=worths)
+    others = variants(scene, touching)
+    compared = [scene, *(others[worth.term] for worth in ablation.worths)]
+    taken_us = 1e6 * np.array([[scan_s(made, touching, count) for made in compared] for _ in range(repeats)])
+    costs_us = np.median(taken_us[:, :1] - taken_us, axis=0)[1:]
+    worths = [replace(worth, cost_us=float(cost)) for worth, cost in zip(ablation.worths, costs_us, strict=True)]
+    return replace(ablation, worths=worths, slide_us=float(np.median(taken_us[:, 0])))
 
 
 def feel(scene: Scene, touching: Touching, count: int, seed: Sequence[int], fingers: Sequence[int]) -> Felt:
@@ -306,10 +357,11 @@ def _repeat(scene: Scene, others: Mapping[str, Scene], touching: Touching, slide
 
 def _worth(term: str, rows: Sequence[_Row]) -> Worth:
     easier, unprepared, changed = zip(*(row.differences[term] for row in rows), strict=True)
-    return Worth(term, _difference(easier), _difference(unprepared), _difference(changed))
+    return Worth(term, difference(easier), difference(unprepared), difference(changed))
 
 
-def _difference(values: Sequence[float]) -> Difference:
+def difference(values: Sequence[float] | Array) -> Difference:
+    """Return the mean of differences, one of each repetition, with its interval."""
     mean = float(np.mean(values))
     if len(values) < 2:
         return Difference(mean, np.inf)

@@ -66,19 +66,16 @@ def cost_chart(
 def _ablation(axes: Any, ablation: Ablation) -> None:
     places = np.arange(len(ablation.worths))
     series = (
-        ('accuracy, if the world had no such term', [worth.easier for worth in ablation.worths], COLOURS[0], -0.16),
-        (
-            'accuracy, if only what is learnt from had none',
-            [worth.unprepared for worth in ablation.worths],
-            COLOURS[1],
-            0.16,
-        ),
+        ('if the world had no such term', [worth.easier for worth in ablation.worths], COLOURS[0], -0.16),
+        ('if only what is learnt from had none', [worth.unprepared for worth in ablation.worths], COLOURS[1], 0.16),
+        ("by the paper's method, if the world had none", [worth.paper for worth in ablation.worths], COLOURS[2], 0.0),
     )
     for label, differences, colour, shift in series:
+        known = [(place + shift, item) for place, item in zip(places, differences, strict=True) if item]
         axes.errorbar(
-            [100 * item.mean for item in differences],
-            places + shift,
-            xerr=[100 * item.half if np.isfinite(item.half) else 0.0 for item in differences],
+            [100 * item.mean for _, item in known],
+            [place for place, _ in known],
+            xerr=[100 * item.half if np.isfinite(item.half) else 0.0 for _, item in known],
             fmt='o',
             color=colour,
             markersize=5,
@@ -89,9 +86,10 @@ def _ablation(axes: Any, ablation: Ablation) -> None:
     axes.set_yticks(places, [_named(worth) for worth in ablation.worths])
     axes.set_ylim(len(places) - 0.5, -0.5)
     axes.set(xlabel='change of accuracy (percentage points)')
-    axes.set_title(f'{ablation.scene}: {100 * ablation.accuracy:.0f} % right')
+    axes.set_title(f'{ablation.scene}: {100 * ablation.accuracy:.0f} % right, {ablation.slide_us:.0f} µs a slide')
 
 
 def _named(worth: Worth) -> str:
-    """Return the term, marked if it is idle, with its share of the time."""
-    return f'{worth.term.replace("_", " ")}{" (idle)" if worth.idle else ""}\n{100 * worth.time_share:+.0f} % time'
+    """Return the term, marked unless it decides, with what it adds to the time of a slide."""
+    mark = '' if worth.verdict == 'decides' else f' ({worth.verdict})'
+    return f'{worth.term.replace("_", " ")}{mark}\ncosts {worth.cost_us:.0f} µs'
