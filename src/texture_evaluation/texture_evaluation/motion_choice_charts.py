@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 
 
-def slides_chart(right: Mapping[str, Array], wanted: float, path: str | Path) -> Path:
+def slides_chart(right: Mapping[str, Array], wanted: Sequence[float], path: str | Path) -> Path:
     """Draw the accuracy against the number of slides; shaded is one standard deviation between seeds.
 
     Parameters
@@ -19,16 +19,17 @@ def slides_chart(right: Mapping[str, Array], wanted: float, path: str | Path) ->
     right : (n_seeds, n_slides)
         Share of trials that are right, by the way to choose.
     wanted
-        Share that is drawn as a line.
+        Shares that are drawn as lines.
     """
     with chart(path, (6.4, 4.0)) as figure:
         figure.suptitle('Textures recognised after several slides (simulated)', x=0.02, ha='left')
         axes = figure.subplots()
-        for colour, marker, (name, shares) in zip(COLOURS, 'osvD', right.items(), strict=False):
+        for colour, marker, (name, shares) in zip(COLOURS, 'osvDP', right.items(), strict=False):
             slides, mean, off = np.arange(1, shares.shape[1] + 1), shares.mean(axis=0), shares.std(axis=0)
             axes.plot(slides, 100 * mean, color=colour, marker=marker, markersize=5, label=name)
             axes.fill_between(slides, 100 * (mean - off), 100 * (mean + off), color=colour, alpha=0.2, linewidth=0)
-        axes.axhline(100 * wanted, color='k', linewidth=1, linestyle='--')
+        for share in wanted:
+            axes.axhline(100 * share, color='k', linewidth=1, linestyle='--')
         axes.set(xlabel='slides', ylabel='trials with the right texture (%)', xticks=slides, ylim=(None, 101))
         axes.legend(loc='lower right', title='next motion')
     return Path(path)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.catalogue import find
 from texture_core.window import Window
+from texture_estimation.log_probabilities import log_softmax
 from texture_estimation.motion import Motion
 from texture_estimation.next_motion import Explorations
 from texture_features.feature_set import FeatureSet
@@ -18,37 +20,45 @@ from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
 from texture_simulation.sliding import Sliding
 
-# Chooses a motion: log-posterior, motions, number of the slide, random numbers.
-Choose = Callable[[Explorations, Array, Sequence[Motion], int, np.random.Generator], Motion]
+# Chooses a motion, by the log-posterior and the number of the slide.
+Choose = Callable[[Array, int], Motion]
+PLANNED, SIMULATED = 8, 20  # slides that are planned, and simulated trials of each texture by which they are
 
 
-def _informed(
-    known: Explorations, posterior: Array, motions: Sequence[Motion], slide: int, rng: np.random.Generator
-) -> Motion:
-    return known.best(posterior, motions).motion
+def _informed(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    return lambda posterior, slide: known.best(posterior, motions).motion
 
 
-def _in_order(
-    known: Explorations, posterior: Array, motions: Sequence[Motion], slide: int, rng: np.random.Generator
-) -> Motion:
-    return motions[slide % len(motions)]
+def _planned(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    """The order that tells most on average, found on simulated trials: whatever is felt, it is kept."""
+    truth = np.repeat(np.arange(len(known.textures)), SIMULATED)
+    posteriors = np.tile(known.ignorance, (len(truth), 1))
+    order: list[Motion] = []
+    for _ in range(PLANNED):
+        told = {motion: sum(known.information(own, motion) for own in posteriors) for motion in motions}
+        order.append(max(motions, key=told.__getitem__))
+        felt = known.felt[order[-1]]
+        places = felt.means[truth] + rng.standard_normal((len(truth), felt.means.shape[1]))
+        posteriors = log_softmax(posteriors + felt.log_likelihoods(places))
+    return lambda posterior, slide: order[slide % PLANNED]
 
 
-def _by_direction(
-    known: Explorations, posterior: Array, motions: Sequence[Motion], slide: int, rng: np.random.Generator
-) -> Motion:
+def _in_order(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    return lambda posterior, slide: motions[slide % len(motions)]
+
+
+def _by_direction(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
     ordered = sorted(motions, key=lambda motion: motion.direction_rad)
-    return ordered[slide % len(ordered)]
+    return lambda posterior, slide: ordered[slide % len(ordered)]
 
 
-def _at_random(
-    known: Explorations, posterior: Array, motions: Sequence[Motion], slide: int, rng: np.random.Generator
-) -> Motion:
-    return motions[int(rng.integers(len(motions)))]
+def _at_random(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    return lambda posterior, slide: motions[int(rng.integers(len(motions)))]
 
 
-CHOICES: Mapping[str, Choose] = {
+CHOICES: Mapping[str, Callable[[Explorations, Sequence[Motion], np.random.Generator], Choose]] = {
     'informed': _informed,
+    'fixed order, planned': _planned,
     'fixed order, turning first': _in_order,  # the order of the motions
     'fixed order, turning last': _by_direction,  # every speed and force in one direction, then the next
     'random': _at_random,
@@ -77,17 +87,25 @@ def learnt(scene: Scene, motions: Sequence[Motion], values: Array) -> Exploratio
     )
 
 
-def right_after(
-    scene: Scene,
-    known: Explorations,
-    motions: Sequence[Motion],
-    values: Array,
-    *,
-    choose: Choose,
-    n_slides: int,
-    rng: np.random.Generator,
-) -> AnyArray:
-    """Return whether the most probable texture is the true one, (n_trials, n_slides), after each slide.
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """Whether the most probable texture is right, and its probability, after each slide: (n_trials, n_slides)."""
+
+    right: AnyArray
+    probability: Array
+
+    def until(self, sure: float) -> tuple[float, float]:
+        """Return the mean number of slides until a probability, or all, and the share of trials that are right then."""
+        over = self.probability >= sure
+        over[:, -1] = True
+        ends = over.argmax(axis=1)
+        return float(ends.mean()) + 1.0, float(self.right[np.arange(len(ends)), ends].mean())
+
+
+def explored(
+    scene: Scene, known: Explorations, motions: Sequence[Motion], values: Array, *, choose: Choose, n_slides: int
+) -> Trials:
+    """Explore each texture in trials of several slides.
 
     Parameters
     ----------
@@ -97,21 +115,19 @@ def right_after(
         Test slides: a trial over a texture has `n_slides` of its own for each motion, the same for any choice.
     choose
         Which motion is next.
-    rng
-        Of a choice at random.
     """
     places = {motion: number for number, motion in enumerate(motions)}
-    right = []
+    right, probability = [], []
     for number, texture in enumerate(scene.surfaces):
         truth = known.textures.index(texture)
         for first in range(0, values.shape[2] - n_slides + 1, n_slides):
-            posterior, row = known.ignorance, []
+            posteriors = [known.ignorance]
             for slide in range(n_slides):
-                motion = choose(known, posterior, motions, slide, rng)
-                posterior = known.update(posterior, motion, values[places[motion], number, first + slide])
-                row.append(int(posterior.argmax()) == truth)
-            right.append(row)
-    return np.array(right)
+                motion = choose(posteriors[-1], slide)
+                posteriors.append(known.update(posteriors[-1], motion, values[places[motion], number, first + slide]))
+            right.append([int(posterior.argmax()) == truth for posterior in posteriors[1:]])
+            probability.append([float(np.exp(posterior.max())) for posterior in posteriors[1:]])
+    return Trials(np.array(right), np.array(probability))
 
 
 def _values(
