@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 from texture_core.errors import InvalidParameter, MotionRefused
 from texture_core.exploration import ExplorationRequest
@@ -65,32 +66,32 @@ class SafetyLimits:
             'z': (self.z_low_m, self.z_high_m),
         }
 
-    def check(self, request: ExplorationRequest, names: Iterable[str]) -> None:
-        """Refuse a request in which one of the named numbers is out of its range.
+    def complete(self, request: ExplorationRequest, defaults: Mapping[str, float]) -> ExplorationRequest:
+        """Return a request with the motion's defaults for those of its numbers that are 0.
 
         Raises
         ------
         MotionRefused
-            With the allowed range.
+            If a number is out of its range, or belongs to another motion.
         """
-        for name in names:
+        numbers: dict[str, Any] = {name: getattr(request, name) or value for name, value in defaults.items()}
+        request = replace(request, **numbers)
+        for name in defaults:
             low_name, high_name, unit = RANGES[name]
             value, low, high = getattr(request, name), getattr(self, low_name), getattr(self, high_name)
             if not low <= value <= high:
                 raise MotionRefused(f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}')
-
-    @staticmethod
-    def check_direction(request: ExplorationRequest) -> None:
-        """Refuse a direction that is none."""
+        self.refuse_unused(request, RANGES.keys() - defaults.keys())
         if not math.isfinite(request.direction_rad):
             raise MotionRefused(
                 f'{request.motion}: direction_rad is {request.direction_rad}; a finite number is needed'
             )
+        return request
 
     @staticmethod
     def refuse_unused(request: ExplorationRequest, names: Iterable[str]) -> None:
         """Refuse a request that gives a number which the motion does not know: it means another motion."""
-        given = [name for name in names if getattr(request, name) != 0.0]
+        given = sorted(name for name in names if getattr(request, name) != 0.0)
         if given:
             raise MotionRefused(f'{request.motion} knows no {" and no ".join(given)}; leave it at 0')
 

@@ -9,23 +9,9 @@ from texture_exploration.motions import circular, in_hand_sliding, linear_slide
 from texture_exploration.safety import RANGES, SafetyLimits
 
 DEFAULTS: Mapping[str, Mapping[str, float]] = {
-    'linear_slide': {
-        'speed_m_s': linear_slide.DEFAULT_SPEED_M_S,
-        'force_n': linear_slide.DEFAULT_FORCE_N,
-        'distance_m': linear_slide.DEFAULT_DISTANCE_M,
-    },
-    'circular': {
-        'speed_m_s': circular.DEFAULT_SPEED_M_S,
-        'force_n': circular.DEFAULT_FORCE_N,
-        'radius_m': circular.DEFAULT_RADIUS_M,
-        'turns': circular.DEFAULT_TURNS,
-    },
-    'in_hand_sliding': {
-        'speed_m_s': in_hand_sliding.DEFAULT_SPEED_M_S,
-        'force_n': in_hand_sliding.DEFAULT_FORCE_N,
-        'distance_m': in_hand_sliding.DEFAULT_STROKE_M,
-        'duration_s': in_hand_sliding.DEFAULT_DURATION_S,
-    },
+    'linear_slide': linear_slide.DEFAULTS,
+    'circular': circular.DEFAULTS,
+    'in_hand_sliding': in_hand_sliding.DEFAULTS,
 }
 
 

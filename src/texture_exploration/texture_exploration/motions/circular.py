@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from texture_core.errors import MotionRefused
 from texture_core.exploration import ExplorationRequest
@@ -14,10 +14,7 @@ from texture_exploration.motions.slide_over import slide_over
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
-DEFAULT_SPEED_M_S = 0.1
-DEFAULT_FORCE_N = 1.0
-DEFAULT_RADIUS_M = 0.02  # ETS: "a radius of about 2" cm
-DEFAULT_TURNS = 2.0
+DEFAULTS = {'speed_m_s': 0.1, 'force_n': 1.0, 'radius_m': 0.02, 'turns': 2.0}  # ETS: "a radius of about 2" cm
 
 
 @dataclass(frozen=True)
@@ -58,16 +55,7 @@ def circular(request: ExplorationRequest, home: Vector, touch: TouchParams, limi
     MotionRefused
         If a number is out of its range, does not belong to this motion, or the circle leaves the workspace.
     """
-    request = replace(
-        request,
-        speed_m_s=request.speed_m_s or DEFAULT_SPEED_M_S,
-        force_n=request.force_n or DEFAULT_FORCE_N,
-        radius_m=request.radius_m or DEFAULT_RADIUS_M,
-        turns=request.turns or DEFAULT_TURNS,
-    )
-    limits.check(request, ('speed_m_s', 'force_n', 'radius_m', 'turns'))
-    limits.refuse_unused(request, ('distance_m', 'duration_s'))
-    limits.check_direction(request)
+    request = limits.complete(request, DEFAULTS)
     _check_speed(request, limits)
     _check_room(request, home, limits)
     radius, speed = request.radius_m, request.speed_m_s

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from texture_core.errors import MotionRefused
 from texture_core.exploration import ExplorationRequest
@@ -14,10 +13,8 @@ from texture_exploration.motions.slide_over import slide_over
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
-DEFAULT_SPEED_M_S = 0.02
-DEFAULT_FORCE_N = 1.0
-DEFAULT_STROKE_M = 0.02  # about what a fingertip reaches
-DEFAULT_DURATION_S = 2.0  # Kaboli et al. 2015
+# A stroke is about what a fingertip reaches; duration: Kaboli et al. 2015.
+DEFAULTS = {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0}
 TURN_MARGIN_S = 0.01  # a promise of steady speed ends one step before the turn
 
 
@@ -108,16 +105,7 @@ def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParam
     MotionRefused
         If a number is out of its range, does not belong to this motion, or a stroke leaves the workspace.
     """
-    request = replace(
-        request,
-        speed_m_s=request.speed_m_s or DEFAULT_SPEED_M_S,
-        force_n=request.force_n or DEFAULT_FORCE_N,
-        distance_m=request.distance_m or DEFAULT_STROKE_M,
-        duration_s=request.duration_s or DEFAULT_DURATION_S,
-    )
-    limits.check(request, ('speed_m_s', 'force_n', 'distance_m', 'duration_s'))
-    limits.refuse_unused(request, ('radius_m', 'turns'))
-    limits.check_direction(request)
+    request = limits.complete(request, DEFAULTS)
     speed = request.speed_m_s
     turn_s = touch.ramp_s(2 * speed)
     _check_stroke(request, home, limits, least_m=ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s)

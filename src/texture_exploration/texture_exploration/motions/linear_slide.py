@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from texture_core.errors import MotionRefused
 from texture_core.exploration import ExplorationRequest
@@ -14,9 +14,7 @@ from texture_exploration.motions.slide_over import slide_over
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
-DEFAULT_SPEED_M_S = 0.05
-DEFAULT_FORCE_N = 1.0
-DEFAULT_DISTANCE_M = 0.1
+DEFAULTS = {'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.1}
 
 
 @dataclass(frozen=True)
@@ -43,15 +41,7 @@ def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, 
     MotionRefused
         If a number is out of its range, does not belong to this motion, or the path leaves the workspace.
     """
-    request = replace(
-        request,
-        speed_m_s=request.speed_m_s or DEFAULT_SPEED_M_S,
-        force_n=request.force_n or DEFAULT_FORCE_N,
-        distance_m=request.distance_m or DEFAULT_DISTANCE_M,
-    )
-    limits.check(request, ('speed_m_s', 'force_n', 'distance_m'))
-    limits.refuse_unused(request, ('radius_m', 'turns', 'duration_s'))
-    limits.check_direction(request)
+    request = limits.complete(request, DEFAULTS)
     _check_room(request, home, touch, limits)
     follower = PathFollower(Line(request.distance_m, request.direction_rad), touch.arm_lag_s)
     return slide_over(follower, request, home, touch, limits)
