@@ -23,14 +23,10 @@ from texture_exploration.explorer import Explorer
 from texture_exploration.force_trials import CIRCLE, SLIDE, Trial, judge
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.dynamixel import (
-    LEAP_FINGERS,
-    LEAP_IDS,
-    LEAP_PRESSING,
-    DynamixelMotors,
-    EmulatedDynamixelBus,
-)
-from texture_simulation.devices.rails import EmulatedRails, RailsMachine
+from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
+from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, leap_hand
+from texture_simulation.devices.rails import EmulatedRails
+from texture_simulation.devices.rails_firmware import RailsMachine
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
@@ -104,7 +100,7 @@ def rails(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
 @contextmanager
 def hand(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
     """Start an emulated LEAP hand; its index finger is looked at."""
-    motors = DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING, stiffness_n_m)
+    motors = leap_hand(stiffness_n_m)
     with (
         tempfile.TemporaryDirectory() as folder,
         EmulatedDynamixelBus(Path(folder) / 'hand', motors, LEAP_FINGERS['index'], finger_port) as made,

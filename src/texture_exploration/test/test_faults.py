@@ -17,8 +17,10 @@ from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.dynamixel import LEAP_IDS, LEAP_PRESSING, DynamixelMotors, EmulatedDynamixelBus
-from texture_simulation.devices.rails import EmulatedRails, RailsMachine
+from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
+from texture_simulation.devices.dynamixel_motors import leap_hand
+from texture_simulation.devices.rails import EmulatedRails
+from texture_simulation.devices.rails_firmware import RailsMachine
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
@@ -46,7 +48,7 @@ def rails(folder):
 
 @contextmanager
 def hand(folder):
-    with EmulatedDynamixelBus(folder / 'bus', DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING)) as bus:
+    with EmulatedDynamixelBus(folder / 'bus', leap_hand()) as bus:
         yield bus, InHandArm(InHandParams(hand='dynamixel', device=str(bus.port.link), grip_timeout_s=20.0)), RUB
 
 

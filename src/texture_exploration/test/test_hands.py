@@ -19,7 +19,8 @@ from texture_exploration.hands.profile import load_profile
 from texture_exploration.hands.simulated import SimulatedHand
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.dynamixel import DynamixelMotors, EmulatedDynamixelBus, Pressing
+from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
+from texture_simulation.devices.dynamixel_motors import DynamixelMotors, Pressing
 
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')

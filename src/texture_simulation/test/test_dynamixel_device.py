@@ -8,15 +8,8 @@ from pathlib import Path
 import pytest
 
 from texture_core.finger import FingerState
-from texture_simulation.devices.dynamixel import (
-    LEAP_FINGERS,
-    LEAP_IDS,
-    LEAP_PRESSING,
-    DynamixelMotors,
-    EmulatedDynamixelBus,
-    Pressing,
-    crc16,
-)
+from texture_simulation.devices.dynamixel import EmulatedDynamixelBus, crc16
+from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, DynamixelMotors, Pressing, leap_hand
 
 DEADLINE_S = 20.0
 PING_1 = bytes.fromhex('fffffd00010300 01 194e'.replace(' ', ''))
@@ -100,7 +93,7 @@ def test_a_free_motor_goes_to_its_goal(bus):
 
 
 def test_the_bench_is_told_where_the_finger_is_and_how_hard_it_presses(tmp_path):
-    motors, finger = DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING), LEAP_FINGERS['index']
+    motors, finger = leap_hand(), LEAP_FINGERS['index']
     # 257 mA · 0.35 N·m/A / 0.09 m = 1 N
     for motor, current_ma, angle_rad in ((finger.press, 257, 0.4), (finger.across, 350, 0.1)):
         motors.write(motor, 84, struct.pack('<H', 600))

@@ -13,13 +13,8 @@ from texture_core.parameters import param
 from texture_core.ros.diagnostics import Diagnostics, Report
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
-from texture_simulation.devices.dynamixel import (
-    LEAP_FINGERS,
-    LEAP_IDS,
-    LEAP_PRESSING,
-    DynamixelMotors,
-    EmulatedDynamixelBus,
-)
+from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
+from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, leap_hand
 
 
 @dataclass(frozen=True)
@@ -38,7 +33,7 @@ class LeapHandNode(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('leap_hand', **kwargs)
         params = declare(self, LeapHandParams)
-        motors = DynamixelMotors(list(LEAP_IDS), LEAP_PRESSING, params.stiffness_n_m)
+        motors = leap_hand(params.stiffness_n_m)
         finger = LEAP_FINGERS[params.finger]
         self._open = ExitStack()
         self._bus = self._open.enter_context(

@@ -13,7 +13,8 @@ from texture_core.parameters import param
 from texture_core.ros.diagnostics import Diagnostics, Report
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
-from texture_simulation.devices.rails import EmulatedRails, RailsMachine
+from texture_simulation.devices.rails import EmulatedRails
+from texture_simulation.devices.rails_firmware import RailsMachine
 
 
 @dataclass(frozen=True)
