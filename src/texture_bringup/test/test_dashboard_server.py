@@ -1,6 +1,7 @@
 import asyncio
 import json
 from pathlib import Path
+from socket import gethostname
 
 import pytest
 from aiohttp import WSMsgType
@@ -178,6 +179,17 @@ def test_beyond_loopback_the_token_is_needed_once_and_then_a_cookie_carries_it()
         assert (await post(client, Cookie=f'texture_token={TOKEN}'))[0] == 200
 
     with_client(story, Access('0.0.0.0', TOKEN, ('robot',)))
+
+
+def test_the_address_of_the_page_carries_the_token_where_one_is_needed(monkeypatch) -> None:
+    monkeypatch.setenv('TEXTURE_DASHBOARD_TOKEN', '')
+    assert Access.to_this_machine('127.0.0.1').url(8085) == 'http://127.0.0.1:8085/'
+    assert Access.to_this_machine('::1').url(8085) == 'http://[::1]:8085/'
+    access = Access.to_this_machine('0.0.0.0')
+    assert access.url(8085).endswith(f':8085/?token={access.token}')
+    assert access.is_our_host(gethostname())
+    monkeypatch.setenv('TEXTURE_DASHBOARD_TOKEN', TOKEN)
+    assert Access.to_this_machine('0.0.0.0').token == TOKEN
 
 
 def test_names_and_addresses_of_this_machine_are_known() -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import os
+import secrets
+import socket
 from collections.abc import Mapping
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
 from texture_core.errors import InvalidParameter
 
+TOKEN_VARIABLE = 'TEXTURE_DASHBOARD_TOKEN'
 COOKIE = 'texture_token'
 LEAST_TOKEN = 16
 
@@ -43,6 +47,24 @@ class Access:
                 f"the token of the dashboard has {len(self.token)} characters; beyond loopback (host is '{self.host}') "
                 f'at least {LEAST_TOKEN} are needed'
             )
+
+    @classmethod
+    def to_this_machine(cls, host: str) -> Access:
+        """Return the access by all names of this machine, with the token of the environment, else one made now.
+
+        On loopback the page needs no token, and only 'localhost' is a right name.
+        """
+        token = os.environ.get(TOKEN_VARIABLE, '')
+        if is_loopback(host):
+            return cls(host, token)
+        name = socket.gethostname().lower()
+        return cls(host, token or secrets.token_urlsafe(24), (host.lower(), name, f'{name}.local'))
+
+    def url(self, port: int) -> str:
+        """Return the address of the page, with its token."""
+        host = socket.gethostname() if self.host in ('0.0.0.0', '::') else self.host
+        host = f'[{host}]' if ':' in host else host
+        return f'http://{host}:{port}/' + (f'?token={self.token}' if self.token else '')
 
     def knows(self, given: str) -> bool:
         """Return whether a request carries the token, compared in constant time; True if none is needed."""

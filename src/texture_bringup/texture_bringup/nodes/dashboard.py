@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import os
-import secrets
-import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from datetime import datetime
 from functools import partial
@@ -18,16 +15,16 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.parameter_client import AsyncParameterClient
-from rclpy.task import Future
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
-from texture_bringup.dashboard.access import Access, is_loopback
+from texture_bringup.dashboard.access import Access
 from texture_bringup.dashboard.feed import FRAME_PERIOD_S, Feed
 from texture_bringup.dashboard.motions import offered
+from texture_bringup.dashboard.recorder import Recorder
 from texture_bringup.dashboard.server import make_app
 from texture_bringup.dashboard.serving import Serving
-from texture_bringup.launcher.child import ChildLauncher
+from texture_bringup.ros.answers import answer_of, ready
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.exploration import ExplorationRequest
 from texture_core.parameters import from_mapping, param
@@ -39,10 +36,8 @@ from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_exploration.safety import SafetyLimits
 
-TOKEN_VARIABLE = 'TEXTURE_DASHBOARD_TOKEN'
 ANSWER_DEADLINE_S = 30.0
 ASKED_AGAIN_S = 2.0
-FOUND_DEADLINE_S, FOUND_STEP_S = 5.0, 0.05
 GONE_S = 10.0  # so long the explorer may be away before an exploration is given up
 MOST_CHARACTERS = 200
 LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
@@ -65,22 +60,21 @@ class Dashboard(Node):
         params = declare(self, DashboardParams)
         self._feed = Feed()
         self._bad = 0
-        self._recordings = Path(params.recordings).expanduser()
-        self._recorder: ChildLauncher | None = None
-        self._trouble = ''
+        self._recorder = Recorder(Path(params.recordings).expanduser(), self.get_namespace())
         self._make_clients()
-        access = Access(params.host, _token(params.host), _names(params.host))
+        access = Access.to_this_machine(params.host)
         self._serving = Serving(
             make_app(self, access, folder('texture_bringup', 'config/dashboard')), params.host, params.port
         )
         self._subscribe()
         self.create_timer(FRAME_PERIOD_S, self._show)
         Diagnostics(self, self._report)
-        _announce(params.host, self._serving.port, access.token)
+        # On the terminal alone, as a log would keep the token.
+        print(f'dashboard: {access.url(self._serving.port)}', flush=True)
 
     def shutdown(self) -> None:
         """Complete a recording, and close the page."""
-        self._end_recording()  # first: the recorder ends with the thread of the server that started it
+        self._recorder.end()  # first: the recorder ends with the thread of the server that started it
         self._serving.close()
 
     # What the page asks for: coroutines of the web server's thread.
@@ -90,13 +84,13 @@ class Dashboard(Node):
         if 'motion' not in asked:
             raise InvalidParameter('no motion is asked for; give its name as `motion`')
         request = from_mapping(ExplorationRequest, {name: _short(value) for name, value in asked.items()})
-        await _ready(self._explorer.server_is_ready, 'explorer')
-        goal = await _answer(self._explorer.send_goal_async(request_to_msg(request)), ANSWER_DEADLINE_S)
+        await ready(self._explorer.server_is_ready, 'explorer')
+        goal = await answer_of(self._explorer.send_goal_async(request_to_msg(request)), ANSWER_DEADLINE_S)
         ending = goal.get_result_async()
         seen_s = time.monotonic()
         while time.monotonic() - seen_s < GONE_S:
             try:
-                result = (await _answer(ending, ASKED_AGAIN_S)).result
+                result = (await answer_of(ending, ASKED_AGAIN_S)).result
             except LaunchFailed:
                 seen_s = time.monotonic() if self._explorer.server_is_ready() else seen_s
                 continue
@@ -119,7 +113,8 @@ class Dashboard(Node):
 
     async def record(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
         """Begin or end a recording; where it goes is not the page's choice."""
-        work = self._begin_recording if asked.get('on') else self._end_recording
+        now = datetime.now().strftime('%Y-%m-%d_%H-%M-%S')
+        work = partial(self._recorder.begin, now) if asked.get('on') else self._recorder.end
         message = await asyncio.get_running_loop().run_in_executor(None, work)
         return {'success': True, 'message': message}
 
@@ -129,7 +124,7 @@ class Dashboard(Node):
         if not self._limits.services_are_ready():
             return offered(SafetyLimits())
         try:
-            answer = await _answer(self._limits.get_parameters(names), ASKED_AGAIN_S)
+            answer = await answer_of(self._limits.get_parameters(names), ASKED_AGAIN_S)
         except LaunchFailed:
             return offered(SafetyLimits())
         values = {name: value.double_value for name, value in zip(names, answer.values, strict=True)}
@@ -175,108 +170,24 @@ class Dashboard(Node):
                 self._feed.lights.update(status.name.removeprefix(ours), level, status.message, time.monotonic())
 
     def _show(self) -> None:
-        self._watch_recorder()
+        self._recorder.watch()
+        self._feed.recording = self._recorder.bag
         self._serving.show(self._feed.frame(time.monotonic()))
 
     def _report(self) -> Report:
-        level = 'WARN' if self._trouble or self._bad else 'OK'
-        return level, self._trouble or 'the page is served', {'bad_messages': self._bad}
+        trouble = self._recorder.trouble
+        return 'WARN' if trouble or self._bad else 'OK', trouble or 'the page is served', {'bad_messages': self._bad}
 
     async def _ask(self, client: Any, request: Any, node: str) -> Mapping[str, Any]:
-        await _ready(client.service_is_ready, node)
-        answer = await _answer(client.call_async(request), ANSWER_DEADLINE_S)
+        await ready(client.service_is_ready, node)
+        answer = await answer_of(client.call_async(request), ANSWER_DEADLINE_S)
         return {'success': answer.success, 'message': answer.message}
-
-    def _begin_recording(self) -> str:
-        if self._recorder is not None:
-            raise InvalidParameter(f"'{self._feed.recording}' is being recorded already; end that first")
-        name = datetime.now().strftime('%Y-%m-%d_%H-%M-%S')
-        try:
-            self._recordings.mkdir(parents=True, exist_ok=True)
-            arguments = {'out': self._recordings / name, 'namespace': self.get_namespace().strip('/')}
-            recorder = ChildLauncher('record', arguments, os.environ, self._recordings / f'{name}.log')
-            self._recorder = recorder.__enter__()
-        except OSError as error:
-            raise InvalidParameter(f"nothing can be recorded in '{self._recordings}': {error.strerror}") from error
-        self._trouble = ''
-        self._feed.recording = str(self._recordings / name)
-        return f"recording to '{self._feed.recording}'"
-
-    def _end_recording(self) -> str:
-        recorder, self._recorder = self._recorder, None
-        if recorder is None:
-            return 'nothing is being recorded'
-        recorder.stop()
-        bag, self._feed.recording = self._feed.recording, ''
-        return f"'{bag}' is complete"
-
-    def _watch_recorder(self) -> None:
-        recorder = self._recorder
-        if recorder is None:
-            return
-        try:
-            recorder.check()
-        except LaunchFailed as error:
-            self._recorder, self._feed.recording, self._trouble = None, '', str(error)
-
-
-async def _ready(is_ready: Callable[[], bool], node: str) -> None:
-    """Wait until a node can be asked: one that has just started is found a moment later.
-
-    Raises
-    ------
-    LaunchFailed
-        If it is not there in time.
-    """
-    deadline_s = time.monotonic() + FOUND_DEADLINE_S
-    while not is_ready():
-        if time.monotonic() > deadline_s:
-            raise LaunchFailed(f'no {node} answers; is it running?')
-        await asyncio.sleep(FOUND_STEP_S)
-
-
-async def _answer(future: Future, deadline_s: float) -> Any:
-    """Return the result of a future of ROS, which the executor's thread completes.
-
-    Raises
-    ------
-    LaunchFailed
-        If it does not come in time.
-    """
-    loop = asyncio.get_running_loop()
-    answered: asyncio.Event = asyncio.Event()
-    future.add_done_callback(lambda _future: loop.call_soon_threadsafe(answered.set))
-    try:
-        await asyncio.wait_for(answered.wait(), deadline_s)
-    except asyncio.TimeoutError as error:
-        raise LaunchFailed(f'no answer within {deadline_s:.0f} s') from error
-    return future.result()
 
 
 def _short(value: Any) -> Any:
     if isinstance(value, str) and len(value) > MOST_CHARACTERS:
         raise InvalidParameter(f'a text has {len(value)} characters; allowed are {MOST_CHARACTERS}')
     return value
-
-
-def _token(host: str) -> str:
-    """Return the token of the environment, else a new one where one is needed."""
-    return os.environ.get(TOKEN_VARIABLE, '') or ('' if is_loopback(host) else secrets.token_urlsafe(24))
-
-
-def _names(host: str) -> tuple[str, ...]:
-    """Return the names of this machine; none on loopback, where only 'localhost' is right."""
-    if is_loopback(host):
-        return ()
-    name = socket.gethostname().lower()
-    return (host.lower(), name, f'{name}.local')
-
-
-def _announce(host: str, port: int, token: str) -> None:
-    """Print the address; on the terminal alone, as a log would keep the token."""
-    shown = {'0.0.0.0': socket.gethostname(), '::': socket.gethostname()}.get(host, host)
-    shown = f'[{shown}]' if ':' in shown else shown
-    print(f'dashboard: http://{shown}:{port}/' + (f'?token={token}' if token else ''), flush=True)
 
 
 def main() -> None:
