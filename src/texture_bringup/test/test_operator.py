@@ -1,5 +1,6 @@
 import os
 import threading
+from contextlib import ExitStack, contextmanager
 
 import pytest
 from rclpy.action import ActionServer
@@ -16,15 +17,16 @@ pytestmark = pytest.mark.ros
 DOMAIN = 62
 
 
-@pytest.fixture
+@contextmanager
 def silent_explorer():
     """An explorer that takes a goal and never answers."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    context, over, left = Context(), threading.Event(), threading.Event()
+    context, taken, over, left = Context(), *(threading.Event() for _ in range(3))
     context.init(domain_id=DOMAIN)
     node = Node('explorer', context=context)
 
     def hang(goal):
+        taken.set()
         over.wait(60.0)
         goal.abort()
         executor.create_task(left.set)  # after what this answer asks of the executor
@@ -35,19 +37,33 @@ def silent_explorer():
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin)
     thread.start()
-    yield
-    over.set()
-    left.wait(10.0)
-    executor.shutdown()
-    thread.join(10.0)
-    server.destroy()
-    node.destroy_node()
-    context.try_shutdown()
+    try:
+        yield
+    finally:
+        over.set()
+        if taken.is_set():
+            left.wait(10.0)
+        executor.shutdown()
+        thread.join(10.0)
+        server.destroy()
+        node.destroy_node()
+        context.try_shutdown()
 
 
-def test_an_explorer_that_is_there_and_says_nothing_is_not_waited_for_for_ever(silent_explorer, monkeypatch):
+def test_an_explorer_that_is_there_and_says_nothing_is_not_waited_for_for_ever(monkeypatch):
     monkeypatch.setattr(operators, 'SILENT_S', 1.0)
-    with operators.Operator(domain_id=DOMAIN) as operator:
+    with silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:
         operator.wait_for_explorer(30.0)
         with pytest.raises(MotionAborted, match='no answer for 1 s'):
             operator.explore(ExplorationRequest('linear_slide'))
+
+
+def test_an_explorer_that_was_started_anew_is_not_waited_for(monkeypatch):
+    monkeypatch.setattr(operators, 'ASK_AGAIN_S', 0.3)
+    with silent_explorer(), ExitStack() as later, operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        second = threading.Timer(1.0, lambda: later.enter_context(silent_explorer()))
+        second.start()
+        with pytest.raises(MotionAborted, match='started anew'):
+            operator.explore(ExplorationRequest('linear_slide'))
+        second.join()

@@ -51,6 +51,7 @@ COMMANDS: Mapping[str, Command] = {
     'scene': Command('scene', 'draw a simulated surface, the way over it, the signal and its spectrum'),
     'panel': Command('panel', 'say what a panel of people grades as rough, and how far they agree'),
     'experiment': Command('experiment', "rebuild a paper's experiment: its figures beside ours"),
+    'endurance': Command('endurance', 'explore on the emulated bench for hours while faults strike at random'),
     'bench': Command('bench', 'run a benchmark; writes figures and a chart'),
 }
 

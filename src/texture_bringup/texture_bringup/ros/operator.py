@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
+from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -33,6 +34,10 @@ FEATURES_DEADLINE_S = 30.0
 GONE_S = 10.0
 # So long it may say nothing although it is there; it waits for the last estimates for a minute at most.
 SILENT_S = 75.0
+# So long until a goal is taken: that takes no time, unless the request has been lost with an explorer that just died.
+ACCEPT_S = 15.0
+# After so much silence the explorer is asked again: one that was started anew says that it knows of nothing.
+ASK_AGAIN_S = 5.0
 # What this process sees, the other processes see soon after.
 DISCOVERY_S = 1.0
 Progress = Callable[[ExplorationState, TextureEstimate], None]
@@ -68,7 +73,7 @@ class Operator:
         self._guard = guard
         self._context = Context()
         self._context.init(domain_id=domain_id)
-        self._node = Node('operator', namespace=namespace or None, context=self._context)
+        self._node = Node('operator', namespace=namespace or None, context=self._context, enable_rosout=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._explore = ActionClient(self._node, action.Explore, 'explore')
@@ -139,13 +144,23 @@ class Operator:
             self._heard_s = time.monotonic()
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
-        goal = self._result(self._explore.send_goal_async(request_to_msg(request), on_feedback))
-        ending = goal.get_result_async()
+        accepted = self._explore.send_goal_async(request_to_msg(request), on_feedback)
+        self._wait(accepted.done, ACCEPT_S)
+        goal = accepted.result()
+        endings = [goal.get_result_async()]
         try:
-            result = self._result(ending).result
+            self._wait(
+                lambda: any(ending.done() for ending in endings),
+                SILENT_S,
+                lambda: endings.append(goal.get_result_async()),
+            )
         except KeyboardInterrupt:
-            self._cancel(goal, ending)
+            self._cancel(goal, endings[0])
             raise
+        answer = next(ending.result() for ending in endings if ending.done())
+        if answer.status == GoalStatus.STATUS_UNKNOWN:
+            raise MotionAborted('the explorer was started anew and knows of no such exploration; it was broken off')
+        result = answer.result
         return Explored(
             result.success, result.message, result.exploration_id, from_msg(result.texture), from_msg(result.roughness)
         )
@@ -178,7 +193,9 @@ class Operator:
         client = self._node.create_client(Trigger, 'stop')
         try:
             self._until(client.service_is_ready, deadline_s, 'no explorer answers')
-            return str(self._result(client.call_async(Trigger.Request())).message)
+            future = client.call_async(Trigger.Request())
+            self._until(future.done, deadline_s, 'the explorer does not answer')
+            return str(future.result().message)
         finally:
             self._node.destroy_client(client)
 
@@ -252,18 +269,28 @@ class Operator:
 
     def _result(self, future: Future) -> Any:
         """Return the result of a future that the explorer or another node answers."""
-        seen_s = self._heard_s = time.monotonic()
-        while not future.done():
-            self._step()
-            if self._explore.server_is_ready():
-                seen_s = time.monotonic()
-            elif time.monotonic() - seen_s > GONE_S:
-                raise MotionAborted('the explorer has vanished; look at its output')
-            if time.monotonic() - self._heard_s > SILENT_S:
-                raise MotionAborted(
-                    f'no answer for {SILENT_S:g} s, though there is an explorer; stop it, and see that it is alone'
-                )
+        self._wait(future.done, SILENT_S)
         return future.result()
+
+    def _wait(
+        self, condition: Callable[[], bool], silent_s: float, ask_again: Callable[[], None] = lambda: None
+    ) -> None:
+        """Wait while there is an explorer; `ask_again` is called after each `ASK_AGAIN_S` of its silence."""
+        seen_s = asked_s = self._heard_s = time.monotonic()
+        while not condition():
+            self._step()
+            now_s = time.monotonic()
+            if self._explore.server_is_ready():
+                seen_s = now_s
+            elif now_s - seen_s > GONE_S:
+                raise MotionAborted('the explorer has vanished; look at its output')
+            if now_s - self._heard_s > silent_s:
+                raise MotionAborted(
+                    f'no answer for {silent_s:g} s, though there is an explorer; stop it, and see that it is alone'
+                )
+            if now_s - max(asked_s, self._heard_s) > ASK_AGAIN_S:
+                asked_s = now_s
+                ask_again()
 
     def _until(self, condition: Callable[[], bool], deadline_s: float, complaint: str) -> None:
         deadline = time.monotonic() + deadline_s
