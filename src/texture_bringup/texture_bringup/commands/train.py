@@ -50,9 +50,11 @@ def summary(model: Model, out: Path) -> list[str]:
     held_out = (
         'nothing could be held out' if accuracy is None else f'{100 * accuracy:.1f} % of the held-out windows right'
     )
+    kinds = len(model.explorations.felt) if model.explorations else 0
     return [
         f"recipe '{model.recipe.name}' learnt {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
+        *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
         f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it',
     ]
 
