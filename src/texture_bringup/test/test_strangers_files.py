@@ -41,7 +41,7 @@ from texture_estimation.roughness.model import load_roughness_model
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
 from texture_estimation.training import train
-from texture_evaluation.bags import BagWriter
+from texture_evaluation.bag_writer import BagWriter
 from texture_evaluation.cdr import TYPES, decode, encode, typestore
 from texture_evaluation.dataset import cut_slides
 from texture_evaluation.ratings import read_ratings

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch
-from texture_evaluation.bags import BagWriter, read_bag
+from texture_evaluation.bag_writer import BagWriter
+from texture_evaluation.bags import read_bag
 from texture_evaluation.dataset import describe
 from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
 from texture_features.feature_set import FeatureSet

@@ -9,7 +9,8 @@ import pytest
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_evaluation.bags import BagWriter, read_bag
+from texture_evaluation.bag_writer import BagWriter
+from texture_evaluation.bags import read_bag
 from texture_evaluation.processes import NodeProcess
 
 pytestmark = pytest.mark.ros

@@ -3,7 +3,8 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_core.exploration import Phase
-from texture_evaluation.bags import BagWriter, read_bag
+from texture_evaluation.bag_writer import BagWriter
+from texture_evaluation.bags import read_bag
 from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
 from texture_evaluation.segment import segment_bags
 from texture_evaluation.slides import find_slides

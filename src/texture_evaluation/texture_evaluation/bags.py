@@ -1,33 +1,24 @@
-"""Read and write recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed."""
+"""Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed."""
 
 from __future__ import annotations
 
 import struct
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import apsw
 import yaml
 from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
-from rosbags.interfaces import (
-    Connection,
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, ReaderError, StoragePlugin, Writer, storage_mcap
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader, ReaderError, storage_mcap
 from rosbags.typesys.base import TypesysError
 
 from texture_core.errors import InvalidData
 from texture_core.plain_data import parse_yaml
 from texture_core.signal import TactileSignal
-from texture_evaluation.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode, typestore
+from texture_evaluation.cdr import MESSAGES, TYPES, SignalDecoder, decode, typestore
 
 if sys.version_info >= (3, 14):
     from compression.zstd import ZstdDecompressor, ZstdError
@@ -40,23 +31,6 @@ BROKEN = (
     ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
 )  # fmt: skip
 MOST_CHUNK_BYTES = 1_000_000_000
-FOREVER = QosTime(2147483647, 4294967295)
-
-
-def _offered(reliability: QosReliability, durability: QosDurability, depth: int) -> list[Qos]:
-    keep, lively = QosHistory.KEEP_LAST, QosLiveliness.AUTOMATIC
-    return [Qos(keep, depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)]
-
-
-# The same as texture_core.ros.qos, for `ros2 bag play`; by the last part of the topic's name.
-QOS: Mapping[str, list[Qos]] = {
-    'signal': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
-    'signal_static': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
-    'exploration': _offered(QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, 200),
-    'features': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 200),
-    'texture': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
-    'roughness': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
-}
 
 
 class RawMessage(NamedTuple):
@@ -66,64 +40,6 @@ class RawMessage(NamedTuple):
     msgtype: str
     log_ns: int
     data: bytes
-
-
-class BagWriter:
-    """Write a new bag; use it in a `with` block, at the end of which the bag is complete.
-
-    Parameters
-    ----------
-    path
-        Folder to make; nothing may exist there.
-    namespace
-        Put before topics that do not start with '/': 'signal' becomes '/left/signal' in '/left'.
-
-    Raises
-    ------
-    InvalidData
-        If something exists at `path`, or it cannot be made.
-    """
-
-    def __init__(self, path: str | Path, namespace: str = '/') -> None:
-        self.path = Path(path)
-        self._namespace = '/' + namespace.strip('/')
-        self._connections: dict[tuple[str, str], Connection] = {}
-        if self.path.exists():
-            raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
-        self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
-        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-        try:
-            self._writer.open()
-        except OSError as error:
-            raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
-
-    def write(self, topic: str, value: Any, log_ns: int) -> None:
-        """Write a data class of texture_core as received at `log_ns`."""
-        self.write_raw(RawMessage(topic, TYPES[type(value)], log_ns, encode(value)))
-
-    def write_raw(self, message: RawMessage) -> None:
-        """Write a message that is CDR already."""
-        key = message.topic, message.msgtype
-        if key not in self._connections:
-            self._connections[key] = self._connect(*key)
-        self._writer.write(self._connections[key], message.log_ns, message.data)
-
-    def close(self) -> None:
-        """Complete the bag; without this it cannot be read."""
-        self._writer.close()
-
-    def _connect(self, topic: str, msgtype: str) -> Connection:
-        name = topic if topic.startswith('/') else f'{self._namespace.rstrip("/")}/{topic}'
-        qos = QOS.get(short_name(name), [])
-        return self._writer.add_connection(name, msgtype, typestore=typestore(), offered_qos_profiles=qos)
-
-    def __enter__(self) -> BagWriter:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def short_name(topic: str) -> str:

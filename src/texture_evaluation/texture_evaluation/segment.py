@@ -9,7 +9,8 @@ from pathlib import Path
 from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_evaluation.bags import BagWriter, RawMessage, find_bags, read_bag, read_raw, short_name
+from texture_evaluation.bag_writer import BagWriter
+from texture_evaluation.bags import RawMessage, find_bags, read_bag, read_raw, short_name
 from texture_features.segmentation import SegmentParams
 from texture_features.slide_segmenter import segment_recording
 

@@ -16,7 +16,8 @@ from texture_core.parameters import param
 from texture_core.ros.diagnostics import Diagnostics, Report
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
-from texture_evaluation.bags import BagWriter, RawMessage
+from texture_evaluation.bag_writer import BagWriter
+from texture_evaluation.bags import RawMessage
 from texture_evaluation.cdr import SignalDecoder
 from texture_evaluation.continuity import Continuity
 from texture_evaluation.ros.topics import TOPICS, Topic
