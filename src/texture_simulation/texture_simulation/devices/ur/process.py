@@ -13,7 +13,6 @@ import signal
 import socket
 import subprocess
 import sys
-from types import TracebackType
 
 from texture_core.errors import DeviceError
 from texture_simulation.devices.ur.params import UrControllerParams
@@ -34,9 +33,7 @@ class ControllerProcess:
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def start(self) -> None:
