@@ -13,7 +13,8 @@ from texture_bringup.ros import operator as operators
 from texture_core.errors import MotionAborted
 from texture_core.exploration import ExplorationRequest
 
-pytestmark = pytest.mark.ros
+# An explorer that answers at the end finds nobody there any more.
+pytestmark = [pytest.mark.ros, pytest.mark.filterwarnings('ignore:failed to send response')]
 DOMAIN = 62
 
 
@@ -67,3 +68,13 @@ def test_an_explorer_that_was_started_anew_is_not_waited_for(monkeypatch):
         with pytest.raises(MotionAborted, match='started anew'):
             operator.explore(ExplorationRequest('linear_slide'))
         second.join()
+
+
+def test_an_operator_at_work_all_day_does_not_grow():
+    with silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        clients = []
+        for _ in range(3):
+            operator.set_parameters('explorer', {'use_sim_time': False})
+            clients.append(len(list(operator._node.clients)))
+    assert clients[0] == clients[-1]

@@ -77,6 +77,8 @@ class Operator:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._explore = ActionClient(self._node, action.Explore, 'explore')
+        self._stop = self._node.create_client(Trigger, 'stop')
+        self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: every other node remembers it
         self._heard_s = 0.0
         self._vectors: list[FeatureVector] | None = None  # nobody listens yet
 
@@ -190,14 +192,10 @@ class Operator:
 
     def stop(self, deadline_s: float = 5.0) -> str:
         """Stop whatever moves; return what the explorer says."""
-        client = self._node.create_client(Trigger, 'stop')
-        try:
-            self._until(client.service_is_ready, deadline_s, 'no explorer answers')
-            future = client.call_async(Trigger.Request())
-            self._until(future.done, deadline_s, 'the explorer does not answer')
-            return str(future.result().message)
-        finally:
-            self._node.destroy_client(client)
+        self._until(self._stop.service_is_ready, deadline_s, 'no explorer answers')
+        future = self._stop.call_async(Trigger.Request())
+        self._until(future.done, deadline_s, 'the explorer does not answer')
+        return str(future.result().message)
 
     def learn(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
         """Teach an exploration, the last one if '', as a texture; return its number of examples and what happened.
@@ -260,7 +258,9 @@ class Operator:
         InvalidParameter
             If it refuses one, with its reason.
         """
-        client = AsyncParameterClient(self._node, node)
+        if node not in self._settings:
+            self._settings[node] = AsyncParameterClient(self._node, node)
+        client = self._settings[node]
         self._until(client.services_are_ready, deadline_s, f"node '{node}' does not answer; is it running?")
         answer = self._result(client.set_parameters([Parameter(name, value=value) for name, value in values.items()]))
         for name, outcome in zip(values, answer.results, strict=True):
