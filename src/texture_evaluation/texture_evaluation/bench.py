@@ -7,6 +7,7 @@ from pathlib import Path
 
 from texture_core.catalogue import find
 from texture_evaluation.benches import (
+    ablation,
     biotac20,
     clock,
     decisions,
@@ -34,6 +35,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
+    'ablation': ablation.run,  # which features, numbers, units and channels are worth their time, recorded
     'decisions': decisions.run,  # early decisions, calibration, candidates and unknown surfaces, recorded
     'speed_force': speed_force.run,  # speeds, forces and directions that were not taught, recorded
     'roughness': roughness.run,  # from window to grade

@@ -6,12 +6,36 @@ from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 
+from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.training_costs import Cost, Size
 
 AXES = {'windows': 'windows learnt from', 'labels': 'surfaces'}
 COSTS = {'seconds': 'computing time of a training (s)', 'mebibytes': 'memory beyond the examples (MiB)'}
 LEAST_MIB = 0.1  # nothing measurable
+
+
+def early_chart(
+    lines: Mapping[str, tuple[Array, Array]], rule: tuple[float, float], title: str, path: str | Path
+) -> Path:
+    """Draw the share of slides decided rightly over their mean length, when each ends at a confidence.
+
+    Parameters
+    ----------
+    lines
+        Mean seconds and shares at rising confidences, by name.
+    rule
+        Mean seconds and share of the rule that a model learnt itself.
+    """
+    with chart(path, (7.0, 4.6)) as figure:
+        axes = figure.subplots()
+        for (name, (seconds, shares)), colour in zip(lines.items(), COLOURS, strict=False):
+            axes.plot(seconds, 100.0 * shares, marker='.', color=colour, label=name)
+        axes.plot(rule[0], 100.0 * rule[1], '*', color='black', markersize=12, label='the rule learnt, every 0.1 s')
+        axes.set(xlabel='mean sliding time (s)', ylabel='slides decided rightly (%)', title=title)
+        axes.set_xlim(left=0)
+        axes.legend(loc='lower right')
+    return Path(path)
 
 
 def size_chart(

@@ -101,6 +101,16 @@ def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
     }
 
 
+def decided_at(results: Sequence[SlideResult], confidences: Sequence[float]) -> tuple[Array, Array]:
+    """Return mean time (s) and share right of slides that end at a confidence or go on to their end, (n,) each."""
+    times, shares = [], []
+    for confidence in confidences:
+        ends = [next((e for e in r.estimates if e.confidence >= confidence), r.estimates[-1]) for r in results]
+        times.append(float(np.mean([end.evidence_s for end in ends])))
+        shares.append(float(np.mean([end.label == result.surface for end, result in zip(ends, results, strict=True)])))
+    return np.array(times), np.array(shares)
+
+
 def calibration_error(results: Sequence[SlideResult]) -> float:
     """Return the expected calibration error of the confidence over all estimates, in bins of equal width.
 

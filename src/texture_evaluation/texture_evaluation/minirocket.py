@@ -33,14 +33,29 @@ def installed() -> bool:
     return find_spec('aeon') is not None
 
 
-def try_minirocket(recorded: Sequence[Recorded], divisions: Sequence[Division], seed: int) -> dict[str, Any]:
-    """Return the figures of MiniRocket on the vibration, the vote being one window, one vote."""
+def try_minirocket(
+    recorded: Sequence[Recorded], divisions: Sequence[Division], seed: int, length_s: float = LENGTH_S, every: int = 1
+) -> dict[str, Any]:
+    """Return the figures of MiniRocket on the vibration, the vote being one window, one vote.
+
+    Parameters
+    ----------
+    recorded, divisions
+        Slides, and which of them are learnt from and tested on.
+    seed
+        Of its kernels.
+    length_s
+        Of the windows, which begin LENGTH_S apart.
+    every
+        Of the windows of the slides to learn from, every so many-th is learnt from: the time grows with the square.
+    """
     transform = import_module('aeon.transformations.collection.convolution_based').MiniRocket
-    windows = _cut(recorded)
+    windows = _cut(recorded, length_s)
     right, voted, taken = [], [], []
     for learnt, tested in divisions:
         start = time.process_time()
-        rows, held = np.isin(windows.slides, list(learnt)), np.isin(windows.slides, list(tested))
+        rows = np.flatnonzero(np.isin(windows.slides, list(learnt)))[::every]
+        held = np.isin(windows.slides, list(tested))
         rocket = transform(random_state=seed).fit(windows.samples[rows])
         ridge = _Ridge.fit(rocket.transform(windows.samples[rows]), windows.labels[rows], windows.slides[rows])
         taken.append(time.process_time() - start)
@@ -64,8 +79,8 @@ class _Windows:
     slides: AnyArray
 
 
-def _cut(recorded: Sequence[Recorded]) -> _Windows:
-    params = WindowParams(length_s=LENGTH_S, hop_s=LENGTH_S)
+def _cut(recorded: Sequence[Recorded], length_s: float) -> _Windows:
+    params = WindowParams(length_s=length_s, hop_s=LENGTH_S)
     found = [
         (piece.windows['signal'].samples[:, 0], item.slide.surface, item.slide.name)
         for item in recorded

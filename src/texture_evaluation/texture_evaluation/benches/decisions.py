@@ -21,7 +21,7 @@ from texture_evaluation.charts import line_chart
 from texture_evaluation.dataset import describe
 from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.evaluate import evaluate
-from texture_evaluation.metrics import SlideResult
+from texture_evaluation.metrics import SlideResult, decided_at
 
 RECIPES = ('default', 'vibration-and-taxels')
 TAUGHT, TESTED = '1-30', '31-40'
@@ -155,13 +155,8 @@ def _charts(trials: dict[str, _Trial], out: Path) -> tuple[Path, ...]:
 
 def _by_confidence(results: Sequence[SlideResult]) -> tuple[Array, Array]:
     """Return mean time (s) and accuracy (%) of slides that end at a confidence, (n,) each."""
-    points = []
-    for confidence in CONFIDENCES:
-        ends = [next((e for e in r.estimates if e.confidence >= confidence), r.estimates[-1]) for r in results]
-        right = [end.label == result.surface for end, result in zip(ends, results, strict=True)]
-        points.append((float(np.mean([end.evidence_s for end in ends])), 100.0 * float(np.mean(right))))
-    times, accuracies = np.array(points).T
-    return times, accuracies
+    times, shares = decided_at(results, CONFIDENCES)
+    return times, 100.0 * shares
 
 
 def _point(early: dict[str, float]) -> tuple[Array, Array]:
