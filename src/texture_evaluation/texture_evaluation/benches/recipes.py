@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -50,6 +52,8 @@ QUICK_FASTER_M_S = 0.05
 QUICK_RECIPES = ('default', 'ets-linear-svm-vote', 'kaboli-pa')
 # The papers leave ties unclassified; the published machines of the same kind take the clearer label: tried beside.
 NEAREST, WITH_TIES = ', ties to the nearest', ('ets-linear-svm', 'ets-fine-svm')
+MINIROCKET = 'MiniRocket'
+SLOW = re.compile('-ann|MiniRocket')
 # They describe what only an array of taxels feels.
 NEEDS_ARRAY = frozenset({'any-speed'})
 # Published with the data, for all of its 50 slides a material: windows of 0.5 s of PAC at 1 kHz, five random folds by
@@ -105,23 +109,24 @@ class _Job(NamedTuple):
 
 
 class _Tried(NamedTuple):
-    """The figures of one recipe by split, and the model of the last division."""
+    """The figures of one recipe by split, and the model of the last division; None for what is no recipe of ours."""
 
     figures: dict[str, dict[str, Any]]
-    model: Model
+    model: Model | None
 
 
 def run(bench: Bench) -> BenchResult:
     """Try all shipped recipes on all recorded data sets that are there."""
     settings = _settings(bench)
     numbers: dict[str, Any] = {name: {split: {} for split in setting.splits} for name, setting in settings.items()}
-    for job, tried in _try_all(settings, _jobs(settings, bench)).items():
+    for job, tried in _try_all(settings, _jobs(settings, bench), bench.seed).items():
         setting = settings[job.setting]
-        latency = latency_us(setting.recipe(job.recipe), tried.model, setting.recorded)
         for split, figures in tried.figures.items():
-            numbers[job.setting][split][job.recipe] = {**figures, 'latency_us': latency}
-    if not bench.quick:
-        _add_minirocket(numbers, settings, bench.seed)
+            numbers[job.setting][split][job.recipe] = figures
+        if tried.model:
+            latency = latency_us(setting.recipe(job.recipe), tried.model, setting.recorded)
+            for figures in tried.figures.values():
+                figures['latency_us'] = latency
     return result_of(numbers, bench)
 
 
@@ -202,9 +207,11 @@ def _jobs(settings: Mapping[str, Setting], bench: Bench) -> list[_Job]:
     shipped = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
     names = QUICK_RECIPES if bench.quick else (*shipped, *(f'{name}{NEAREST}' for name in WITH_TIES))
     jobs = [_Job(name, recipe) for name in settings for recipe in names if recipe not in NEEDS_ARRAY or name == ARRAY]
+    if not bench.quick and minirocket.installed() and VIBRATION in settings:
+        jobs.append(_Job(VIBRATION, MINIROCKET))
     # What takes long first, so that no core waits at the end.
     trainings = {name: sum(map(len, setting.splits.values())) for name, setting in settings.items()}
-    return sorted(jobs, key=lambda job: ('-ann' not in job.recipe, -trainings[job.setting]))
+    return sorted(jobs, key=lambda job: (not SLOW.search(job.recipe), -trainings[job.setting]))
 
 
 _shared: dict[str, Setting] = {}
@@ -216,8 +223,14 @@ def _share(settings: Mapping[str, Setting]) -> None:
     import_module('threadpoolctl').threadpool_limits(1)  # one core each
 
 
-def _try(job: _Job) -> _Tried:
+def _try(job: _Job, seed: int) -> _Tried:
     setting = _shared[job.setting]
+    if job.recipe == MINIROCKET:
+        return _Tried(
+            {name: minirocket.try_minirocket(setting.recorded, divisions, seed)
+             for name, divisions in setting.splits.items()},
+            None,
+        )  # fmt: skip
     recipe = setting.recipe(job.recipe)
     described = describe_all(recipe, setting.recorded)
     outcomes = {split: try_described(recipe, described, divisions) for split, divisions in setting.splits.items()}
@@ -225,23 +238,16 @@ def _try(job: _Job) -> _Tried:
     return _Tried({split: outcome.numbers() for split, outcome in outcomes.items()}, last.model)
 
 
-def _try_all(settings: Mapping[str, Setting], jobs: Sequence[_Job]) -> dict[_Job, _Tried]:
+def _try_all(settings: Mapping[str, Setting], jobs: Sequence[_Job], seed: int) -> dict[_Job, _Tried]:
     context = multiprocessing.get_context('fork')
     with ProcessPoolExecutor(os.cpu_count(), context, _share, (settings,)) as pool:
-        return dict(zip(jobs, pool.map(_try, jobs), strict=True))
+        return dict(zip(jobs, pool.map(partial(_try, seed=seed), jobs), strict=True))
 
 
 def _note(bench: Bench) -> str:
     if bench.quick:
         return 'not measured in a quick run'
     return 'measured' if minirocket.installed() else minirocket.ABSENT
-
-
-def _add_minirocket(numbers: dict[str, Any], settings: Mapping[str, Setting], seed: int) -> None:
-    if minirocket.installed() and VIBRATION in settings:
-        setting = settings[VIBRATION]
-        for split, divisions in setting.splits.items():
-            numbers[VIBRATION][split]['MiniRocket'] = minirocket.try_minirocket(setting.recorded, divisions, seed)
 
 
 def _chart(numbers: Mapping[str, Any], out: Path) -> Path:
