@@ -19,10 +19,9 @@ def ablation_chart(ablations: Sequence[Ablation], path: str | Path) -> Path:
     """Draw for each scene what happens when a term is removed; a panel a scene."""
     rows = -(-len(ablations) // COLUMNS)
     most = max(len(ablation.worths) for ablation in ablations)
-    with chart(path, (13.0, 1.0 + rows * (0.9 + 0.42 * most))) as figure:
-        figure.suptitle(
-            'What changes when a term of a simulated scene is removed', x=0.02, ha='left', fontweight='bold'
-        )
+    with chart(
+        path, (13.0, 1.0 + rows * (0.9 + 0.42 * most)), 'What changes when a term of a simulated scene is removed'
+    ) as figure:
         panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for axes, ablation in zip(panels, ablations, strict=False):
             _ablation(axes, ablation)

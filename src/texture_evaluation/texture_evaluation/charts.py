@@ -98,8 +98,7 @@ def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], 
     panels
         Kind of fault → name of the line → faults per byte, share recovered and share of false ones, 0 to 1, (n,) each.
     """
-    with chart(path, (4.0 * len(panels), 4.0)) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (4.0 * len(panels), 4.0), title) as figure:
         rows = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
         for axes, (kind, series) in zip(rows, panels.items(), strict=True):
             for (name, (rates, recovered, false)), colour in zip(series.items(), COLOURS, strict=False):
@@ -123,8 +122,7 @@ def front_chart(
         Title of the panel → name of the method → its cost, on a logarithmic axis, and its share, 0 to 1.
     """
     names = list(dict.fromkeys(name for points in panels.values() for name in points))
-    with chart(path, (4.2 * len(panels) + 2.0, 4.8)) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (4.2 * len(panels) + 2.0, 4.8), title) as figure:
         rows = figure.subplots(1, len(panels) + 1, squeeze=False, width_ratios=[4.2] * len(panels) + [2.0])[0]
         for axes, (name, points) in zip(rows, panels.items(), strict=False):
             _front(axes, points, names)
@@ -147,7 +145,7 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
 
 def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, path: str | Path) -> Path:
     """Draw how values are spread, each group on its own row; the line stands at 99 % of them."""
-    with chart(path, (7.0, 1.0 + 1.3 * len(series))) as figure:
+    with chart(path, (7.0, 1.0 + 1.3 * len(series)), title) as figure:
         rows = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
         longest = max(float(np.max(values)) for values in series.values())
         edges = np.linspace(0.0, 1.02 * longest, 120)
@@ -158,16 +156,20 @@ def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, pa
             axes.set_title(f'{name}: median {np.median(values):.2f}, 99 % below {p99:.2f}', fontsize=9)
             axes.set_ylabel('windows')
         rows[-1].set_xlabel(axis_label)
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
     return Path(path)
 
 
 @contextmanager
-def chart(path: str | Path, size: tuple[float, float]) -> Iterator[Figure]:
-    """Give an empty figure and save it at the end; no display is needed and no global state is touched."""
+def chart(path: str | Path, size: tuple[float, float], title: str = '') -> Iterator[Figure]:
+    """Give an empty figure, with a title over all its panels if wanted, and save it at the end.
+
+    No display is needed and no global state is touched.
+    """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, layout='constrained')
         FigureCanvasAgg(figure)
+        if title:
+            figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
         yield figure
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=DPI, bbox_inches='tight', pad_inches=0.12)

@@ -58,11 +58,9 @@ def surface_table(surfaces: Mapping[str, Mapping[float, Trial]]) -> str:
 
 def robot_chart(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, float], path: str | Path) -> Path:
     """Draw how each robot kept force, speed and circle over the stiffness; `robots` is as in the JSON of the bench."""
-    with chart(path, (9.0, 6.4)) as figure:
-        figure.suptitle(
-            'Flat surfaces, 1 N: straight at 0.05 m/s (the hand 0.02), circle of 20 mm at 0.1 m/s', x=0.02, ha='left',
-            fontweight='bold',
-        )  # fmt: skip
+    with chart(
+        path, (9.0, 6.4), 'Flat surfaces, 1 N: straight at 0.05 m/s (the hand 0.02), circle of 20 mm at 0.1 m/s'
+    ) as figure:
         panels = list(figure.subplots(2, 2).flat)
         for axes, (motions, number, name, times) in zip(panels, PANELS, strict=True):
             highest = times * targets[number]
@@ -82,10 +80,7 @@ def surface_chart(
     surfaces: Mapping[str, Mapping[float, Trial]], targets: Mapping[str, float], path: str | Path
 ) -> Path:
     """Draw force and speed errors over stiffness, a line for each surface."""
-    with chart(path, (9.0, 4.4)) as figure:
-        figure.suptitle(
-            'An arm without a force mode over simulated surfaces: 1 N, 0.05 m/s', x=0.02, ha='left', fontweight='bold'
-        )
+    with chart(path, (9.0, 4.4), 'An arm without a force mode over simulated surfaces: 1 N, 0.05 m/s') as figure:
         force, speed = figure.subplots(1, 2)
         for (name, trials), colour, marker in zip(surfaces.items(), COLOURS, MARKERS, strict=False):
             kilo = np.array(list(trials)) / 1000

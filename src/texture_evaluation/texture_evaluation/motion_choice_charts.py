@@ -21,8 +21,7 @@ def slides_chart(right: Mapping[str, Array], wanted: Sequence[float], path: str 
     wanted
         Shares that are drawn as lines.
     """
-    with chart(path, (6.4, 4.0)) as figure:
-        figure.suptitle('Textures recognised after several slides (simulated)', x=0.02, ha='left')
+    with chart(path, (6.4, 4.0), 'Textures recognised after several slides (simulated)') as figure:
         axes = figure.subplots()
         for colour, marker, (name, shares) in zip(COLOURS, 'osvDP', right.items(), strict=False):
             slides, mean, off = np.arange(1, shares.shape[1] + 1), shares.mean(axis=0), shares.std(axis=0)

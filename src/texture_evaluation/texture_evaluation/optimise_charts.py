@@ -13,8 +13,7 @@ NAMED = 10  # lines of more searches than this are not named
 
 def convergence_chart(searches: Mapping[str, Sequence[Generation]], title: str, path: str | Path) -> Path:
     """Draw the fitness of the best individual over the generations, a line for each search."""
-    with chart(path, (7.5, 4.2)) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()
         for number, (name, history) in enumerate(searches.items()):
             axes.step(
@@ -39,8 +38,7 @@ def search_front_chart(fronts: Mapping[str, Sequence[tuple[float, float]]], titl
     fronts
         Name of the search → (operations of a window, fitness from 0 to 1) of each recipe.
     """
-    with chart(path, (7.5, 4.2)) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()
         for number, (name, points) in enumerate(fronts.items()):
             colour = COLOURS[number % len(COLOURS)]

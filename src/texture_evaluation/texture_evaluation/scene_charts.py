@@ -19,8 +19,7 @@ RELIEF_COLOURS = 'cividis'
 def slide_picture(view: SceneView, title: str, path: str | Path) -> Path:
     """Draw one slide: relief with the way, profile, signal and spectrum."""
     wide = (view.extent_m[1] - view.extent_m[0]) > WIDE * (view.extent_m[3] - view.extent_m[2])
-    with chart(path, (11.0, 5.8 if wide else 7.2)) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (11.0, 5.8 if wide else 7.2), title) as figure:
         # A straight way lies above the curves, a round one beside them.
         parts: Any = (
             figure.subfigures(2, 1, height_ratios=[0.8, 1.0])
@@ -46,8 +45,7 @@ def slide_picture(view: SceneView, title: str, path: str | Path) -> Path:
 
 def table_picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
     """Draw all surfaces of a scene, one in each row."""
-    with chart(path, (13.0, 0.8 + 1.75 * len(views))) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (13.0, 0.8 + 1.75 * len(views)), title) as figure:
         rows = figure.subplots(len(views), 4, squeeze=False, width_ratios=[1.5, 1, 1, 1])
         for (relief, profile, signal, spectrum), view in zip(rows, views, strict=True):
             image = _relief(relief, view)

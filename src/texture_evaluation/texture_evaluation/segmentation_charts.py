@@ -25,8 +25,7 @@ class Found:
 
 def error_strength_chart(trials: Mapping[str, Sequence[Trial]], target_s: float, path: str | Path) -> Path:
     """Draw the errors of start and end against how much stronger the vibration is than the noise, a colour a scene."""
-    with chart(path, (9.0, 4.2)) as figure:
-        figure.suptitle('Start and end of sliding, found from the signal alone (simulated)', x=0.02, ha='left')
+    with chart(path, (9.0, 4.2), 'Start and end of sliding, found from the signal alone (simulated)') as figure:
         for axes, name in zip(figure.subplots(1, 2, sharex=True, sharey=True), ('start', 'end'), strict=True):
             for colour, (scene, listed) in zip(COLOURS, trials.items(), strict=False):
                 errors = [1000 * abs(getattr(trial, f'{name}_error_s')) for trial in listed]
@@ -41,8 +40,7 @@ def error_strength_chart(trials: Mapping[str, Sequence[Trial]], target_s: float,
 
 def found_chart(recordings: Mapping[str, Found], title: str, path: str | Path) -> Path:
     """Draw recordings below each other, with the stretches of sliding shaded."""
-    with chart(path, (9.0, 0.6 + 1.1 * len(recordings))) as figure:
-        figure.suptitle(title, x=0.02, ha='left')
+    with chart(path, (9.0, 0.6 + 1.1 * len(recordings)), title) as figure:
         rows = figure.subplots(len(recordings), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (name, found) in zip(rows, recordings.items(), strict=True):
             times = np.arange(len(found.samples)) / found.rate_hz

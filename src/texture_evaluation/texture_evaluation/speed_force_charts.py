@@ -28,8 +28,9 @@ def held_out_chart(panels: Mapping[str, tuple[Methods, Mapping[str, float]]], pa
     panels
         Title → method → what was left out → outcome; and the goal by what was left out.
     """
-    with chart(path, (10.0, 2.2 * len(panels) + 0.8)) as figure:
-        figure.suptitle('Slides recognised under conditions that were not taught', x=0.02, ha='left', fontweight='bold')
+    with chart(
+        path, (10.0, 2.2 * len(panels) + 0.8), 'Slides recognised under conditions that were not taught'
+    ) as figure:
         for axes, (title, (methods, goals)) in zip(figure.subplots(len(panels), 1), panels.items(), strict=True):
             _methods(axes, methods, goals)
             axes.set_title(title)
@@ -55,8 +56,7 @@ def window_chart(outcomes: Mapping[str, Outcome], goal: float, path: str | Path)
 
 def spectra_chart(slides: Sequence[WholeSlide], path: str | Path) -> Path:
     """Draw the mean spectrum of one surface at each speed: over frequency, and over waves per metre."""
-    with chart(path, (10.0, 4.0)) as figure:
-        figure.suptitle(f'One texture at several speeds ({slides[0].surface})', x=0.02, ha='left', fontweight='bold')
+    with chart(path, (10.0, 4.0), f'One texture at several speeds ({slides[0].surface})') as figure:
         over_time, over_way = figure.subplots(1, 2, sharey=True)
         edges = FINE.edges_per_m
         waves = np.sqrt(edges[1:] * edges[:-1])

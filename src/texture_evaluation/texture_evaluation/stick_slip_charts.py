@@ -77,8 +77,7 @@ def cost_chart(costs: Costs, path: str | Path) -> Path:
 
 def border_chart(borders: Borders, path: str | Path) -> Path:
     """Draw the longest stable step over the stiffness: lines predicted, markers found; a panel for each phase."""
-    with chart(path, (9.0, 4.6)) as figure:
-        figure.suptitle('Longest stable step: lines predicted, markers found', x=0.02, ha='left', fontweight='bold')
+    with chart(path, (9.0, 4.6), 'Longest stable step: lines predicted, markers found') as figure:
         panels = dict(zip(('stick', 'slide'), figure.subplots(1, 2, sharey=True), strict=True))
         methods = list(dict.fromkeys(method for _, method in borders.predicted_s))
         for (phase, method), predicted in borders.predicted_s.items():

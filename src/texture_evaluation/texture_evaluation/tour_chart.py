@@ -53,10 +53,7 @@ class Tour:
 
 def picture(tour: Tour, path: str | Path) -> Path:
     """Draw one slide in four panels: signal, spectrum, evidence and confusion."""
-    with chart(path, (11.0, 8.0)) as figure:
-        figure.suptitle(
-            f'How a slide over {tour.surface} is recognised ({tour.source})', x=0.02, ha='left', fontweight='bold'
-        )
+    with chart(path, (11.0, 8.0), f'How a slide over {tour.surface} is recognised ({tour.source})') as figure:
         (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
         _signal(signal, tour)
         _spectrum(spectrum, tour)

@@ -24,8 +24,7 @@ def accuracy_chart(
         Task → method → the paper's share, if it tells, and the simulated one.
     """
     heights = [len(methods) + 1 for methods in panels.values()]
-    with chart(path, (7.0, 1.2 + 0.3 * sum(heights))) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (7.0, 1.2 + 0.3 * sum(heights)), title) as figure:
         rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for axes, (task, methods) in zip(rows, panels.items(), strict=True):
             _bars(axes, methods)
@@ -46,8 +45,7 @@ def confusions_chart(
         Method → surfaces, and two tables of shares with a last column for what is unclassified.
     """
     side = 2.2 + 0.3 * max(len(surfaces) for surfaces, _, _ in tables.values())
-    with chart(path, (2.0 * side + 1.5, side * len(tables))) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (2.0 * side + 1.5, side * len(tables)), title) as figure:
         rows = figure.subplots(len(tables), 2, squeeze=False)
         for (left, right), (name, (surfaces, theirs, ours)) in zip(rows, tables.items(), strict=True):
             _table(left, surfaces, theirs)

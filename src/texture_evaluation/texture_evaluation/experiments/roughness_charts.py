@@ -44,8 +44,7 @@ def grades_chart(
              for name, grade in zip(s.textures, s.human, strict=True)}  # fmt: skip
     order = sorted(textures, key=lambda name: (human[name], list(textures).index(name)))
     place = {name: index for index, name in enumerate(order)}
-    with chart(path, (0.36 * len(order) + 2.0, 2.9 * len(panels) + 1.0)) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
+    with chart(path, (0.36 * len(order) + 2.0, 2.9 * len(panels) + 1.0), title) as figure:
         rows = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
         for axes, (name, series) in zip(rows, panels.items(), strict=True):
             axes.scatter(range(len(order)), [human[texture] for texture in order], marker='_', s=160,
