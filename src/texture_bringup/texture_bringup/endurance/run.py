@@ -18,7 +18,16 @@ from texture_bringup.demo.isolation import Isolation, isolate
 from texture_bringup.endurance.faults import Strike, strikes
 from texture_bringup.endurance.orders import Order, orders
 from texture_bringup.endurance.processes import Processes
-from texture_bringup.endurance.record import ABORTED, LOST, REFUSED, SUCCESS, Explored, Record, in_force
+from texture_bringup.endurance.record import (
+    ABORTED,
+    AFTERMATH_S,
+    LOST,
+    REFUSED,
+    SUCCESS,
+    Explored,
+    Record,
+    in_force,
+)
 from texture_bringup.endurance.usage import Use, read_use
 from texture_bringup.launcher.child import ChildLauncher
 from texture_bringup.ros.operator import Operator
@@ -216,6 +225,7 @@ def _work(day: Day, striker: Striker, rng: np.random.Generator, until_s: float, 
                 if time.monotonic() > told_s + TOLD_S:
                     told_s = time.monotonic()
                     say(_progress(day, striker, until_s - told_s))
+        time.sleep(AFTERMATH_S)
         day.explore(Order(ExplorationRequest('linear_slide', surface=SURFACE)))
     except KeyboardInterrupt:
         return f'it was interrupted {until_s - time.monotonic():.0f} s before its end'
