@@ -28,7 +28,7 @@ class Surface:
     """A named sum of terms, and the friction on it (`frictions.py`); without one, the skin glides."""
 
     name: str
-    terms: tuple[Any, ...]
+    terms: tuple[Term, ...]
     friction: Any = None
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
