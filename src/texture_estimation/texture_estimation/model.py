@@ -160,6 +160,8 @@ class Model:
         self.stopping.certain(0.5, 1.0)
         if self.familiarity is not None:
             self.familiarity.knows(nothing, 1.0)
+        if self.explorations is not None:
+            self.explorations.check(nothing)
         if self.examples is not None:
             self.examples.check(len(self.names), len(self.labels))
         if not 0.0 <= self.growth <= 1.0:

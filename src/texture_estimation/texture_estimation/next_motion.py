@@ -215,6 +215,12 @@ class Explorations:
         most = max(choice.information for choice in told)
         return min((c for c in told if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
 
+    def check(self, values: Array) -> None:
+        """Refuse what cannot judge a slide with these mean features, (n_features,), under each motion."""
+        for motion in self.felt:
+            if np.isnan(self.update(self.ignorance, motion, values)).any():
+                raise InvalidData(f'what textures feel like under {motion} is not finite')
+
     def as_parts(self) -> dict[str, Any]:
         """Return plain values and arrays for the model file."""
         return {
