@@ -34,7 +34,9 @@ class Degradation:
     loses
         Whether samples become NaN: windows that hold one are not cut, and count as not recognised.
     of_windows
-        Whether the strength is the length of the tested windows, s, and the samples stay as they are.
+        Whether the strength is the length of the tested windows, of that taught, and the samples stay as they are.
+    of_the_world
+        Whether it happens before sampling, so that the samples of the sensor are changed and not those of a lower rate.
     """
 
     change: Change
@@ -42,6 +44,7 @@ class Degradation:
     axis: str
     loses: bool = False
     of_windows: bool = False
+    of_the_world: bool = False
 
     @property
     def nothing(self) -> float:
@@ -104,7 +107,8 @@ def _clipped(samples: Array, _rate_hz: float, strength: float, _rng: np.random.G
 
 
 def _hurried(samples: Array, _rate_hz: float, strength: float, _rng: np.random.Generator) -> Array:
-    return samples if strength == 1.0 else retimed(samples, 1.0, strength)
+    """Return the way at another speed: less of it in the same time, or all of it in less."""
+    return samples if strength == 1.0 else retimed(samples, 1.0, strength)[: len(samples)]
 
 
 def _unchanged(samples: Array, _rate_hz: float, _strength: float, _rng: np.random.Generator) -> Array:
@@ -117,17 +121,23 @@ DEGRADATIONS: Mapping[str, Degradation] = {
     'lower gain': Degradation(_amplified, (1.0, 0.95, 0.9, 0.8, 0.7, 0.5, 0.35, 0.25), 'gain'),
     'higher gain': Degradation(_amplified, (1.0, 1.05, 1.1, 1.25, 1.5, 2.0, 3.0, 4.0), 'gain'),
     'offset drift': Degradation(_drifting, (0.0, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0), f'drift per second, {_OF_RMS}'),
-    'wear': Degradation(_worn, (math.inf, 300.0, 200.0, 150.0, 100.0, 50.0, 20.0, 5.0), 'cut-off (Hz)'),
+    'wear': Degradation(
+        _worn, (math.inf, 2000.0, 1000.0, 500.0, 300.0, 200.0, 100.0, 20.0), 'cut-off (Hz)', of_the_world=True
+    ),
     'lost samples': Degradation(_lost, (0.0, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05), 'share lost', loses=True),
     'losses hidden': Degradation(
         _held, (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.2, 0.5), 'share replaced by the last value'
     ),
     'clipping': Degradation(_clipped, (math.inf, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5, 0.2), f'limit, {_OF_RMS}'),
     'shorter windows': Degradation(
-        _unchanged, (0.5, 0.45, 0.4, 0.3, 0.25, 0.2, 0.1, 0.05), 'window tested (s)', of_windows=True
+        _unchanged, (1.0, 0.9, 0.8, 0.6, 0.5, 0.4, 0.2, 0.1), 'length of the window, of that taught', of_windows=True
     ),
-    'slower than taught': Degradation(_hurried, (1.0, 0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5), 'speed, of that taught'),
-    'faster than taught': Degradation(_hurried, (1.0, 1.02, 1.05, 1.1, 1.25, 1.5, 1.75, 2.0), 'speed, of that taught'),
+    'slower than taught': Degradation(
+        _hurried, (1.0, 0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5), 'speed, of that taught', of_the_world=True
+    ),
+    'faster than taught': Degradation(
+        _hurried, (1.0, 1.02, 1.05, 1.1, 1.25, 1.5, 1.75, 2.0), 'speed, of that taught', of_the_world=True
+    ),
 }
 
 

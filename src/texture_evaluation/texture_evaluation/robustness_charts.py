@@ -1,4 +1,4 @@
-"""Chart and table of how accuracy falls as one thing gets worse."""
+"""Charts and tables of how accuracy falls as one thing gets worse."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from texture_evaluation.charts import COLOURS, chart
 
-COLUMNS = 4
+KEPT = 0.9  # of the accuracy without degradation: below it, a recipe has broken down
+NETWORKS, MACHINES = '-ann', '-svm'  # drawn in one colour where they differ in nothing else
+NOT_BROKEN = '–'
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,48 +27,82 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """The curves of all recipes for one effect."""
+    """The curves of all recipes for one effect.
+
+    Parameters
+    ----------
+    axis
+        What the strength is, with its unit.
+    strengths
+        From none to the worst; they only rise or only fall.
+    curves
+        By recipe.
+    slides
+        What was degraded: 'recorded' or 'simulated'.
+    """
 
     axis: str
     strengths: Sequence[float]
     curves: Mapping[str, Curve]
+    slides: str
 
 
-def robustness_chart(panels: Mapping[str, Panel], title: str, path: str | Path) -> Path:
-    """Draw a panel for each effect, from nothing at the left to worst at the right; a ring is the breakdown point."""
-    rows = -(-(len(panels) + 1) // COLUMNS)
-    with chart(path, (3.6 * COLUMNS, 3.1 * rows)) as figure:
-        figure.suptitle(title, x=0.02, ha='left', fontweight='bold')
-        grid = figure.subplots(rows, COLUMNS, sharey=True, squeeze=False).ravel()
-        for axes, (effect, panel) in zip(grid, panels.items(), strict=False):
-            places = np.arange(len(panel.strengths))
-            for (recipe, curve), colour in zip(panel.curves.items(), COLOURS, strict=False):
-                shares = 100 * np.array(curve.shares)
-                axes.plot(places, shares, marker='.', color=colour, label=recipe)
-                if curve.breakdown is not None:
-                    place = _place(curve.breakdown, panel.strengths)
-                    axes.plot(place, np.interp(place, places, shares), 'o', mfc='none', markersize=9, color=colour)
-            axes.set_xticks(places, ['none' if math.isinf(s) else f'{s:g}' for s in panel.strengths], fontsize=7)
-            axes.set(title=effect, xlabel=panel.axis, ylim=(0, None))
-        for axes in grid[::COLUMNS]:
-            axes.set_ylabel('windows recognised (%)')
-        for axes in grid[len(panels) :]:
-            axes.axis('off')
-        handles, names = grid[0].get_legend_handles_labels()
-        grid[len(panels)].legend(handles, names, loc='center', title='recipe (ring: below 90 % of nominal)')
+def robustness_chart(effect: str, panel: Panel, families: Mapping[str, Sequence[str]], path: str | Path) -> Path:
+    """Draw one effect, from nothing at the left to worst at the right, the recipes of each family beside each other.
+
+    A curve ends in a ring where it breaks down; what comes after is drawn faintly.
+    """
+    title = f'{effect.capitalize()}: single windows recognised as it grows, {panel.slides} slides'
+    with chart(path, (3.9 * len(families), 4.4)) as figure:
+        figure.suptitle(f'{title} (ring: below {100 * KEPT:.0f} % of nominal)', x=0.02, ha='left', fontweight='bold')
+        row = figure.subplots(1, len(families), sharey=True, squeeze=False)[0]
+        for axes, (family, recipes) in zip(row, families.items(), strict=True):
+            _curves(axes, panel, recipes)
+            axes.set(title=family, xlabel=panel.axis)
+            axes.legend(loc='upper center', bbox_to_anchor=(0.5, -0.18), ncols=2, fontsize=8)
+        row[0].set_ylabel('windows recognised (%)')
+        row[0].set_ylim(bottom=0)
     return Path(path)
 
 
-def robustness_table(panels: Mapping[str, Panel]) -> str:
-    """Return the breakdown points in Markdown: a row for each effect, a column for each recipe."""
-    recipes = list(next(iter(panels.values())).curves)
-    lines = [['effect', 'strength', *recipes], ['---'] * (len(recipes) + 2)]
-    lines.append(['none', 'windows recognised', *(_percent(panels, recipe) for recipe in recipes)])
-    for effect, panel in panels.items():
-        worst = panel.strengths[-1]
-        points = [_point(panel.curves[recipe], worst) for recipe in recipes]
-        lines.append([effect, panel.axis, *points])
-    return '\n'.join(f'| {" | ".join(cells)} |' for cells in lines) + '\n'
+def robustness_tables(panels: Mapping[str, Panel]) -> str:
+    """Return the breakdown points in Markdown: a table for each kind of slides, a row for each recipe."""
+    kinds = dict.fromkeys(panel.slides for panel in panels.values())
+    tables = [_table(kind, {name: panel for name, panel in panels.items() if panel.slides == kind}) for kind in kinds]
+    return '\n'.join(tables)
+
+
+def _table(kind: str, panels: Mapping[str, Panel]) -> str:
+    nominal = next(iter(panels.values()))
+    rows = [
+        [f'{kind} slides', 'windows recognised', *panels],
+        ['---'] * (len(panels) + 2),
+        ['strength', 'without degradation', *(panel.axis for panel in panels.values())],
+        ['tried up to', '', *(f'{panel.strengths[-1]:g}' for panel in panels.values())],
+    ]
+    for recipe in sorted(nominal.curves, key=lambda recipe: -nominal.curves[recipe].shares[0]):
+        points = (_point(panel.curves[recipe]) for panel in panels.values())
+        rows.append([f'`{recipe}`', f'{100 * nominal.curves[recipe].shares[0]:.1f} %', *points])
+    return ''.join(f'| {" | ".join(cells)} |\n' for cells in rows)
+
+
+def _curves(axes: Any, panel: Panel, recipes: Sequence[str]) -> None:
+    places = np.arange(len(panel.strengths))
+    kinds = list(dict.fromkeys(recipe.replace(NETWORKS, MACHINES) for recipe in recipes))
+    for recipe in recipes:
+        style = {
+            'color': COLOURS[kinds.index(recipe.replace(NETWORKS, MACHINES)) % len(COLOURS)],
+            'linestyle': '--' if NETWORKS in recipe else '-',
+        }
+        curve = panel.curves[recipe]
+        shares = 100 * np.array(curve.shares)
+        axes.plot(places, shares, alpha=0.25, linewidth=1, **style)
+        end = places[-1] if curve.breakdown is None else _place(curve.breakdown, panel.strengths)
+        kept = np.append(places[places < end], end)
+        axes.plot(kept, np.interp(kept, places, shares), label=recipe, **style)
+        if curve.breakdown is not None:
+            axes.plot(end, np.interp(end, places, shares), 'o', mfc='none', markersize=8, color=style['color'])
+    axes.set_xticks(places, ['none' if math.isinf(s) else f'{s:g}' for s in panel.strengths], fontsize=7)
 
 
 def _place(strength: float, strengths: Sequence[float]) -> float:
@@ -76,9 +113,5 @@ def _place(strength: float, strengths: Sequence[float]) -> float:
     return float(np.interp(strength, np.array(strengths)[order], places[order]))
 
 
-def _percent(panels: Mapping[str, Panel], recipe: str) -> str:
-    return f'{100 * next(iter(panels.values())).curves[recipe].shares[0]:.1f} %'
-
-
-def _point(curve: Curve, worst: float) -> str:
-    return f'not up to {worst:g}' if curve.breakdown is None else f'{curve.breakdown:.3g}'
+def _point(curve: Curve) -> str:
+    return NOT_BROKEN if curve.breakdown is None else f'{curve.breakdown:.3g}'
