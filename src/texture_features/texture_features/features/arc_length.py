@@ -19,11 +19,7 @@ class ArcLength:
     """
 
     of_signal: ClassVar[bool] = True
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return Σ √(Δt² + Δs²)."""

@@ -23,15 +23,11 @@ class Bursts:
     """
 
     of_signal: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     pieces: int = param(10, 'Number of pieces; fewer if the window has fewer samples.', low=2, high=1000)
     over: str = param(MIDDLE, 'Piece that the strongest is compared with.', choices=(MIDDLE, WEAKEST))
     floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return log(strongest / other)."""

@@ -28,12 +28,8 @@ class Correlation:
     """
 
     of_signal: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('pearson', 'spearman')
     joins: ClassVar[bool] = True
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The two means."""
-        return ('pearson', 'spearman')
 
     def __call__(self, windows: Windows) -> Array:
         """Return the two correlations, (..., 1, 2)."""

@@ -16,11 +16,7 @@ class Force:
     """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not say."""
 
     of_signal: ClassVar[bool] = False
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return the force."""

@@ -17,11 +17,7 @@ class Integral:
     """
 
     of_signal: ClassVar[bool] = True
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return ∫ s² dt."""

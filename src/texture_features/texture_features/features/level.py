@@ -16,11 +16,7 @@ class Level:
     """Mean of each channel: what a slow channel rests at. It may betray how a surface was mounted."""
 
     of_signal: ClassVar[bool] = True
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return the mean."""

@@ -20,13 +20,9 @@ class LevelShare:
     """
 
     of_signal: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     floor: float = param(1e-3, 'Least level, in the unit of the signal.', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return the log shares."""

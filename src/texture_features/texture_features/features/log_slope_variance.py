@@ -17,15 +17,11 @@ class LogSlopeVariance:
     """Logarithm of the variance of the steps from sample to sample of each channel."""
 
     of_signal: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     floor: float = param(
         1e-20, 'Power added before the logarithm, unit²; 1/12 for whole counts.', low=1e-300, high=1e300
     )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return log(variance of the steps + floor)."""

@@ -20,14 +20,10 @@ class MeanAmplitude:
     """
 
     of_signal: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     logarithm: bool = param(False, 'Give the logarithm.')
     floor: float = param(1e-10, 'Amplitude added before the logarithm, unit.', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return mean |s - mean(s)|, or its logarithm."""

@@ -21,13 +21,9 @@ class MeanShape:
     """
 
     of_signal: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('level', 'log_variance', 'rise', 'absolute_rise', 'share_above', 'skewness')
 
     floor: float = param(1e-4, 'Power added to the variance, unit².', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The six of them."""
-        return ('level', 'log_variance', 'rise', 'absolute_rise', 'share_above', 'skewness')
 
     def __call__(self, windows: Windows) -> Array:
         """Return the six means."""

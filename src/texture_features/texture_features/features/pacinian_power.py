@@ -27,6 +27,7 @@ class PacinianPower:
     """
 
     of_signal: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     points: int = param(128, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
     best_hz: float = param(250.0, 'Frequency of the lowest threshold.', unit='Hz', low=1.0, high=10_000.0)
@@ -36,11 +37,6 @@ class PacinianPower:
     at_speed_m_s: float = param(0.0, 'Weigh as if felt at this speed; 0: as felt.', unit='m/s', low=0.0, high=10.0)
     force_exponent: float = param(0.0, 'Divide the power by force to this exponent; 2/3: Hertz.', low=0.0, high=4.0)
     floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return the log power."""

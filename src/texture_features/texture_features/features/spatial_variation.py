@@ -25,17 +25,13 @@ class SpatialVariation:
     """
 
     of_signal: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     lag_m: float = param(5e-4, 'Way between what is compared.', unit='m', low=1e-6, high=1.0)
     points: int = param(128, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
     rate_of_change: bool = param(True, 'The signal is the rate of change of what touches.')
     force_exponent: float = param(0.0, 'Divide the power by force to this exponent; 2/3: Hertz.', low=0.0, high=4.0)
     floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return the log mean square difference."""

@@ -26,6 +26,7 @@ class SpectralExponent:
     """
 
     of_signal: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     points: int = param(128, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
     low_hz: float = param(60.0, 'Lower end of the band.', unit='Hz', low=0.0, high=1e6)
@@ -35,11 +36,6 @@ class SpectralExponent:
         0.0, 'The band holds at this speed and moves with it; 0: it stands.', unit='m/s', low=0.0, high=10.0
     )
     floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return s."""

@@ -16,11 +16,7 @@ class Speed:
     """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not say."""
 
     of_signal: ClassVar[bool] = False
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return the speed."""

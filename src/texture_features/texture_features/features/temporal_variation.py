@@ -23,14 +23,10 @@ class TemporalVariation:
     """
 
     of_signal: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
 
     lag_s: float = param(0.002, 'Time between what is compared; at least one sample.', unit='s', low=0.0, high=10.0)
     floor: float = param(1e-20, 'Difference added before the logarithm, unit.', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """One value without a name of its own."""
-        return ('',)
 
     def __call__(self, windows: Windows) -> Array:
         """Return log(mean |s(t + lag) - s(t)|)."""
