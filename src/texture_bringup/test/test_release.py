@@ -105,3 +105,10 @@ def test_a_workflow_ends_and_may_not_write_the_repository(workflow: Path) -> Non
 
 def test_there_are_workflows() -> None:
     assert {path.stem for path in ROOT.glob('.github/workflows/*.yaml')} == {'checks', 'colcon', 'image'}
+
+
+def test_the_profile_for_loopback_knows_no_other_address() -> None:
+    profile = ElementTree.parse(ROOT / 'src/texture_bringup/config/fastdds/loopback.xml')
+    named = {element.tag.partition('}')[2]: element.text for element in profile.iter()}
+    assert (named['address'], named['useBuiltinTransports']) == ('127.0.0.1', 'false')
+    assert [element.text for element in profile.findall('.//{*}type')] == ['UDPv4', 'SHM']

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from texture_bringup.nodes.dashboard import TOKEN_VARIABLE, Dashboard, DashboardParams
+from texture_bringup.dashboard.access import TOKEN_VARIABLE
+from texture_bringup.nodes.dashboard import Dashboard, DashboardParams
 from texture_bringup.ros.run_node import run_node
 
 

@@ -80,8 +80,10 @@ def _parameters(element: Element, scope: Scope) -> Path | dict[str, Any]:
     if 'from' not in element.attrib:
         return dict(_named(element, scope, prefix=''))
     path = Path(scope.expand(element.attrib['from']))
-    if 'name' in element.attrib or not path.is_file():
-        raise InvalidLaunch(f"<param from='{path}'> needs a parameter file that exists, and no name")
+    if 'name' in element.attrib:
+        raise InvalidLaunch(f"<param from='{path}'> has a name, too; the file holds the names")
+    if not path.is_file():
+        raise InvalidLaunch(f"there is no parameter file '{path}'; give the path of one")
     return path
 
 
