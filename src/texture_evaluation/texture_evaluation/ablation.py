@@ -32,8 +32,7 @@ BANDS = 24  # of the spectrum, each of equal width on a logarithmic scale
 LOWEST_HZ = 5.0
 LEAST_POWER = 1e-12
 CONFIDENCE = 0.95
-LEAST_CHANGE = 0.005  # of the accuracy, or of the decisions: what is less changes nothing that a user would see
-MOST_IDLE = 0.01  # of the accuracy: what may be more is not called idle
+LEAST_CHANGE = 0.01  # of the accuracy, or of the decisions: what is less is not worth a term
 PATCH = 'patch filter'
 FRICTION = 'friction'
 
@@ -175,7 +174,7 @@ class Worth:
         known = [self.easier, self.unprepared, *([self.paper] if self.paper else [])]
         if any(item.matters for item in known) or (self.changed.matters and self.changed.mean > 0):
             return 'decides'
-        return 'idle' if max(self.easier.most, self.unprepared.most) < MOST_IDLE else 'open'
+        return 'idle' if max(self.easier.most, self.unprepared.most) < LEAST_CHANGE else 'open'
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,6 +286,8 @@ def timed(ablation: Ablation, scene: Scene, touching: Touching, count: int, repe
     """Return the same with the time that each term takes: medians of measurements taken in turn."""
     others = variants(scene, touching)
     compared = [scene, *(others[worth.term] for worth in ablation.worths)]
+    for made in compared:
+        scan_s(made, touching, count)  # makes what is made once
     taken_us = 1e6 * np.array([[scan_s(made, touching, count) for made in compared] for _ in range(repeats)])
     costs_us = np.median(taken_us[:, :1] - taken_us, axis=0)[1:]
     worths = [replace(worth, cost_us=float(cost)) for worth, cost in zip(ablation.worths, costs_us, strict=True)]

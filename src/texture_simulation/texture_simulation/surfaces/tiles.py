@@ -18,7 +18,7 @@ POINTS_PER_WAVE = 4  # of the shortest wave
 # The periodic tile lies askew at the golden slope, so that a slide along x or y never meets the same stretch again.
 TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
 BLURS_M = np.geomspace(LEAST_BLUR_M, MOST_BLUR_M, 10)  # tiles are made for these and interpolated between
-WORTH_MIXING = 10_000  # points under one blur, from which on a tile of its own is cheaper than mixing point by point
+WORTH_MIXING = 20_000  # points under one blur, from which on a tile of its own is cheaper than mixing point by point
 TILE_POINTS = (SIDE + 1) ** 2
 
 
@@ -97,8 +97,9 @@ def _mixed(random: Random, levels: tuple[float, ...]) -> AnyArray:
     """Return one tile for each of some levels of blur."""
     tiles = []
     for level in levels:
-        pair = _pairs(random, int(level), int(level) + 1)
-        tiles.append(pair.real + np.float32(level - int(level)) * (pair.imag - pair.real))
+        share = level - int(level)
+        pair = _pairs(random, int(level), int(level) + 1).view(np.float32).reshape(-1, 2)
+        tiles.append(pair @ np.array([1.0 - share, share], dtype=np.float32))
     return np.concatenate(tiles)
 
 
