@@ -174,7 +174,7 @@ class Worth:
         known = [self.easier, self.unprepared, *([self.paper] if self.paper else [])]
         if any(item.matters for item in known) or (self.changed.matters and self.changed.mean > 0):
             return 'decides'
-        return 'idle' if max(self.easier.most, self.unprepared.most) < LEAST_CHANGE else 'open'
+        return 'idle' if max(item.most for item in known) < LEAST_CHANGE else 'open'
 
 
 @dataclass(frozen=True, eq=False)
