@@ -1,4 +1,5 @@
 import dataclasses
+import json
 import math
 import os
 from pathlib import Path
@@ -22,6 +23,7 @@ from texture_evaluation.train import with_channels
 from texture_simulation.scene import load_scene
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
+DOCS = Path(__file__).resolve().parents[3] / 'docs'
 RATE_HZ = 1000.0
 
 
@@ -149,6 +151,22 @@ def test_tables_and_chart_show_where_each_recipe_breaks_down(tmp_path: Path) -> 
     assert robustness_chart(
         'noise', panels['noise'], {'one': ['fast'], 'other': ['kaboli-pa']}, tmp_path / 'a.png'
     ).is_file()
+
+
+@pytest.mark.parametrize('kind', ['recorded', 'simulated'])
+def test_the_page_shows_what_the_bench_measured(kind: str) -> None:
+    numbers = json.loads((DOCS / 'charts' / 'robustness.json').read_text())['numbers']
+    panels = {
+        effect: Panel(
+            found['strength'],
+            [math.inf if strength is None else strength for strength in found['strengths']],
+            {name: Curve(own['window_accuracy'], own['breakdown']) for name, own in found['recipes'].items()},
+            found['slides'],
+        )
+        for effect, found in numbers.items()
+        if found['slides'] == kind
+    }
+    assert robustness_tables(panels) in (DOCS / 'robustness.md').read_text()
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
