@@ -36,6 +36,7 @@ def test_a_jump_of_the_index_is_a_loss() -> None:
         {'samples': np.zeros((10, 2), dtype=np.float32)},
         {'sampling_rate_hz': 0.0},
         {'sampling_rate_hz': float('nan')},
+        {'sampling_rate_hz': 1e12},
         {'first_sample': -1},
     ],
 )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from texture_core.errors import InvalidData
 
 NANOSECONDS = 1_000_000_000
+MOST_HZ = 1e6  # seconds of samples are kept: a rate from nowhere would take all memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +26,7 @@ class TactileSignal:
     sensor, channels, unit
         Name of the sensor part, of each column, and of the unit ('' if unknown).
     sampling_rate_hz
-        Nominal rate, > 0.
+        Nominal rate, above 0 and at most 1 MHz.
     first_sample
         Running index of the first sample since the stream began; a jump between batches is a loss.
     samples : (n_samples, n_channels) float32
@@ -54,9 +55,10 @@ class TactileSignal:
                 f"signal of '{self.sensor}' has samples of shape {self.samples.shape}; "
                 f'(n_samples, {len(self.channels)}) is needed for its channels {list(self.channels)}'
             )
-        if not (np.isfinite(self.sampling_rate_hz) and self.sampling_rate_hz > 0):
+        if not 0 < self.sampling_rate_hz <= MOST_HZ:
             raise InvalidData(
-                f"signal of '{self.sensor}' has a sampling rate of {self.sampling_rate_hz} Hz; give one above 0"
+                f"signal of '{self.sensor}' has a sampling rate of {self.sampling_rate_hz} Hz; "
+                f'give one above 0, at most {MOST_HZ:g}'
             )
         if self.first_sample < 0:
             raise InvalidData(f"signal of '{self.sensor}' starts at sample {self.first_sample}; 0 is the first")
