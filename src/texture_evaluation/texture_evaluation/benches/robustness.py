@@ -109,10 +109,10 @@ QUICK = _Size(
     last_learnt=QUICK_LAST_LEARNT,
     every_slide=1,
     every_strength=3,
-    every_effect=4,
+    every_effect=5,
     early=(1, 3),
     later=((2,), (5, 6)),
-    simulated=(4, 8),
+    simulated=(4, 2),
 )
 
 
