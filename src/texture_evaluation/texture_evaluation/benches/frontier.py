@@ -27,12 +27,12 @@ SHOWN = 'default'
 OVERLAPPING_S = 0.1  # windows of LENGTH_S begin so far apart on the robot
 CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999)
 # MiniRocket takes minutes to learn from all windows, and time that grows with their square.
-ROCKET, ROCKET_LENGTHS_S, ROCKET_EVERY = 'MiniRocket', (0.1, 0.5, 2.0), 4
+ROCKET, ROCKET_LENGTHS_S, ROCKET_EVERY = 'MiniRocket', (0.1, 0.5, 2.0), 2
 LEARNERS = ('mlp', 'svm_rbf', 'svm_linear', 'naive_bayes', 'passive_aggressive')
 QUICK_LEARNERS = ('mlp', 'naive_bayes')
 FEW_LABELS, WINDOWS_OF_A_LABEL = 10, 50
-BY_WINDOWS = [Size(windows, FEW_LABELS) for windows in (100, 1_000, 10_000, 100_000)]
-BY_LABELS = [Size(WINDOWS_OF_A_LABEL * labels, labels) for labels in (2, 10, 50, 200)]
+BY_WINDOWS = [Size(windows, FEW_LABELS) for windows in (100, 300, 1_000, 3_000, 10_000, 30_000, 100_000)]
+BY_LABELS = [Size(WINDOWS_OF_A_LABEL * labels, labels) for labels in (2, 5, 10, 20, 50, 100, 200)]
 FIXED = {'windows': f'of {FEW_LABELS} surfaces', 'labels': f'{WINDOWS_OF_A_LABEL} windows each'}
 LIMIT_S, QUICK_SIZES = 10.0, 2
 
