@@ -28,6 +28,8 @@ BUILD_INCLUDE = re.compile(r'/opt/python/cp\d+-cp\d+/include/python3\.\d+')
 BUILD_SITE_PACKAGES = re.compile(r'/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages')
 # Files of a package that need a new build when they change; Python modules are linked, not copied.
 BUILT = ('package.xml', 'setup.py', 'CMakeLists.txt', '*.msg', '*.srv', '*.action')
+# Behind the suite comes what the user has put there: sensors, motions and features of their own.
+OWN = '"${PYTHONPATH:+:$PYTHONPATH}"'
 LISTED = ('nodes/*.py', 'launch/*', 'config/*', 'config/*/*')  # linked: only their names matter
 
 
@@ -208,6 +210,7 @@ def write_commands(env: dict[str, str]) -> None:
         '_ROS_WHEELS_BOOTSTRAP_COMPLETE',
     )
     exports = [f"export {name}='{after[name]}'" for name in names if name in after]
+    exports = [line + OWN * line.startswith('export PYTHONPATH') for line in exports]
     exports += [
         f'export PATH=\'{VENV / "bin"}\':"$PATH"',
         'export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"',
@@ -216,7 +219,9 @@ def write_commands(env: dict[str, str]) -> None:
         'export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}" OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"',
     ]
     head = '#!/usr/bin/env bash\n# Written by tools/workspace.py.\n' + '\n'.join(exports) + '\n'
-    for name, tail in {'ros-run': 'exec "$@"\n', 'texture': f'exec {PYTHON} -m texture_bringup.command "$@"\n'}.items():
+    # In the folder the user stands in nothing is looked for: it may be a stranger's.
+    texture = f'exec env PYTHONSAFEPATH=1 {PYTHON} -m texture_bringup.command "$@"\n'
+    for name, tail in {'ros-run': 'exec "$@"\n', 'texture': texture}.items():
         command = VENV / 'bin' / name
         command.write_text(head + tail)
         command.chmod(0o755)
