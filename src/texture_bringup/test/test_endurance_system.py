@@ -11,6 +11,7 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 from texture_bringup.endurance import run  # noqa: E402
 from texture_bringup.endurance.faults import Strike  # noqa: E402
 from texture_bringup.endurance.record import LOST  # noqa: E402
+from texture_bringup.ros import operator as operators  # noqa: E402
 from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
 
@@ -27,9 +28,12 @@ def model(tmp_path):
     return tmp_path / 'model'
 
 
-def test_a_killed_explorer_comes_back_and_every_exploration_ends_with_a_reason(model, tmp_path) -> None:
+def test_a_killed_explorer_comes_back_and_every_exploration_ends_with_a_reason(model, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(run, 'AFTERMATH_S', 0.0)
+    monkeypatch.setattr(operators, 'ASK_AGAIN_S', 1.0)
+    monkeypatch.setattr(operators, 'ACCEPT_S', 5.0)
     faults = [Strike(name, 0.5, 0.5, 0.0) for name in FAULTS]
-    record = run.endure(run.Plan(DEADLINE_S, model=model, settle_s=2.0), tmp_path / 'nodes.log', lambda _: None, faults)
+    record = run.endure(run.Plan(DEADLINE_S, model=model, settle_s=1.0), tmp_path / 'nodes.log', lambda _: None, faults)
     told = (tmp_path / 'nodes.log').read_text()
     assert record.trouble == '', told
     assert [item.name for item in record.struck] == list(FAULTS)
