@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import time
 from pathlib import Path
 
 from texture_bringup.commands.options import add_seed
@@ -51,7 +52,8 @@ def _run_if_possible(name: str, bench: Bench) -> None:
 
 
 def _run_one(name: str, bench: Bench) -> None:
+    began_s = time.monotonic()
     result, path = run_bench(name, bench)
-    print(f'{name}: {result.measured}')
+    print(f'{name}, {time.monotonic() - began_s:.0f} s: {result.measured}')
     for file in (path, *result.charts):
         print(f'  {file}')
