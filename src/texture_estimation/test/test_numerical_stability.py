@@ -147,10 +147,10 @@ def learnt(recipe):
 
 @pytest.mark.parametrize('factor', [1e6, 1e-6])
 def test_in_other_units_a_recipe_learns_to_tell_as_much(recipe, learnt, factor):
-    if factor < 1.0 and recipe.name in FLOORED:
-        pytest.skip('its features have a floor in the unit of their sensor')
     strange = train(recipe, windows_of(recipe, factor))
-    assert accuracy(strange, windows_of(recipe, factor, seed=1)) > accuracy(learnt, windows_of(recipe, seed=1)) - 0.1
+    told = accuracy(strange, windows_of(recipe, factor, seed=1))
+    as_much = told > accuracy(learnt, windows_of(recipe, seed=1)) - 0.1
+    assert as_much != (factor < 1.0 and recipe.name in FLOORED)
 
 
 @pytest.mark.parametrize('changed', [{'factor': 1e6}, {'factor': 1e-6}, {'constant': True}], ids=str)

@@ -128,7 +128,8 @@ def world(make_world):
 
 
 def test_a_service_call_explores_and_reports(world):
-    response = world.result(world.call(**QUICK, surface='cork'))
+    # So long that a pause of the machine does not last for the whole slide.
+    response = world.result(world.call(**{**QUICK, 'distance_m': 0.06}, surface='cork'))
     assert (response.success, response.message) == (True, 'the motion ended as asked')
     assert not response.texture.label
     world.until_phase('done')
@@ -180,7 +181,7 @@ def test_an_arm_in_a_protective_stop_is_recovered_by_a_service(world):
 
 
 def test_the_action_tells_how_it_goes(world):
-    goal = world.goal(**{**QUICK, 'distance_m': 0.1})
+    goal = world.goal(**{**QUICK, 'distance_m': 0.06})
     result = world.result(goal.get_result_async())
     assert result.status == GoalStatus.STATUS_SUCCEEDED
     assert result.result.success
