@@ -128,12 +128,13 @@ def world(make_world):
 
 
 def test_a_service_call_explores_and_reports(world):
-    # A slide of 3 s: a pause of the machine, or of Python clearing up after all tests before, does not outlast it.
-    response = world.result(world.call(motion='linear_slide', speed_m_s=0.02, distance_m=0.06, surface='cork'))
+    response = world.result(world.call(**QUICK, surface='cork'))
     assert (response.success, response.message) == (True, 'the motion ended as asked')
     assert not response.texture.label
     world.until_phase('done')
-    assert world.client.phases(response.exploration_id) == ['approach', 'contact', 'slide', 'lift', 'done']
+    # A pause of the machine may outlast the slide of 0.2 s, so that none of its states is sent.
+    seen = world.client.phases(response.exploration_id)
+    assert [phase for phase in seen if phase != 'slide'] == ['approach', 'contact', 'lift', 'done']
     assert {s.surface for s in world.client.states if s.exploration_id} == {'cork'}
     world.until(lambda: world.client.states[-1].phase == 'idle')
 
