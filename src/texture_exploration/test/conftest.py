@@ -32,6 +32,7 @@ class Table:
         self.states, self.places = [], []
         self.exploration = None
         self.asleep_ns = 0
+        self.late_ns = 0  # delay of what the arm tells
         self.silence = hear_nothing
         self.when = {}  # what to do at the third state of a phase
 
@@ -55,7 +56,7 @@ class Table:
             arm=self.arm,
             motion=motion,
             limits=self.limits,
-            clock=lambda: self.now_ns,
+            clock=lambda: self.now_ns + self.late_ns,
             on_state=self.on_state,
             silence=self.silence,
         )

@@ -68,6 +68,14 @@ def test_a_machine_that_slept_does_not_take_the_arm_for_dead(table):
     assert table.exploration.gaps == 1
 
 
+def test_a_slide_that_was_over_before_it_was_seen_is_no_success(table):
+    table.late_ns = 100_000_000
+    outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.1, distance_m=0.005))
+    assert (outcome.success, outcome.slid) == (False, False)
+    assert outcome.message.startswith('the slide was shorter than the delay of the arm')
+    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
+
+
 def test_a_fault_of_the_arm_aborts_and_is_told(table):
     table.when[Phase.SLIDE] = lambda: table.arm.fail('protective stop')
     assert 'the arm reports a fault: protective stop' in table.explore().message

@@ -4,13 +4,13 @@ import threading
 from functools import partial
 
 import pytest
-from rclpy.executors import MultiThreadedExecutor
 from rclpy.parameter import Parameter
 
 from texture_core.errors import UnknownName
 from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros.waiting_executor import WaitingExecutor
 from texture_exploration.nodes.explore_preset import ExplorePreset
-from texture_exploration.nodes.explorer import THREADS, ExplorerNode
+from texture_exploration.nodes.explorer import ExplorerNode
 
 pytestmark = pytest.mark.ros
 PRESET = 'motion: linear_slide\nspeed_m_s: 0.1\ndistance_m: 0.02\nvary: {direction_deg: [0, 720, .inf]}\n'
@@ -29,7 +29,7 @@ def test_every_motion_of_a_preset_is_made_and_the_node_ends(graph, tmp_path):
     explorer = ExplorerNode(parameter_overrides=[Parameter(name, value=value) for name, value in quick.items()])
     ended = threading.Event()
     asker = graph.add(partial(ExplorePreset, ended.set), preset=str(path), surface='cork', repeats=1)
-    executor = MultiThreadedExecutor(THREADS)
+    executor = WaitingExecutor()
     executor.add_node(explorer)
     thread = threading.Thread(target=executor.spin)
     thread.start()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ENDED, ExplorationRequest, ExplorationState, Phase
@@ -18,6 +18,10 @@ STATE_PERIOD_NS = 20_000_000
 GAP_NS = 50_000_000
 # A tick that comes a little early must not wait for the next one.
 STATE_SLACK_NS = 5_000_000
+NOT_SEEN_SLIDING = (
+    'the slide was shorter than the delay of the arm or than a pause of this machine, so nothing could be felt; '
+    'slide longer or more slowly'
+)
 
 
 @dataclass(frozen=True)
@@ -145,7 +149,9 @@ class Exploration:
     def _tell(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
         """Report the state if its phase is new or the time has come."""
         self._slid |= step.phase is Phase.SLIDE
-        if step.phase in ENDED:
+        if step.phase is Phase.DONE and not self._slid:
+            self.outcome, step = Outcome(False, NOT_SEEN_SLIDING, False), replace(step, phase=Phase.ABORTED)
+        elif step.phase in ENDED:
             self.outcome = Outcome(step.phase is Phase.DONE, self._motion.message, self._slid)
         if step.phase is self.state.phase and now_ns < self._next_state_ns:
             return

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
-from rclpy.executors import Executor, ExternalShutdownException, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import TextureError
@@ -24,7 +24,9 @@ except ImportError:
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def run(make_node: Callable[[], Any], args: Sequence[str] | None = None, threads: int = 1) -> None:
+def run(
+    make_node: Callable[[], Any], args: Sequence[str] | None = None, make_executor: Callable[[], Executor] = OneThread
+) -> None:
     """Make the node, spin it until SIGINT or SIGTERM, destroy it; exit with 2 and one sentence on a user's error.
 
     The node's `shutdown` method, if it has one, is called before it is destroyed, while it can still publish: it joins
@@ -38,7 +40,7 @@ def run(make_node: Callable[[], Any], args: Sequence[str] | None = None, threads
     try:
         node = make_node()
         warn_of_unknown(node)
-        executor = OneThread() if threads == 1 else MultiThreadedExecutor(num_threads=threads)
+        executor = make_executor()
         executor.add_node(node)
         _wake_on_signals(executor)
         while rclpy.ok() and not stopped.is_set():

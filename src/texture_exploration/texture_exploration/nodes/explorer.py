@@ -27,6 +27,7 @@ from texture_core.ros.diagnostics import Diagnostics, Report
 from texture_core.ros.parameters import declare, on_change
 from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
+from texture_core.ros.waiting_executor import WaitingExecutor
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.estimates import CertaintyParams, Estimates
 from texture_exploration.exploration import Exploration, hear_nothing
@@ -38,8 +39,6 @@ from texture_exploration.signal_watch import SignalWatch, SignalWatchParams
 
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
-# One exploration that runs, one that waits for its last estimate, one that is being refused, and all the rest.
-THREADS = 4
 
 
 @dataclass(frozen=True)
@@ -228,4 +227,4 @@ def _accept_cancel(_goal: Any) -> CancelResponse:
 
 def main() -> None:
     """Run the node."""
-    run(ExplorerNode, threads=THREADS)
+    run(ExplorerNode, make_executor=WaitingExecutor)
