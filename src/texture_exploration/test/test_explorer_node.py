@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+import rclpy
 from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.action import ActionClient
@@ -261,7 +262,7 @@ def test_a_shutdown_while_moving_lifts_the_finger_and_frees_the_caller(world):
     assert world.result(call).message == 'the explorer was shut down'
 
 
-def test_ctrl_c_while_sliding_lifts_the_finger_and_ends_the_process(ros):
+def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
         bench.bind(('127.0.0.1', 0))
         bench.settimeout(DEADLINE_S)
@@ -270,15 +271,17 @@ def test_ctrl_c_while_sliding_lifts_the_finger_and_ends_the_process(ros):
         with subprocess.Popen([sys.executable, '-c', program, '--ros-args', '-p', port]) as explorer:
             client = Client()
             assert client.explore.wait_for_service(DEADLINE_S)
-            client.explore.call_async(srv.Explore.Request(**SLOW))
+            answer = client.explore.call_async(srv.Explore.Request(**SLOW))
             fingers = iter(lambda: FingerState.from_bytes(bench.recv(100)), None)
             assert next(finger for finger in fingers if finger.vx_m_s > 0.009)
             explorer.send_signal(signal.SIGINT)
             last = last_until_exit(bench, explorer)
+            rclpy.spin_until_future_complete(client, answer, timeout_sec=DEADLINE_S)
             client.destroy_node()
     assert explorer.returncode == 0
     assert last.force_n == 0
     assert last.z_m == pytest.approx(0.01, abs=0.001)
+    assert answer.result().message == 'the explorer was shut down'
 
 
 def last_until_exit(bench, process):

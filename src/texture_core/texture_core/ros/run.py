@@ -22,6 +22,7 @@ except ImportError:
     OneThread = SingleThreadedExecutor
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+ANSWERING_S = 2.0  # the longest that callbacks may take to answer once the node is shut down
 
 
 def run(
@@ -36,7 +37,7 @@ def run(
     stopped = threading.Event()
     for number in STOP_SIGNALS:
         signal.signal(number, lambda _number, _frame: stopped.set())
-    node = None
+    node = executor = None
     try:
         node = make_node()
         warn_of_unknown(node)
@@ -53,6 +54,8 @@ def run(
     finally:
         if node is not None:
             getattr(node, 'shutdown', lambda: None)()
+            if executor is not None:
+                executor.shutdown(ANSWERING_S)  # who waited for an answer still gets it
             node.destroy_node()
         rclpy.try_shutdown()
 

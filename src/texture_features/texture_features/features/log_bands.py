@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -28,7 +29,7 @@ class LogBands:
         """Number of the band, from 1."""
         return tuple(str(band + 1) for band in range(self.bands))
 
-    @property
+    @cached_property
     def _step(self) -> int:
         return max(1, round(2 * self.bands * (1.0 - self.overlap)))
 

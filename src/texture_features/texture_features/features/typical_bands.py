@@ -3,38 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_core.parameters import param
 from texture_features.feature import Windows
+from texture_features.features.log_bands import LogBands
 from texture_features.spectrum import densities_of, mean_over_segments
 
 
 @dataclass(frozen=True)
-class TypicalBands:
+class TypicalBands(LogBands):
     """Mean over short segments of the logarithm of the power spectral density, in the bands of `log_bands`.
 
     Where this is well below `log_bands`, the power comes in bursts: single bumps, stick and slip.
     """
-
-    of_signal: ClassVar[bool] = True
-
-    bands: int = param(32, 'Number of bands; a segment is twice as many samples long.', low=2, high=512)
-    overlap: float = param(0.75, 'Share of a segment that the next one repeats.', low=0.0, high=0.9)
-    floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Number of the band, from 1."""
-        return tuple(str(band + 1) for band in range(self.bands))
-
-    @cached_property
-    def _step(self) -> int:
-        return max(1, round(2 * self.bands * (1.0 - self.overlap)))
 
     def __call__(self, windows: Windows) -> Array:
         """Return the mean of log(density + floor)."""
