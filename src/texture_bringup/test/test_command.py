@@ -1,3 +1,7 @@
+import os
+import subprocess
+import sys
+
 import pytest
 
 from texture_bringup.command import COMMANDS, main
@@ -9,6 +13,18 @@ def test_without_a_sub_command_the_help_is_printed(capsys) -> None:
     assert main([]) == 0
     shown = capsys.readouterr().out
     assert all(name in shown and command.summary in shown for name, command in COMMANDS.items())
+
+
+@pytest.mark.parametrize('arguments', [[], ['scene', '--help']])
+def test_a_reader_who_has_seen_enough_ends_the_command_quietly(arguments) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, '-m', 'texture_bringup.command', *arguments]
+    ended = subprocess.run(
+        command, check=False, stdout=write, stderr=subprocess.PIPE, env={**os.environ, 'PYTHONUNBUFFERED': ''}
+    )
+    os.close(write)
+    assert (ended.returncode, ended.stderr) == (141, b'')
 
 
 def test_an_unknown_sub_command_gets_the_nearest(capsys) -> None:

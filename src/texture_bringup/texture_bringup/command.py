@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import signal
 import sys
 from collections.abc import Mapping, Sequence
@@ -13,7 +14,7 @@ from typing import Protocol, cast
 from texture_core.catalogue import find
 from texture_core.errors import TextureError
 
-USER_ERROR, INTERRUPTED = 2, 130
+USER_ERROR, INTERRUPTED, CUT_OFF = 2, 130, 141
 
 
 class Module(Protocol):
@@ -57,10 +58,20 @@ COMMANDS: Mapping[str, Command] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the `texture` command; return its exit code: 0, 2 for an error of the user, 130 after Ctrl-C."""
+    """Run the `texture` command; return its exit code.
+
+    0, 2 for an error of the user, 130 after Ctrl-C, 141 when nobody reads on what it prints, as behind `| head`.
+    """
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        return _dispatch(given)
+        try:
+            return _dispatch(given)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # What is left to print goes nowhere, or Python would complain at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CUT_OFF
     except TextureError as error:
         print(f'texture: {error}', file=sys.stderr)
         return USER_ERROR

@@ -35,7 +35,8 @@ def test_stamps_of_16_bits_wrap() -> None:
 def test_a_device_that_counts_from_zero_again_is_noticed() -> None:
     counter = SampleCounter()
     assert counter.place([1_000_000, 1_000_001, 0, 1]) == ([0, 1], True)
-    counter.resume(500)
+    counter.interrupt()
+    counter.skip(498)
     assert counter.place([0, 1])[0] == [500, 501]
     assert counter.lost == 498
 

@@ -48,7 +48,7 @@ def run(script: str, batches: int) -> tuple[Scripted, Reader, list[str]]:
         if len(came) >= batches:
             enough.set()
 
-    reader = Reader(sensor, deliver, told.append)
+    reader = Reader(sensor, deliver, told.append, told.append)
     reader.start()
     assert enough.wait(DEADLINE_S)
     reader.stop()

@@ -189,6 +189,27 @@ def test_unplugging_is_told_and_the_gap_counted_by_the_host_clock(feeder: Feeder
     assert feeder.sensor.counts['reopened'] == 1
 
 
+@pytest.mark.parametrize('kept_ms', [0, 100, 250])
+def test_what_a_frozen_device_sends_late_is_not_taken_for_new(feeder: Feeder, kept_ms: int) -> None:
+    feeder.run(300)
+    for _ in range(4):  # it stands still for 1.5 s, is started again, sends what it kept in two pieces, and goes on
+        feeder.sensor.open()
+        feeder.clock.now_ns += 1500 * NANOSECONDS // 1000
+        feeder.stamp_ms += 1500 - kept_ms
+        for ms in range(kept_ms):
+            feeder.wire.say(feeder.stamp_ms + ms, ms)
+            if ms == 5:
+                feeder.read()
+        feeder.stamp_ms += kept_ms
+        feeder.read()
+        feeder.run(300)
+    first, last = feeder.signal[0], feeder.signal[-1]
+    assert (last.stamp_ns - first.stamp_ns) / NANOSECONDS == pytest.approx(7.1, abs=0.05)
+    index_s, time_s = (last.first_sample - first.first_sample) / 1000, (last.stamp_ns - first.stamp_ns) / NANOSECONDS
+    assert index_s == pytest.approx(time_s, abs=0.005)
+    assert feeder.sensor.counts['samples'] + feeder.sensor.counts['lost'] == last.next_sample - first.first_sample
+
+
 def test_a_silent_device_is_stopped_and_started_and_given_up_at_last(wire: Wire, clock: Clock) -> None:
     sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.05), clock)
     sensor.open()

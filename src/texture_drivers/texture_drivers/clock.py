@@ -100,6 +100,13 @@ class StreamClock:
         self._late_since_ns: int | None = None
         self._before = self._now = Line(drift=self._drift)
 
+    def skip(self, samples: int) -> None:
+        """Take the samples of this stream for later ones by so many: their times stay, their indices do not."""
+        if self._origin is not None:
+            first_index, first_ns = self._origin
+            self._origin = first_index + samples, first_ns
+            self._last_index += samples
+
     @property
     def drift(self) -> float:
         """How much longer than nominal a sample takes: 50e-6 is a device whose clock is slow by 50 ppm."""
@@ -118,7 +125,9 @@ class StreamClock:
             arrival = Arrival(0.0, 0.0)
         self._last_index = index
         self._remember(arrival)
-        self.settled = self.settled or arrival.elapsed_ns >= self._settle_ns
+        # By both clocks: what was kept back arrives in one burst, and tells nothing of when it was taken.
+        watched_ns = min(arrival.elapsed_ns, arrival_ns - self._origin[1])
+        self.settled = self.settled or watched_ns >= self._settle_ns
 
     def time_ns(self, index: float) -> int:
         """Return the host time of a sample."""

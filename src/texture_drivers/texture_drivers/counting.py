@@ -38,13 +38,15 @@ class SampleCounter:
         self._last: int | None = None
         self._early = 0
 
-    def resume(self, index: int) -> None:
-        """Go on with `index` after an interruption, whatever the next stamp is; what lies between is lost."""
-        index = max(index, self.next_index)
-        self.lost += index - self.next_index
-        self.next_index = index
+    def interrupt(self) -> None:
+        """Number on, whatever the next stamp is."""
         self._last = None
         self._early = 0
+
+    def skip(self, samples: int) -> None:
+        """Number on behind samples that are known to be lost."""
+        self.lost += samples
+        self.next_index += samples
 
     def place(self, stamps: Sequence[int | None]) -> tuple[list[int], bool]:
         """Return the index of each stamp's sample as far as decided, and whether the device began anew after those.

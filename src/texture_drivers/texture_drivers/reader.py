@@ -23,15 +23,18 @@ class Reader:
         What is read; used by this thread alone.
     deliver
         Called with topic and batch, in the thread.
-    tell
-        Called with one sentence when the sensor goes or comes back, not at each retry.
+    warn, tell
+        Called with one sentence when the sensor goes, not at each retry, and when it comes back.
     """
 
-    def __init__(self, sensor: Sensor, deliver: Deliver, tell: Tell = lambda _: None) -> None:
+    def __init__(
+        self, sensor: Sensor, deliver: Deliver, warn: Tell = lambda _: None, tell: Tell = lambda _: None
+    ) -> None:
         self.sensor = sensor
         self.fault = 'not opened yet'  # '' while all is well
         self.published: dict[str, int] = dict.fromkeys(sensor.expected_rates_hz, 0)
         self._deliver = deliver
+        self._warn = warn
         self._tell = tell
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='sensor reader', daemon=True)
@@ -60,7 +63,7 @@ class Reader:
                     self._hand_on(topic, batches)
         except DeviceError as error:
             if self.fault != str(error):
-                self._tell(f'{error}. Trying again every {RETRY_S} s')
+                self._warn(f'{error}. Trying again every {RETRY_S} s')
             self.fault = str(error)
 
     def _hand_on(self, topic: str, batches: Sequence[TactileSignal]) -> None:

@@ -18,7 +18,6 @@ from texture_simulation.devices.faults import ByteFaults
 from texture_simulation.finger_link import FingerLink
 from texture_simulation.live_sensor import LIVE_SENSORS, MakeLive, live_tsf85
 from texture_simulation.scene import Scene, load_scene
-from texture_simulation.surfaces.surface import Surface
 
 BURST_S = 0.005
 
@@ -68,7 +67,9 @@ class Bench:
         rng = np.random.default_rng(params.seed)
         self.scene: Scene = load_scene(params.scene)
         self._now_ns = now_ns
-        surface = self._prepared(params.surface)
+        surface = self.scene.surface(params.surface)
+        for other in self.scene.surfaces.values():  # all tables are made now: swapping takes no time and no memory
+            other.height_m(np.zeros(1), np.zeros(1), np.zeros(1))
         tsf85 = {
             name: partial(live_tsf85, layout=name, finger=params.finger, long_stamps=params.long_stamps)
             for name in ('tsf85', 'tsf85_3x4')
@@ -116,7 +117,7 @@ class Bench:
 
     def set_surface(self, name: str) -> None:
         """Swap the sample; UnknownName, with the nearest name, if there is none such."""
-        surface = self._prepared(name)
+        surface = self.scene.surface(name)
         for sensor in self._sensors:
             sensor.model.touch.surface = surface
 
@@ -159,12 +160,6 @@ class Bench:
             'finger states': self._link.received,
             'refused datagrams': self._link.refused,
         }
-
-    def _prepared(self, name: str) -> Surface:
-        """Return a surface whose tables are made, so that swapping takes no time."""
-        surface = self.scene.surface(name)
-        surface.height_m(np.zeros(1), np.zeros(1), np.zeros(1))
-        return surface
 
     def _in_thread(self, command: Callable[[], None]) -> None:
         """Run a command between two bursts, for only the thread may touch the device."""

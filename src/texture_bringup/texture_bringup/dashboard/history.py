@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,17 +13,17 @@ MOST_FRAMES = 300  # of one exploration; a longer one is thinned to every second
 
 @dataclass
 class Past:
-    """One exploration: its summary, and the texts of its frames."""
+    """One exploration: its summary, and the texts of its frames, compressed: a page in memory for each is too much."""
 
     summary: dict[str, Any]
-    frames: list[str] = field(default_factory=list)
+    frames: list[bytes] = field(default_factory=list)
     stride: int = 1
     seen: int = 0
 
     def add(self, frame: str) -> None:
         """Keep every `stride`-th frame."""
         if self.seen % self.stride == 0:
-            self.frames.append(frame)
+            self.frames.append(zlib.compress(frame.encode(), 1))
         self.seen += 1
         if len(self.frames) > MOST_FRAMES:
             self.frames, self.stride = self.frames[::2], self.stride * 2
@@ -53,4 +54,7 @@ class History:
     def replay(self, exploration_id: str) -> str | None:
         """Return the frames of an exploration as a JSON list with the time between them; None if it is not kept."""
         past = self._past.get(exploration_id)
-        return None if past is None else f'{{"stride": {past.stride}, "frames": [{", ".join(past.frames)}]}}'
+        if past is None:
+            return None
+        frames = ', '.join(zlib.decompress(frame).decode() for frame in past.frames)
+        return f'{{"stride": {past.stride}, "frames": [{frames}]}}'

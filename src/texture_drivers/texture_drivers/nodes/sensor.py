@@ -66,7 +66,8 @@ class SensorNode(LifecycleNode):
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start reading; a sensor that is not there yet is waited for."""
         result = super().on_activate(state)
-        self._reader = Reader(self._sensor, self._publish, self.get_logger().warning)
+        log = self.get_logger()
+        self._reader = Reader(self._sensor, self._publish, log.warning, log.info)
         self._health = Health(self._reader, time.monotonic())
         self._reader.start()
         return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
@@ -48,6 +49,7 @@ class Finger:
         self.cutter = BatchCutter(layout, settings, static_rate_hz or layout.static_rate_hz, frame_id, self.clock)
         self._waiting: list[Set] = []
         self._interrupted = False
+        self._clock_before: StreamClock | None = None  # before an interruption, until the clock is settled again
 
     @property
     def rates_hz(self) -> Mapping[str, float]:
@@ -65,7 +67,7 @@ class Finger:
         if not sets:
             return {}
         if self._interrupted:
-            self._resume(len(sets), arrival_ns)
+            self._begin_anew()
         waiting = [*self._waiting, *sets]
         indices, anew = self.counter.place([item.stamp_ms for item in waiting])
         self._waiting = waiting[len(indices) :]
@@ -74,16 +76,29 @@ class Finger:
         if not indices:
             return {}
         self.clock.observe(indices[-1], arrival_ns)
-        return self.cutter.cut(indices, waiting[: len(indices)])
+        skipped = self._skipped(indices[-1])
+        return self.cutter.cut([index + skipped for index in indices], waiting[: len(indices)])
 
-    def _resume(self, n_sets: int, arrival_ns: int) -> None:
-        """Go on after an interruption at the index that the host's clock tells."""
+    def _begin_anew(self) -> None:
+        """Number on after an interruption, and keep the clock of before for telling what was lost in it."""
         self._interrupted = False
         if self.clock.settled:
-            self.counter.resume(round(self.clock.index_at(arrival_ns)) - (n_sets - 1))
-        else:
-            self.counter.resume(self.counter.next_index)
+            self._clock_before = copy.copy(self.clock)
         self.clock.restart()
+        self.counter.interrupt()
+
+    def _skipped(self, index: int) -> int:
+        """Return how many samples an interruption has cost that is over now, and number on behind them.
+
+        That is known when the clock is settled again and not before: what arrives first may be long on its way.
+        """
+        if self._clock_before is None or not self.clock.settled:
+            return 0
+        skipped = max(0, round(self._clock_before.index_at(self.clock.time_ns(index))) - index)
+        self._clock_before = None
+        self.counter.skip(skipped)
+        self.clock.skip(skipped)
+        return skipped
 
 
 class BatchCutter:

@@ -39,6 +39,7 @@ from texture_exploration.signal_watch import SignalWatch, SignalWatchParams
 
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
+RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds of results
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,13 @@ class ExplorerNode(Node):
         self.create_service(Trigger, 'stop', self._on_stop, callback_group=group)
         self.create_service(Trigger, 'recover', self._on_recover, callback_group=group)
         ActionServer(
-            self, action.Explore, 'explore', self._on_goal, callback_group=group, cancel_callback=_accept_cancel
+            self,
+            action.Explore,
+            'explore',
+            self._on_goal,
+            callback_group=group,
+            cancel_callback=_accept_cancel,
+            result_timeout=RESULT_KEPT_S,
         )
         self.create_timer(IDLE_PERIOD_S, self._publish_idle)
         Diagnostics(self, self._report)

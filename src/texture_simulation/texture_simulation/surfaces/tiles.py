@@ -46,8 +46,7 @@ def tile_height(random: Random, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         height = _bilinear(_mixed(random, tuple(levels.tolist())), np.searchsorted(levels, level), rows, columns)
         return np.asarray(height, dtype=np.float64)
     low = level.astype(np.intp)
-    first = int(low.min())
-    both = _bilinear(_pairs(random, first, int(low.max()) + 1), low - first, rows, columns)
+    both = _bilinear(_pairs(random), low, rows, columns)
     return np.asarray(both.real + (level - low) * (both.imag - both.real), dtype=np.float64)
 
 
@@ -97,16 +96,21 @@ def _mixed(random: Random, levels: tuple[float, ...]) -> AnyArray:
     """Return one tile for each of some levels of blur."""
     tiles = []
     for level in levels:
-        share = level - int(level)
-        pair = _pairs(random, int(level), int(level) + 1).view(np.float32).reshape(-1, 2)
+        low = int(level)
+        share = level - low
+        pair = _pairs(random)[low * TILE_POINTS : (low + 1) * TILE_POINTS].view(np.float32).reshape(-1, 2)
         tiles.append(pair @ np.array([1.0 - share, share], dtype=np.float32))
     return np.concatenate(tiles)
 
 
-@lru_cache(maxsize=128)
-def _pairs(random: Random, first: int, end: int) -> AnyArray:
-    """Return the tiles of some levels of blur, and of the next blunter ones as imaginary part: found at once."""
-    blurred = [_blurred(random, level) for level in range(first, end + 1)]
+@lru_cache(maxsize=32)
+def _pairs(random: Random) -> AnyArray:
+    """Return the tiles of all levels of blur, each with the next blunter one as imaginary part: found at once.
+
+    All are made at once, 4.8 MB a relief: what a bench holds does not grow with what it has felt.
+    """
+    spectrum, wave_1_m = np.fft.rfft2(random.sharp()), waves_1_m(random.spacing_m)
+    blurred = [_blurred(spectrum, wave_1_m, blur_m) for blur_m in BLURS_M]
     return _flat([sharp + 1j * blunt for sharp, blunt in itertools.pairwise(blurred)]).astype(np.complex64)
 
 
@@ -115,16 +119,10 @@ def _flat(tiles: list[AnyArray]) -> AnyArray:
     return np.concatenate([np.pad(tile, ((0, 1), (0, 1)), mode='wrap').ravel() for tile in tiles])
 
 
-def _blurred(random: Random, level: int) -> Array:
+def _blurred(spectrum: NDArray[np.complex128], wave_1_m: Array, blur_m: float) -> Array:
     """Return a tile, (SIDE, SIDE) m, under one of the blurs."""
-    spectrum, wave_1_m = _spectrum(random)
-    weak = np.exp(-0.5 * (2 * np.pi * wave_1_m * BLURS_M[level]) ** 2)
+    weak = np.exp(-0.5 * (2 * np.pi * wave_1_m * blur_m) ** 2)
     return np.asarray(np.fft.irfft2(spectrum * weak, s=(SIDE, SIDE)))
-
-
-@lru_cache(maxsize=64)
-def _spectrum(random: Random) -> tuple[NDArray[np.complex128], Array]:
-    return np.fft.rfft2(random.sharp()), waves_1_m(random.spacing_m)
 
 
 def waves_1_m(spacing_m: float) -> Array:
