@@ -47,7 +47,7 @@ def run(bench: Bench) -> BenchResult:
     return BenchResult(
         name='learning',
         measured='share of test windows and whole test slides (summed log-probabilities) that are right, mean over the '
-        'draws; time of a lesson with its writing to disk; time to judge a window',
+        'draws; time of a lesson with its writing to disk, by the clock of the processor; time to judge a window',
         data=f'BioTac vibration, {len(labels)} materials (github dexrob/BioTac_slide_20_50, Gao et al. 2020), recipe '
         f'{RECIPE} calibrated in {FOLDS} parts',
         split=f'{len(courses)} draws of {len(draws[0])} new materials: trained on slides 1-{taught} of the others, '
