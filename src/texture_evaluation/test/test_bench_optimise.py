@@ -1,7 +1,7 @@
 from pathlib import Path
 
-from texture_evaluation.bench import BENCHES
-from texture_evaluation.benches.optimise import CASES, DATA
+from texture_evaluation.bench import BENCHES, run_bench
+from texture_evaluation.benches.optimise import CASES, DATA, LINEAR
 from texture_evaluation.benches.result import Bench
 
 
@@ -13,7 +13,7 @@ def test_searches_have_the_size_of_the_papers() -> None:
 
 
 def test_every_search_ends_with_a_recipe_judged_by_its_learner_and_the_charts_are_drawn(tmp_path: Path) -> None:
-    result = BENCHES['optimise'](Bench(tmp_path, quick=True))
+    result = BENCHES['optimise_large'](Bench(tmp_path, quick=True))
     assert set(result.numbers['searches']) == set(CASES)
     for figures in result.numbers['searches'].values():
         assert figures['evaluations'] == 10
@@ -21,4 +21,11 @@ def test_every_search_ends_with_a_recipe_judged_by_its_learner_and_the_charts_ar
         assert figures['halves_judged'] <= figures['halves_of_all']
     whole = result.numbers['searches']['linear, SVM, no individual given up']
     assert whole['halves_judged'] == whole['halves_of_all']
+    assert all(chart.is_file() for chart in result.charts)
+
+
+def test_the_short_bench_searches_the_linear_experiment_alone(tmp_path: Path) -> None:
+    result, path = run_bench('optimise', Bench(tmp_path, quick=True))
+    assert tuple(result.numbers['searches']) == LINEAR
+    assert path.name == 'optimise.json'
     assert all(chart.is_file() for chart in result.charts)

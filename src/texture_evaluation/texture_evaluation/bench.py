@@ -40,7 +40,8 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'speed_force': speed_force.run,  # speeds, forces and directions that were not taught, recorded
     'roughness': roughness.run,  # from window to grade
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
-    'optimise': optimise.run,  # genetic searches of the papers' size: time, convergence, front
+    'optimise': optimise.run,  # genetic searches of the papers' size, linear experiment: time, convergence
+    'optimise_large': optimise.run_large,  # all of them, and the fronts of accuracy and computing; not in `all`
     'learning': learning.run,  # taught slide by slide against trained anew on the same slides
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults

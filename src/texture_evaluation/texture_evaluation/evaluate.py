@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -123,15 +123,17 @@ def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '', namespa
     )
 
 
-def judge(model: Model, pieces: Iterable[Piece]) -> tuple[list[FeatureVector], list[TextureEstimate], Array]:
-    """Return vector, estimate and computing time (µs) of each window and of the end of one slide, one by one."""
+def judge(
+    model: Model, pieces: Iterable[Piece], clock: Callable[[], float] = time.perf_counter
+) -> tuple[list[FeatureVector], list[TextureEstimate], Array]:
+    """Return vector, estimate and time (µs, by the clock) of each window and of the end of one slide, one by one."""
     evidence = Evidence(model)
     vectors, estimates, taken_us = [], [], []
     for piece in pieces:
-        start = time.perf_counter()
+        start = clock()
         vector = model.recipe.feature_set.describe(piece)
         estimate = evidence.update(vector)
-        taken_us.append(1e6 * (time.perf_counter() - start))
+        taken_us.append(1e6 * (clock() - start))
         vectors.append(vector)
         estimates.append(estimate)
     return vectors, estimates, np.array(taken_us)

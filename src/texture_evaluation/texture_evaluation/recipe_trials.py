@@ -144,12 +144,29 @@ def describe_all(recipe: Recipe, recorded: Sequence[Recorded]) -> Described:
     return {item.slide: describe(recipe, item) for item in recorded}
 
 
-def try_described(recipe: Recipe, described: Described, divisions: Sequence[Division]) -> Outcome:
-    """Train and test a recipe on each division of slides that it has described."""
+def try_described(
+    recipe: Recipe,
+    described: Described,
+    divisions: Sequence[Division],
+    lessons: Described | None = None,
+    apart_s: float = LENGTH_S,
+) -> Outcome:
+    """Train and test a recipe on each division of slides that it has described.
+
+    Parameters
+    ----------
+    recipe, described, divisions
+        What to learn, from which slides, and which to test it on.
+    lessons
+        The same slides in the windows to learn from, where these are others than those to test.
+    apart_s
+        How far apart the windows learnt from begin at least.
+    """
     results: list[SlideResult] = []
     taken: list[float] = []
     for learnt, tested in divisions:
-        examples = examples_of({slide: vectors for slide, vectors in described.items() if slide.name in learnt})
+        windows = (described if lessons is None else lessons).items()
+        examples = examples_of({slide: vectors for slide, vectors in windows if slide.name in learnt}, apart_s)
         start = time.process_time()
         model = train(recipe, examples)
         taken.append(time.process_time() - start)
@@ -163,19 +180,22 @@ def describe(recipe: Recipe, item: Recorded) -> list[FeatureVector]:
     return [dataclasses.replace(vector, exploration_id=item.slide.name) for vector in vectors if not vector.last]
 
 
-def examples_of(described: Described) -> LabelledFeatures:
-    """Return windows that begin at least LENGTH_S apart, of all slides."""
-    chosen = [vector for vectors in described.values() for vector in _apart(vectors)]
+def examples_of(described: Described, apart_s: float = LENGTH_S) -> LabelledFeatures:
+    """Return windows that begin at least so far apart, of all slides."""
+    chosen = [vector for vectors in described.values() for vector in _apart(vectors, apart_s)]
     if not chosen:
         raise InvalidData('no slide to learn from has a whole window; record longer slides')
     examples = LabelledFeatures.from_vectors(chosen, {slide.name: slide.surface for slide in described})
-    return dataclasses.replace(examples, hop_s=max(LENGTH_S, examples.hop_s))
+    return dataclasses.replace(examples, hop_s=max(apart_s, examples.hop_s))
 
 
 def latency_us(recipe: Recipe, model: Model, recorded: Sequence[Recorded]) -> dict[str, float]:
-    """Return median and 99th percentile of the computing time of windows one by one; the first slide warms up."""
+    """Return median and 99th percentile of the computing time of windows one by one; the first slide warms up.
+
+    By the clock of the processor, which other work on the machine lengthens little.
+    """
     cut = [item.cut(recipe) for item in recorded[:: max(1, len(recorded) // TIMED_SLIDES)]]
-    taken = [judge(model, pieces)[2][:-1] for pieces in (cut[0], *cut)][1:]
+    taken = [judge(model, pieces, time.process_time)[2][:-1] for pieces in (cut[0], *cut)][1:]
     median, p99 = np.percentile(np.concatenate(taken), (50, 99))
     return {'median': round(float(median), 1), 'p99': round(float(p99), 1)}
 
@@ -251,10 +271,10 @@ def _adapted_feature(feature: Feature, n_samples: int, of_motion: bool) -> Featu
     return feature
 
 
-def _apart(vectors: Sequence[FeatureVector]) -> list[FeatureVector]:
+def _apart(vectors: Sequence[FeatureVector], apart_s: float) -> list[FeatureVector]:
     kept: list[FeatureVector] = []
     for vector in vectors:
-        if not kept or vector.start_ns - kept[-1].start_ns >= LENGTH_S * NANOSECONDS - 1:
+        if not kept or vector.start_ns - kept[-1].start_ns >= apart_s * NANOSECONDS - 1:
             kept.append(vector)
     return kept
 

@@ -38,12 +38,14 @@ class Cost:
 
 
 def costs(learner: str, sizes: Sequence[Size], limit_s: float, seed: int) -> Mapping[Size, Cost]:
-    """Return the costs of rising sizes; those after the first that takes longer than the limit are left out."""
+    """Return the costs of rising sizes, up to the first that would take longer than the limit, in proportion."""
     found: dict[Size, Cost] = {}
-    for size in sizes:
-        found[size] = cost(LEARNERS[learner](), size, seed)
-        if found[size].seconds > limit_s:
+    predicted_s = 0.0
+    for size, larger in zip(sizes, (*sizes[1:], sizes[-1]), strict=True):
+        if predicted_s > limit_s:
             break
+        found[size] = cost(LEARNERS[learner](), size, seed)
+        predicted_s = found[size].seconds * larger.windows / size.windows
     return found
 
 
