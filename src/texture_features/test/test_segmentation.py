@@ -120,6 +120,15 @@ def test_a_contact_is_where_the_finger_vibrates_whatever_the_sign_of_the_load(si
     assert touch.ends_s == pytest.approx(1.6, abs=0.01)
 
 
+def test_knocks_of_touching_and_letting_go_do_not_tell_which_level_is_contact():
+    times = np.arange(0, 1.8, 0.01)
+    load = np.interp(times, [0.2, 0.3, 1.6, 1.7], [0.0, 1.0, 1.0, 0.0])[:, None]
+    knocks = (np.abs(times - 0.25) < 0.11) | (np.abs(times - 1.65) < 0.11)  # most of what is no contact
+    vibration = np.where(knocks, 8.0, np.where((times > 0.4) & (times < 1.5), 2.0, 0.0))
+    [touch] = find_touches(load, 100.0, vibration)
+    assert (touch.begins_s, touch.ends_s) == pytest.approx((0.2, 1.7), abs=0.011)
+
+
 def test_a_channel_at_the_end_of_its_range_has_no_power_there():
     clipped = np.minimum(np.random.default_rng(0).normal(size=(1000, 1)), 3.0 - np.linspace(0, 8, 1000)[:, None])
     clipped[:300] = 9.0

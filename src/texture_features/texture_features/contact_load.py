@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from texture_core.arrays import Array, Samples
 
@@ -50,7 +51,8 @@ def find_touches(levels: Samples, rate_hz: float, vibration: Array) -> list[Touc
     """
     if len(levels) < 3:
         return []
-    load = _load(levels, vibration)
+    near = max(1, round(0.5 * CHANGE_S * rate_hz))
+    load = _load(levels, vibration, near)
     high = load > 0.5 * load.max()
     if not high.any() or high.all():
         return []
@@ -58,7 +60,6 @@ def find_touches(levels: Samples, rate_hz: float, vibration: Array) -> list[Touc
     if full <= OVER_SCATTER * max(float(np.median(steps[high])), float(np.median(steps[~high]))):
         return []
     edges = np.flatnonzero(np.diff(np.concatenate(([0], high, [0])).astype(int))).reshape(-1, 2)
-    near = max(1, round(0.5 * CHANGE_S * rate_hz))
     return [
         _touch(load / full, first, last - 1, rate_hz)
         for first, last in edges.tolist()
@@ -66,8 +67,12 @@ def find_touches(levels: Samples, rate_hz: float, vibration: Array) -> list[Touc
     ]
 
 
-def _load(levels: Samples, vibration: Array) -> Array:
-    """Return the common change of the channels, (n_samples,), about 0 without contact."""
+def _load(levels: Samples, vibration: Array, near: int) -> Array:
+    """Return the common change of the channels, (n_samples,), about 0 without contact.
+
+    The finger vibrates more in contact than without. What knocks, within `near` samples, while it is pressed on and let
+    go belongs to neither.
+    """
     middle = np.nanmedian(np.where(np.isfinite(levels), levels, np.nan), axis=0, keepdims=True)
     centred = np.nan_to_num(np.where(np.isfinite(levels), levels - middle, 0.0))
     _, vectors = np.linalg.eigh(centred.T @ centred)
@@ -75,7 +80,9 @@ def _load(levels: Samples, vibration: Array) -> Array:
     # Channels saturate one after the other: those that follow the load count alike, or the strongest tell its end late.
     load: Array = centred @ np.where(np.abs(weights) > FOLLOWS * np.abs(weights).max(), np.sign(weights), 0.0)
     upper = load > 0.5 * (load.min() + load.max())
-    if 0 < upper.sum() < len(load) and np.median(vibration[upper]) < np.median(vibration[~upper]):
+    still = maximum_filter1d(upper, near) == minimum_filter1d(upper, near)
+    high, low = vibration[upper & still], vibration[~upper & still]
+    if len(high) and len(low) and np.median(high) < np.median(low):
         load = -load
     return load - np.quantile(load, 0.05)
 
