@@ -10,15 +10,19 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.bench import BENCHES
+from texture_evaluation.benches.recipes import QUICK_RECIPES, VIBRATION
 from texture_evaluation.benches.result import Bench
 from texture_evaluation.charts import pareto_front
 from texture_evaluation.recipe_trials import (
     Recorded,
     comparable,
+    describe_all,
     division_by_time,
     divisions_by,
+    every,
     random_divisions,
     read_recorded,
+    try_described,
     try_recipe,
 )
 from texture_evaluation.slides import Slide, find_slides
@@ -95,6 +99,18 @@ def test_a_recipe_is_tested_on_slides_it_has_not_learnt(simulated: Path) -> None
     assert len(find_slides([simulated])) == len(slides)
 
 
+def test_windows_learnt_from_may_overlap_where_those_tested_do_not(simulated: Path) -> None:
+    slides = read_recorded([simulated])
+    recipe = comparable(load_recipe('jamali-naive-bayes-5'), 1000.0, of_motion=False)
+    divisions = division_by_time([item.slide for item in slides], 4)
+    apart = describe_all(recipe, slides)
+    plain = try_described(recipe, apart, divisions)
+    more = try_described(recipe, apart, divisions, describe_all(every(0.25, recipe), slides), 0.25)
+    # twelve slides of 1 s, windows of 0.5 s
+    assert (plain.model.training['windows'], more.model.training['windows']) == (24, 36)
+    assert [len(found.estimates) for found in more.results] == [len(found.estimates) for found in plain.results]
+
+
 def test_the_front_holds_what_is_neither_dearer_nor_worse_than_another() -> None:
     assert pareto_front([(3.0, 0.9), (1.0, 0.5), (2.0, 0.4), (2.0, 0.7), (4.0, 0.9)]) == [1, 3, 0]
 
@@ -110,5 +126,7 @@ def test_recorded_slides_are_recognised_by_all_and_the_table_is_whole(tmp_path: 
         assert cell['train_s'] > 0
     head, _, *rows = (tmp_path / 'recipes.md').read_text().splitlines()
     assert 'biotac20, PAC at 1 kHz, random: window; slide (%)' in head
-    assert {row.split(' | ')[0] for row in rows} == {'| default', '| ets-linear-svm-vote', '| kaboli-pa'}
+    assert {row.split(' | ')[0] for row in rows} == {f'| {name}' for name in QUICK_RECIPES}
+    assert 'jamali-naive-bayes-5, overlapping' in result.numbers[VIBRATION]['random']
+    assert 'jamali-naive-bayes-5, overlapping' not in result.numbers['ntp21']['one force out']
     assert set(result.numbers['ntp21']) == {'one force out', 'one speed out'}

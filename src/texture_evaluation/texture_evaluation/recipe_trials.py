@@ -134,6 +134,13 @@ def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: flo
     return dataclasses.replace(recipe, feature_set=feature_set)
 
 
+def every(hop_s: float, recipe: Recipe) -> Recipe:
+    """Return a recipe whose windows begin so far apart."""
+    windows = dataclasses.replace(recipe.feature_set.windows, hop_s=hop_s)
+    feature_set = dataclasses.replace(recipe.feature_set, windows=windows, _layouts={})
+    return dataclasses.replace(recipe, feature_set=feature_set)
+
+
 def try_recipe(recipe: Recipe, recorded: Sequence[Recorded], divisions: Sequence[Division]) -> Outcome:
     """Train and test a recipe on each division of the slides."""
     return try_described(recipe, describe_all(recipe, recorded), divisions)
