@@ -16,6 +16,7 @@ from texture_exploration.arms.ur_params import UrArmParams
 
 MODULE = 'texture_exploration.arms.ur_worker'
 STOPPING_S = 1.5  # time to brake; then it is killed, and the watchdog of the controller stops the arm
+LAST_WORD_S = 0.05
 
 
 class WorkerLink:
@@ -109,6 +110,7 @@ class WorkerLink:
             return b''
 
     def _why_ended(self) -> str:
+        self._reader.join(LAST_WORD_S)  # what the worker said before it ended may still be on its way
         if self._trouble:
             return self._trouble
         if self._process.poll() == -signal.SIGALRM:
