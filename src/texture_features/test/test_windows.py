@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_features.stream import Stream
 from texture_features.windows import CutWindow, SlideEnd, WindowCutter, WindowParams, cut_recording
 
 PARAMS = WindowParams(length_s=0.5, hop_s=0.1)
@@ -252,3 +253,13 @@ def test_what_is_cut_does_not_depend_on_the_order_of_arrival(content, order):
             if random.random() < 0.5:
                 pieces += cutter.take()
     assert as_data(pieces + cutter.finish()) == expected
+
+
+def test_a_stream_that_ended_is_forgotten_when_another_has_run_for_as_long_as_is_kept():
+    kept = Stream(keep_s=1.0)
+    for batch in stream(0.5) + stream(0.4, begin_s=1.0):
+        kept.add(batch)
+    assert len(kept.runs) == 2
+    for batch in stream(0.6, begin_s=1.0)[-40:]:
+        kept.add(batch)
+    assert [run.next_sample for run in kept.runs] == [600]

@@ -38,6 +38,11 @@ class Run:
         self._marks: deque[tuple[int, int, int]] = deque()  # index, start and end time of each batch that is kept
         self.append(signal)
 
+    @property
+    def end_ns(self) -> int:
+        """When the newest batch ended."""
+        return self._marks[-1][2]
+
     def continued_by(self, signal: TactileSignal) -> bool:
         """Whether the batch carries on this numbering, with or without a loss before it."""
         return (
@@ -100,7 +105,10 @@ class Run:
 
 
 class Stream:
-    """The runs of one topic: a new one begins when the numbering restarts or the rate or channels change."""
+    """The runs of one topic: a new one begins when the numbering restarts or the rate or channels change.
+
+    One that ended is kept as long as a sample, and no more than `MAX_RUNS` are.
+    """
 
     MAX_RUNS = 4
 
@@ -112,6 +120,8 @@ class Stream:
 
     def add(self, signal: TactileSignal) -> bool:
         """Add a batch; return whether it began a new run."""
+        while len(self.runs) > 1 and signal.stamp_ns - self.runs[0].end_ns > self._keep_s * NANOSECONDS:
+            self.runs.popleft()
         if self.runs and self.runs[-1].continued_by(signal):
             self.lost_samples += self.runs[-1].append(signal)
             return False
