@@ -18,7 +18,7 @@ STRETCH_S = 120.0  # medians over so long are compared, and a life must have two
 GROWTH = 0.01
 HUNG_S = 60.0
 CPU_SHARE, CPU_POINTS = 0.1, 0.01  # flat: within 10 % of itself, or within 1 % of a core
-DRIFT_S = 0.3  # an emulated device that was frozen sends the last 0.25 s late, and nobody can tell how late
+DRIFT_S = 0.3  # of what a device that was frozen keeps and sends late, 0.25 s, nothing may be taken for new
 
 
 @dataclass(frozen=True)
