@@ -147,6 +147,18 @@ def test_motors_that_do_not_answer_are_let_go_too(bus):
 
 
 @needs_sdk
+def test_a_late_answer_to_an_earlier_question_is_not_taken_for_a_measurement(bus):
+    line = DynamixelBus(str(bus.port.link), LEAP)
+    line.start()
+    late, hear = [bus._status(LEAP.ids[0], bytes(1))], bus.hear  # one byte, as of its register of errors
+    bus.hear = lambda data: (late.pop() if late else b'') + hear(data)
+    assert line.read() == {}
+    assert line.missing == set()
+    assert set(line.read()) == set(LEAP.ids)
+    line.close()
+
+
+@needs_sdk
 def test_a_missing_motor_is_named_and_survived(bus):
     hand = DynamixelHand('leap', str(bus.port.link))
     hand.connect()

@@ -112,7 +112,7 @@ class DynamixelBus:
         return True
 
     def read(self) -> dict[int, Motor]:
-        """Return what all motors measure; who does not answer is moved to `missing`."""
+        """Return what all motors measure, {} if a cycle is lost; who does not answer is moved to `missing`."""
         asked = [motor for motor in self._profile.ids if motor not in self.missing]
         group = self._sdk.GroupSyncRead(self._port, self._packets, *self._block)
         for motor in asked:
@@ -124,6 +124,9 @@ class DynamixelBus:
             silent = next(motor for motor in asked if not group.data_dict[motor])
             if not self._answers(silent):
                 self.missing.add(silent)
+            return {}
+        # An answer that came too late for an earlier question is taken for one to this: it is shorter.
+        if any(len(group.data_dict[motor]) != group.data_length for motor in asked):
             return {}
         return {motor: self._measured(group, motor) for motor in asked}
 
