@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -13,26 +13,21 @@ from texture_estimation.genetic.spread import one_thread_each
 
 Act = Callable[[str], int]  # runs a benchmark by its name and returns the exit code of its process
 
-# Here accuracy counts, or real time, or time by the clock of the processor: they run side by side, one on each
-# core. How far each stands back when there are too few cores (niceness): robots and sensors do not wait for the others.
-SIDE_BY_SIDE: Mapping[str, int] = {
-    'motion': 0,
-    'robustness': 10,
-    'decisions': 10,
-    'scenes': 0,
-    'ablation': 10,
-    'load': 0,
-    'learning': 10,
-    'speed_force': 10,
-    'biotac20': 10,
-    'stick_slip': 10,
-    'next_motion': 10,
-    'sensors': 10,
-    'segmentation': 10,
-    'clock': 10,
-}
-# Each takes half as long as all others together, or longer.
-LONG = frozenset({'recipes', 'optimise_large'})
+# Here accuracy counts: they run side by side, one on each core.
+SIDE_BY_SIDE = (
+    'robustness',
+    'decisions',
+    'ablation',
+    'learning',
+    'biotac20',
+    'speed_force',
+    'next_motion',
+    'sensors',
+    'segmentation',
+    'clock',
+)
+# These take minutes and describe other things than recognition, or take a quarter of an hour and longer.
+LONG = frozenset({'recipes', 'optimise_large', 'scenes', 'load', 'motion'})
 
 
 def run_all(names: Sequence[str], act: Act) -> dict[str, int]:
@@ -69,7 +64,5 @@ def in_processes(names: Sequence[str], act: Act, at_once: int) -> dict[str, int]
 
 
 def _run(name: str, act: Act, at_once: int) -> None:
-    if at_once > 1:
-        os.nice(SIDE_BY_SIDE.get(name, 0))
     with one_thread_each() if at_once > 1 else nullcontext():
         raise SystemExit(act(name))

@@ -30,7 +30,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help='folder of the recorded data sets (DIR/biotac20); default: $TEXTURE_DATA',
     )
     parser.add_argument('--quick', action='store_true', help='fewer repetitions; not for publishing')
-    parser.add_argument('--long', action='store_true', help=f'with {ALL}: also {" and ".join(sorted(LONG))}')
+    parser.add_argument('--long', action='store_true', help=f'with {ALL}: also {", ".join(sorted(LONG))}')
     parser.add_argument(
         '--duration', type=float, default=30.0, metavar='S', help='length of the long measurement of `load`, s'
     )
