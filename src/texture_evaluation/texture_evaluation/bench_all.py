@@ -13,14 +13,14 @@ from texture_estimation.genetic.spread import one_thread_each
 
 Act = Callable[[str], int]  # runs a benchmark by its name and returns the exit code of its process
 
-# Here accuracy counts: they run side by side, one on each core.
+# Here accuracy counts: they run side by side, one on each core, the longest first.
 SIDE_BY_SIDE = (
     'robustness',
+    'speed_force',
     'decisions',
     'ablation',
     'learning',
     'biotac20',
-    'speed_force',
     'next_motion',
     'sensors',
     'segmentation',
