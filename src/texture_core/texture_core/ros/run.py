@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable, MutableMapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
@@ -15,7 +14,6 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.signals import SignalHandlerOptions
 
 from texture_core.errors import TextureError
-from texture_core.resources import folder
 from texture_core.ros.parameters import warn_of_unknown
 
 try:  # from rclpy 7.1.4 on; half the computing time per message
@@ -24,7 +22,6 @@ except ImportError:
     OneThread = SingleThreadedExecutor
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE'
 ANSWERING_S = 2.0  # the longest that callbacks may take to answer once the node is shut down
 
 
@@ -36,7 +33,6 @@ def run(
     The node's `shutdown` method, if it has one, is called before it is destroyed, while it can still publish: it joins
     threads and closes devices.
     """
-    prefer_our_profile(os.environ)
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     stopped = threading.Event()
     for number in STOP_SIGNALS:
@@ -62,11 +58,6 @@ def run(
                 executor.shutdown(ANSWERING_S)  # who waited for an answer still gets it
             node.destroy_node()
         rclpy.try_shutdown()
-
-
-def prefer_our_profile(environment: MutableMapping[str, str]) -> None:
-    """Let Fast DDS find a node soon that was killed and started again, unless the user has chosen a profile."""
-    environment.setdefault(PROFILES, str(folder('texture_core', 'config/fastdds') / 'restart.xml'))
 
 
 def _wake_on_signals(executor: Executor) -> None:
