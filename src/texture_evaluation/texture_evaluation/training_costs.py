@@ -40,12 +40,12 @@ class Cost:
 def costs(learner: str, sizes: Sequence[Size], limit_s: float, seed: int) -> Mapping[Size, Cost]:
     """Return the costs of rising sizes, up to the first that would take longer than the limit, in proportion."""
     found: dict[Size, Cost] = {}
-    predicted_s = 0.0
-    for size, larger in zip(sizes, (*sizes[1:], sizes[-1]), strict=True):
-        if predicted_s > limit_s:
+    before: Size | None = None
+    for size in sizes:
+        if before is not None and found[before].seconds * size.windows / before.windows > limit_s:
             break
         found[size] = cost(LEARNERS[learner](), size, seed)
-        predicted_s = found[size].seconds * larger.windows / size.windows
+        before = size
     return found
 
 

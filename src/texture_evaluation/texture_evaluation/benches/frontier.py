@@ -7,7 +7,7 @@ import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,6 +36,7 @@ from texture_evaluation.recipe_trials import (
     Recorded,
     comparable,
     division_by_time,
+    every,
     latency_us,
     read_recorded,
     try_recipe,
@@ -79,10 +80,7 @@ class _Job(NamedTuple):
         recipe = comparable(
             with_channels(load_recipe(self.name), 'fast'), RATE_HZ, of_motion=False, length_s=self.length_s
         )
-        if not self.overlap:
-            return recipe
-        windows = replace(recipe.feature_set.windows, hop_s=OVERLAPPING_S)
-        return replace(recipe, feature_set=replace(recipe.feature_set, windows=windows, _layouts={}))
+        return every(OVERLAPPING_S, recipe) if self.overlap else recipe
 
 
 class _Point(NamedTuple):
