@@ -133,6 +133,18 @@ def test_a_node_that_may_be_restarted_comes_back(launch) -> None:
     assert launched.end() == 0
 
 
+@pytest.mark.parametrize(('given', 'again'), [('', 'restart.xml'), ('/mine.xml', 'mine.xml')])
+def test_a_node_in_the_place_of_a_dead_one_gets_the_profile_for_restarts(launch, monkeypatch, given, again) -> None:
+    monkeypatch.setenv('FASTRTPS_DEFAULT_PROFILES_FILE', given)
+    launched = launch({'phoenix': f'echo "profile $FASTRTPS_DEFAULT_PROFILES_FILE"; {GOOD}'}, phoenix='respawn="true"')
+    profiles = []
+    for _ in range(2):
+        profiles.append(launched.wait_for('profile').split('profile')[1].strip())
+        os.kill(launched.ready(), signal.SIGKILL)
+    assert profiles[0] == given
+    assert Path(profiles[1]).name == again
+
+
 def test_a_node_that_was_started_wrongly_is_not_restarted_and_stops_the_others(launch) -> None:
     launched = launch({'good': GOOD, 'wrong': 'echo why; exit 2'}, wrong='respawn="true"')
     assert launched.end() == 1

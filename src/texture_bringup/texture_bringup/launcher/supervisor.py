@@ -6,19 +6,21 @@ import selectors
 import signal
 import tempfile
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from subprocess import Popen
 
 from texture_bringup.launcher import process
 from texture_bringup.launcher.description import NodeDescription
 from texture_bringup.launcher.output import Output
+from texture_core import resources
 
 # How nodes are asked to end: so many seconds after the wish, this signal.
 STOP = ((0.0, signal.SIGINT), (5.0, signal.SIGTERM), (8.0, signal.SIGKILL))
 STOPPING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 POLL_S = 0.1
+PROFILES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')  # where Fast DDS looks for settings
 MISTAKE = 2  # exit code of a node that was given something it cannot use, and said so
 
 
@@ -28,6 +30,15 @@ class Job:
 
     node: NodeDescription
     command: Sequence[str]
+    again: bool = False  # it has died before
+
+    @property
+    def environment(self) -> Mapping[str, str]:
+        """The environment of its process; in the place of a dead one, Fast DDS needs other settings to be heard soon."""
+        given = self.node.environment
+        if not self.again or any(given.get(name) for name in PROFILES):
+            return given
+        return {**given, PROFILES[0]: str(resources.folder('texture_bringup', 'config/fastdds') / 'restart.xml')}
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +124,7 @@ class Supervisor:
                 self._end(running)
 
     def _start(self, job: Job) -> None:
-        started = process.start(job.command, job.node.environment)
+        started = process.start(job.command, job.environment)
         # As upstream: without output="screen", what a node prints is not shown, only its log and error messages.
         printed = self._say if job.node.screen else _nowhere
         label = job.node.label
@@ -145,7 +156,7 @@ class Supervisor:
         self._failed |= returncode != 0 and not (asked_for or restart)
         self._say(f'[launch] {running.label} {process.ending(returncode)}')
         if restart:
-            self._due.append((time.monotonic() + node.respawn_delay_s, running.job))
+            self._due.append((time.monotonic() + node.respawn_delay_s, replace(running.job, again=True)))
         elif needed and not asked_for:
             self._say(f'[launch] {running.label} is needed by the others, which are stopped now')
             self.stop()
