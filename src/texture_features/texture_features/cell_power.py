@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import savgol_coeffs, savgol_filter, welch
+from scipy.signal import savgol_coeffs, savgol_filter
 
-from texture_core.arrays import Array, Samples
+from texture_core.arrays import AnyArray, Array, Samples
 
 # What follows a cubic over the time to smooth over is the load, and its leaking away, not vibration.
 SMOOTH_S, SMOOTH_ORDER = 0.05, 3
@@ -18,12 +18,6 @@ REST_QUANTILE = 0.1
 REST_OVER_QUANTILE = 1.25
 # Samples that do not change at all are no measure of the noise.
 LEAST_REST, TINY = 1e-9, 1e-300
-SPECTRUM_S = 0.25
-# What a vibration channel senses, and the powers of the speed with which the amplitude of one and the same wave of a
-# texture then grows: films that hold their charge and hydrophones feel the force, differentiating channels its change.
-# Below the corner of its high-pass a change grows as the square of the speed, above as the speed; most waves pass both.
-SENSES: Mapping[str, tuple[float, ...]] = {'force': (0.0,), 'change': (1.5,), 'either': (0.0, 0.5, 1.0, 1.5)}
-SPEEDS = np.linspace(0.0, 1.0, 41)
 
 
 def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = SMOOTH_S) -> tuple[float, Array]:
@@ -33,19 +27,28 @@ def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = S
     stands at the end of its range is NaN.
     """
     width = max(1, round(cell_s * rate_hz))
-    count, smoothed = len(fast) // width, _smoothed(rate_hz, smooth_s)
-    if len(fast) <= smoothed:
+    count = len(fast) // width
+    if len(fast) <= _smoothed(rate_hz, smooth_s):
         return width / rate_hz, np.empty((0, fast.shape[1]))
     known = np.isfinite(fast)
     lowest = np.where(known, fast, np.inf).min(axis=0)
     highest = np.where(known, fast, -np.inf).max(axis=0)
     at_end = ((fast <= lowest) | (fast >= highest))[: count * width].reshape(count, width, -1).all(axis=1)
-    vibration = _centred(fast)
-    vibration -= savgol_filter(vibration, smoothed, SMOOTH_ORDER, axis=0)
-    vibration[~known] = 0.0
-    power: Array = np.square(vibration[: count * width]).reshape(count, width, -1).mean(axis=1)
+    power: Array = (
+        np.square(vibration_of(fast, rate_hz, smooth_s)[: count * width]).reshape(count, width, -1).mean(axis=1)
+    )
     power[at_end] = np.nan
     return width / rate_hz, power
+
+
+def vibration_of(fast: Samples, rate_hz: float, smooth_s: float = SMOOTH_S) -> Samples:
+    """Return the samples without what changes over longer than `smooth_s`; 0 for what is not finite."""
+    vibration = centred(fast)
+    smoothed = _smoothed(rate_hz, smooth_s)
+    if len(fast) > smoothed:
+        vibration -= savgol_filter(vibration, smoothed, SMOOTH_ORDER, axis=0)
+    vibration[~np.isfinite(fast)] = 0.0
+    return vibration
 
 
 def rest_power(powers: Array) -> Array:
@@ -60,56 +63,33 @@ def rest_power(powers: Array) -> Array:
     return rest
 
 
-def growth(fast: Samples, rate_hz: float, rest: Array, senses: str = 'either', smooth_s: float = SMOOTH_S) -> Array:
-    """Return how the power of vibration grows with the speed, from its spectrum at steady speed.
-
-    At a share of the speed all frequencies of a texture are lower by that share, and fewer of them are vibration.
-
-    Parameters
-    ----------
-    fast : (n_samples, n_channels)
-        At steady speed.
-    rest : (n_channels,)
-        Power of each channel at rest.
-    senses
-        One of `SENSES`.
-    smooth_s
-        What changes over longer is no vibration.
-
-    Returns
-    -------
-    (n_ways, n_speeds)
-        Power at `SPEEDS`, shares of the steady speed, in that at steady speed; a row for each way it may be.
-    """
-    length = min(len(fast), max(2, round(SPECTRUM_S * rate_hz)))
-    frequency_hz, density = welch(_centred(fast), rate_hz, nperseg=length, detrend='linear', axis=0)
-    passed = _passed(frequency_hz, rate_hz, smooth_s)
-    noise = 1.0 / max(float(passed.mean()) * rate_hz / 2, TINY)  # white
-    texture = np.maximum(density / rest - noise, 0.0).sum(axis=1)
-    power = _passed(SPEEDS[:, None] * frequency_hz, rate_hz, smooth_s) @ texture
-    shares = power / power[-1] if power[-1] > 0 else SPEEDS**2
-    table: Array = SPEEDS ** (2.0 * np.array(SENSES[senses])[:, None]) * shares
-    return table
-
-
 def _smoothed(rate_hz: float, smooth_s: float) -> int:
     """Return over how many samples the smooth part is taken: odd, and enough for its order."""
     return max(2 * round(0.5 * smooth_s * rate_hz) + 1, SMOOTH_ORDER + 2)
 
 
-def _centred(fast: Samples) -> Samples:
+def centred(fast: Samples) -> Samples:
+    """Return the samples about the median of each channel; 0 for what is not finite."""
     known = np.where(np.isfinite(fast), fast, np.nan)
     some = np.isfinite(known).any(axis=0)
     middle = np.nanmedian(np.where(some, known, 0.0), axis=0)
-    centred: Samples = np.nan_to_num(known - middle)
-    return centred
+    about: Samples = np.nan_to_num(known - middle)
+    return about
 
 
-def _passed(frequency_hz: Array, rate_hz: float, smooth_s: float) -> Array:
+def passed_share(frequency_hz: AnyArray, rate_hz: float, smooth_s: float) -> Array:
     """Return the share of power at frequencies that is not taken for the smooth part."""
+    grid_hz, passed = _passed(rate_hz, smooth_s)
+    share: Array = np.interp(frequency_hz, grid_hz, passed)
+    return share
+
+
+@lru_cache(maxsize=8)
+def _passed(rate_hz: float, smooth_s: float) -> tuple[Array, Array]:
+    """Return frequencies up to half the rate, and the share of power passed at each."""
     kernel = savgol_coeffs(_smoothed(rate_hz, smooth_s), SMOOTH_ORDER)
     turns = np.arange(len(kernel)) - len(kernel) // 2
-    grid_hz = np.linspace(0.0, rate_hz / 2, 512)
+    grid_hz = np.asarray(np.linspace(0.0, rate_hz / 2, 512), dtype=np.float64)
     answer = 1.0 - np.cos(2 * np.pi * grid_hz[:, None] * turns / rate_hz) @ kernel
-    passed: Array = np.interp(frequency_hz, grid_hz, np.square(answer))
-    return passed
+    passed: Array = np.square(answer)
+    return grid_hz, passed

@@ -15,27 +15,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import percentile_filter, uniform_filter1d
-from scipy.special import gammaln
 
 from texture_core.arrays import Array, Samples
 from texture_core.errors import InvalidData
 from texture_core.parameters import param
-from texture_features.cell_power import SENSES, SMOOTH_S, SMOOTHED_CELLS, SPEEDS, TINY, cell_power, growth, rest_power
+from texture_features.cell_power import SMOOTH_S, SMOOTHED_CELLS, TINY, cell_power, rest_power
 from texture_features.contact_load import Touch, find_touches
+from texture_features.onset import SENSES, OnsetModel
 
 # Rest and sliding are told apart over 50 ms. A touch or a knock lasts a part of that, sliding most.
 SMOOTHED_PERCENTILE = 70
 KNOCK_S = 0.08
 # In a contact, its knocks left out, less is enough for longer: the mean of 0.25 s of rest scatters by some percent.
 LONG_S, LONG_ON, LONG_OFF = 0.25, 3.0, 1.5
-# How near, in cells, a slide begins to where it is seen first.
-NEAR_CELLS = 36
-# Independent values in the power of a cell, halved: at rest, and at least in a vibration that comes in bursts.
-REST_SHAPE, LEAST_SHAPE = 2.5, 0.2
-ONSETS_A_CELL = 2
-LEAST_POWER = 0.01
-# One cell in a hundred is a knock, of any power over nine decades (20 nats).
-ANYTHING = math.log(0.01 / 20)
+# How near a slide begins to where it is seen first.
+NEAR_S = 0.18
 # Levels of the vibration channels themselves, where no others tell the load.
 LEVEL_S = 0.01
 UNTOUCHED = Touch(-math.inf, -math.inf, math.inf, math.inf)
@@ -129,12 +123,12 @@ def find_sliding(
         slow, slow_rate_hz, slow_from_s = levels_of(fast, rate_hz)
     touches = _touches(slow, slow_rate_hz, slow_from_s, power, cell_s)
     known = np.where(_unchanged(len(power), cell_s, touches, params), power, np.nan)
+    model = OnsetModel(rate_hz, rest, params.ramp_s, params.senses, params.smooth_s)
     found = []
     for run in active_runs(known, cell_s, touches, params):
         touch, steady = _steady(run, touches, cell_s)
-        width = round(cell_s * rate_hz)
-        grows = growth(fast[steady.start * width : steady.stop * width], rate_hz, rest, params.senses, params.smooth_s)
-        found.append(_refined(known, cell_s, run, touch=touch, steady=steady, grows=grows, params=params))
+        vibration = _Vibration(fast, round(cell_s * rate_hz), np.isfinite(known), steady, model)
+        found.append(_refined(vibration, cell_s, run, touch, params))
     return [sliding for sliding in _joined(found) if sliding.end_s - sliding.start_s >= params.least_s]
 
 
@@ -229,72 +223,55 @@ def _steady(run: tuple[int, int], touches: Sequence[Touch], cell_s: float) -> tu
     return touch, slice(begin + quarter, end - quarter)
 
 
+@dataclass(frozen=True)
+class _Vibration:
+    """Vibration channels in cells of `width` samples, of which some are known, and some at steady speed."""
+
+    fast: Samples
+    width: int
+    known: NDArray[np.bool_]
+    steady: slice
+    model: OnsetModel
+
+    def reversed(self) -> _Vibration:
+        """Return the same from its end to its beginning."""
+        count = len(self.known)
+        return replace(
+            self,
+            fast=self.fast[: count * self.width][::-1],
+            known=self.known[::-1],
+            steady=slice(count - self.steady.stop, count - self.steady.start),
+        )
+
+    def onset_s(self, near: int) -> float:
+        """Return when the finger sets off, if it is seen to slide from the cell `near` on."""
+        width, rate_hz, before_s = self.width, self.model.rate_hz, self.model.ramp_s + NEAR_S
+        far = math.ceil(before_s * rate_hz / width)
+        begin, end = max(0, near - far), near + far
+        near_s = (near - begin) * width / rate_hz
+        from_begin_s = self.model.find(
+            self.fast[begin * width : end * width],
+            np.repeat(self.known[begin:end], width),
+            self.fast[self.steady.start * width : self.steady.stop * width],
+            (near_s - before_s, near_s + NEAR_S),
+        )
+        return begin * width / rate_hz + from_begin_s
+
+
 def _refined(
-    power: Array,
-    cell_s: float,
-    run: tuple[int, int],
-    *,
-    touch: Touch,
-    steady: slice,
-    grows: Array,
-    params: SegmentParams,
+    vibration: _Vibration, cell_s: float, run: tuple[int, int], touch: Touch, params: SegmentParams
 ) -> Sliding:
-    """Return the sliding whose power stands out in the cells of `run`; NaN in a cell of which nothing is known."""
+    """Return the sliding whose power stands out in the cells of `run`."""
     first, last = run
-    ramp = params.ramp_s / cell_s
+    known = vibration.known
     # A run may begin in the knock of the touch, of which nothing is known: it is seen first after that.
     pressed = max(first, math.floor(max(touch.pressed_s, 0.0) / cell_s))
-    near = pressed + int(np.isfinite(power[pressed:]).argmax())
-    moving_s = cell_s * _onset(power, power[steady], near, ramp, grows)
+    moving_s = vibration.onset_s(pressed + int(known[pressed:].argmax()))
     start_s = max(moving_s + params.ramp_s, touch.pressed_s, 0.0)
     if touch.falls_s < last * cell_s + params.ramp_s + params.bridge_s:
         end_s = touch.falls_s
-    elif last >= len(power):
-        end_s = len(power) * cell_s
+    elif last >= len(known):
+        end_s = len(known) * cell_s
     else:
-        end_s = (
-            cell_s * (len(power) - _onset(power[::-1], power[steady], len(power) - last, ramp, grows)) - params.ramp_s
-        )
+        end_s = len(known) * cell_s - vibration.reversed().onset_s(len(known) - last) - params.ramp_s
     return Sliding(moving_s, start_s, end_s)
-
-
-def _onset(power: Array, steady: Array, near: int, ramp: float, grows: Array) -> float:
-    """Return where the power begins to grow, in cells: the mean over what is likely.
-
-    The power of a cell is taken to be gamma distributed about 1 + level · g(t), where g rises over the ramp as the
-    power of the vibration does at growing speed. All onsets and ways to grow are equally likely beforehand.
-
-    Parameters
-    ----------
-    power : (n_cells,)
-        In that of rest; NaN if unknown.
-    steady
-        That of the cells at steady speed.
-    near
-        Where it is seen to stand out first.
-    ramp
-        Length of the growth, in cells.
-    grows : (n_ways, n_speeds)
-        See `cell_power.growth`.
-    """
-    around = math.ceil(ramp) + NEAR_CELLS
-    begin = max(0, near - around)
-    cells = power[begin : near + around]
-    known = np.isfinite(cells)
-    earliest = near - around - begin
-    onsets = np.arange(earliest * ONSETS_A_CELL, (near - begin + NEAR_CELLS) * ONSETS_A_CELL) / ONSETS_A_CELL
-    speed = np.clip((np.flatnonzero(known) + 0.5 - onsets[:, None]) / max(ramp, 1e-9), 0.0, 1.0)
-    level = max(float(np.nanmean(steady)) - 1.0, 0.5)
-    vibration = level * np.stack([np.interp(speed, SPEEDS, way) for way in grows], axis=1)
-    shape = float(np.clip(level**2 / max(float(np.nanvar(steady)), TINY), LEAST_SHAPE, REST_SHAPE))
-    fit = _gamma_fit(cells[known], 1.0 + vibration, 1.0 / REST_SHAPE + vibration**2 / shape).sum(axis=-1)
-    likely = np.exp(fit - fit.max()).sum(axis=1)
-    return begin + float(likely @ onsets / likely.sum())
-
-
-def _gamma_fit(values: Array, mean: Array, variance: Array) -> Array:
-    """Return the logarithm of the gamma density of the logarithm of powers, of which a few may be anything."""
-    shape = mean**2 / variance
-    scaled = shape * np.maximum(values, LEAST_POWER) / mean
-    fit: Array = np.logaddexp(shape * np.log(scaled) - scaled - gammaln(shape), ANYTHING)
-    return fit
