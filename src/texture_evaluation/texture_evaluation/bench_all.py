@@ -27,7 +27,9 @@ SIDE_BY_SIDE = (
     'clock',
 )
 # These take minutes and describe other things than recognition, or take a quarter of an hour and longer.
-LONG = frozenset({'recipes', 'optimise_large', 'scenes', 'load', 'motion'})
+LONG = frozenset({'recipes', 'optimise', 'optimise_large', 'scenes', 'load', 'motion'})
+# What many of them read is imported once.
+IMPORTED = ('biotac20', 'ntp21')
 
 
 def run_all(names: Sequence[str], act: Act) -> dict[str, int]:

@@ -26,7 +26,7 @@ from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.evaluate import judge
 from texture_evaluation.metrics import SlideResult
-from texture_evaluation.slides import Slide, find_slides, read_slides
+from texture_evaluation.slides import STREAMS, Slide, find_slides, read_slides
 from texture_features.feature import Feature
 from texture_features.feature_set import InputFeatures
 from texture_features.features.force import Force
@@ -104,9 +104,9 @@ Described = Mapping[Slide, Sequence[FeatureVector]]
 Division = tuple[frozenset[str], frozenset[str]]  # names of the slides learnt from, and tested on
 
 
-def read_recorded(bags: Iterable[str | Path], slides: str = '') -> list[Recorded]:
-    """Return the labelled slides of bags with all their messages."""
-    return [_recorded(slide, messages) for slide, messages in read_slides(find_slides(bags, slides))]
+def read_recorded(bags: Iterable[str | Path], streams: Sequence[str] = STREAMS) -> list[Recorded]:
+    """Return the labelled slides of bags with all messages of some streams."""
+    return [_recorded(*read) for read in read_slides(find_slides(bags), streams)]
 
 
 def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: float | None = None) -> Recipe:

@@ -18,7 +18,7 @@ from texture_evaluation.motion_made import motion_made
 
 RANGE = re.compile(r'(\d+)(?:-(\d+))?')
 Message = tuple[str, int, Any]
-SIGNALS = ('signal', 'signal_static', 'exploration')
+STREAMS = ('signal', 'signal_static')
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,15 @@ class Slide:
         return f'{self.surface}/{self.number}'
 
 
-def read_slides(slides: Sequence[Slide]) -> Iterator[tuple[Slide, list[Message]]]:
-    """Yield each slide with its (topic, log time in ns, data class) of signals and states; each bag is read once.
+def read_slides(slides: Sequence[Slide], streams: Sequence[str] = STREAMS) -> Iterator[tuple[Slide, list[Message]]]:
+    """Yield each slide with its (topic, log time in ns, data class) of streams and states; each bag is read once.
 
     Slides of one bag come in the order recorded.
     """
     for bag in dict.fromkeys(slide.bag for slide in slides):
         inside = sorted((slide for slide in slides if slide.bag == bag), key=lambda slide: slide.start_ns)
         first, last = inside[0], inside[-1]
-        messages = read_bag(bag, SIGNALS, first.namespace, first.start_ns, last.stop_ns)
+        messages = read_bag(bag, (*streams, 'exploration'), first.namespace, first.start_ns, last.stop_ns)
         yield from _share_out(messages, inside)
 
 

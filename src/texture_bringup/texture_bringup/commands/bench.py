@@ -11,7 +11,8 @@ from pathlib import Path
 from texture_bringup.commands.options import add_seed
 from texture_core.errors import InvalidData
 from texture_evaluation.bench import BENCHES, run_bench
-from texture_evaluation.bench_all import LONG, run_all
+from texture_evaluation.bench_all import IMPORTED, LONG, run_all
+from texture_evaluation.benches.imports import importing_once
 from texture_evaluation.benches.result import Bench
 
 ALL = 'all'
@@ -44,9 +45,9 @@ def run(options: argparse.Namespace) -> int:
         _run_one(options.name, bench)
         return 0
     began_s = time.monotonic()
-    codes = run_all(
-        [name for name in BENCHES if options.long or name not in LONG], partial(_run_to_exit_code, bench=bench)
-    )
+    names = [name for name in BENCHES if options.long or name not in LONG]
+    with importing_once(bench, IMPORTED) as sharing:
+        codes = run_all(names, partial(_run_to_exit_code, bench=sharing))
     failed = [name for name, code in codes.items() if code not in (0, NO_DATA)]
     without = [name for name, code in codes.items() if code == NO_DATA]
     print(f'{list(codes.values()).count(0)} benchmarks in {(time.monotonic() - began_s) / 60:.1f} min')

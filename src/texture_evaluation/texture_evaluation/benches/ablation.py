@@ -99,8 +99,7 @@ class _Tried:
 
 def run(bench: Bench) -> BenchResult:
     """Leave out one thing after the other; judge by slides held out, look at the later ones once."""
-    [source] = bench.recordings('biotac20')
-    settings = biotac20_settings(source, bench)
+    settings = biotac20_settings(bench)
     vibration, everything = settings[VIBRATION].recorded, settings[ALL_CHANNELS].recorded
     numbers = {
         VIBRATION: _figures(_vibration_cases(vibration), bench),

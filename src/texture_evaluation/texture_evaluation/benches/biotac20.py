@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from texture_estimation.recipe import load_recipe
+from texture_evaluation.benches.imports import imported
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import confusion_chart, evidence_chart
-from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.evaluate import Report, evaluate
 from texture_evaluation.metrics import curve
 from texture_evaluation.train import train_from_bags
@@ -21,9 +20,7 @@ QUICK_MATERIALS = ('material01', 'material02', 'material03')
 
 def run(bench: Bench) -> BenchResult:
     """Train on the first 30 slides of each material, test on the last 10."""
-    [source] = bench.recordings('biotac20')
-    with tempfile.TemporaryDirectory() as folder:
-        bags = import_biotac20(source, Path(folder), materials=QUICK_MATERIALS if bench.quick else ())
+    with imported(bench, 'biotac20', materials=QUICK_MATERIALS if bench.quick else ()) as bags:
         reports = {recipe: _report(recipe, bags) for recipe in RECIPES}
     return BenchResult(
         name='biotac20',

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,10 +15,10 @@ from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.model import Model
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.training import train
+from texture_evaluation.benches.imports import imported
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import line_chart
 from texture_evaluation.dataset import describe
-from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.metrics import SlideResult, decided_at
 
@@ -52,10 +51,8 @@ class _Trial:
 
 def run(bench: Bench) -> BenchResult:
     """Train on the first 30 slides of each material, decide about the last 10; leave materials out in several draws."""
-    [source] = bench.recordings('biotac20')
-    with tempfile.TemporaryDirectory() as folder:
-        slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if bench.quick else ('', ())
-        bags = import_biotac20(source, Path(folder), slides, materials)
+    slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if bench.quick else ('', ())
+    with imported(bench, 'biotac20', slides, materials) as bags:
         trials = {name: _try(load_recipe(name), bags, bench) for name in RECIPES}
     return BenchResult(
         name='decisions',

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +16,7 @@ from texture_estimation.genetic.spread import one_thread_each
 from texture_estimation.model import Model
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation import metrics, minirocket
+from texture_evaluation.benches.imports import imported
 from texture_evaluation.benches.recipes import (
     DATA,
     LAST_LEARNT,
@@ -28,7 +27,6 @@ from texture_evaluation.benches.recipes import (
 )
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import evidence_chart, line_chart
-from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.frontier_charts import early_chart, size_chart
 from texture_evaluation.recipe_trials import (
     LENGTH_S,
@@ -98,8 +96,7 @@ _Points = Mapping[str, Mapping[float, _Point]]  # by recipe and length (s) of it
 
 def run(bench: Bench) -> BenchResult:
     """Try recipes with windows of many lengths on recorded slides, and learners with trainings of many sizes."""
-    [source] = bench.recordings('biotac20')
-    recorded = _recorded(source, bench)
+    recorded = _recorded(bench)
     slides = [item.slide for item in recorded]
     divisions = division_by_time(slides, QUICK_LAST_LEARNT if bench.quick else LAST_LEARNT)
     recipes = QUICK_RECIPES if bench.quick else RECIPES
@@ -173,10 +170,10 @@ def run(bench: Bench) -> BenchResult:
     )
 
 
-def _recorded(source: Path, bench: Bench) -> list[Recorded]:
+def _recorded(bench: Bench) -> list[Recorded]:
     slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if bench.quick else ('', ())
-    with tempfile.TemporaryDirectory() as bags:
-        recorded = read_recorded(import_biotac20(source, bags, slides, materials, 'fast'))
+    with imported(bench, 'biotac20', slides, materials) as bags:
+        recorded = read_recorded(bags, ('signal',))
     return [item.at_rate('signal', RATE_HZ) for item in recorded]
 
 

@@ -13,10 +13,10 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_evaluation.benches.imports import imported
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import line_chart
 from texture_evaluation.dataset import describe
-from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.learning_trials import Course, Score, try_course
 
 RECIPE = 'default'
@@ -29,12 +29,10 @@ TARGETS = {'lesson_ms': 50.0, 'behind_training_points': 3.0}
 
 def run(bench: Bench) -> BenchResult:
     """Train on 15 materials, teach 5 more, test on later slides of all; several draws of the five."""
-    [source] = bench.recordings('biotac20')
     recipe = _recipe()
     stages, taught = (QUICK_STAGES, QUICK_TAUGHT) if bench.quick else (STAGES, TAUGHT)
-    with tempfile.TemporaryDirectory() as folder:
-        materials, slides = (QUICK_MATERIALS, QUICK_SLIDES) if bench.quick else ((), '')
-        bags = import_biotac20(source, Path(folder) / 'bags', slides, materials, channels='fast')
+    slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if bench.quick else ('', ())
+    with imported(bench, 'biotac20', slides, materials) as bags, tempfile.TemporaryDirectory() as folder:
         examples = describe(bags, replace(recipe.feature_set, windows=recipe.training_windows))
         labels, rng = np.unique(examples.labels), np.random.default_rng(bench.seed)
         draws = [rng.permutation(labels)[: 1 if bench.quick else NEW] for _ in range(1 if bench.quick else DRAWS)]

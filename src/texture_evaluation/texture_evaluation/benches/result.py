@@ -29,6 +29,8 @@ class Bench:
         Of everything random.
     duration_s
         Of the one measurement whose length may be chosen.
+    bags
+        Folder of data sets that are imported already, each in its own folder; see `imports.imported`.
     quick
         Fewer repetitions, for tests; such numbers are not for publishing.
     """
@@ -38,6 +40,7 @@ class Bench:
     seed: int = 0
     quick: bool = False
     duration_s: float = 30.0
+    bags: Path | None = None
 
     def recordings(self, name: str, *more: str) -> list[Path]:
         """Return the folders of recorded data sets, by the names of these.

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from texture_core.resources import folder
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_evaluation.benches.imports import imported
 from texture_evaluation.benches.recipes import (
     DATA,
     LAST_LEARNT,
@@ -23,7 +22,6 @@ from texture_evaluation.benches.recipes import (
     RATE_HZ,
 )
 from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.degradations import DEGRADATIONS, Degradation, breakdown
 from texture_evaluation.recipe_trials import Recorded, comparable, read_recorded
 from texture_evaluation.robustness_charts import KEPT, Curve, Panel, robustness_chart, robustness_tables
@@ -118,9 +116,9 @@ QUICK = _Size(
 
 def run(bench: Bench) -> BenchResult:
     """Train recipes on clean slides and test them on degraded ones."""
-    [source] = bench.recordings('biotac20')
     size = QUICK if bench.quick else WHOLE
-    recorded = _recorded(source, size)
+    with imported(bench, 'biotac20', size.slides, size.materials) as bags:
+        recorded = read_recorded(bags, (TOPIC,))
     recipes = [_recipe(name) for name in size.recipes]
     vibration = [item.at_rate(TOPIC, RATE_HZ) for item in recorded]
     pupils = Pupils.taught(recipes, [item for item in vibration if item.slide.number <= size.last_learnt])
@@ -135,11 +133,6 @@ def run(bench: Bench) -> BenchResult:
 
 def _some(effects: Mapping[str, Effect], size: _Size) -> list[tuple[str, Effect]]:
     return list(effects.items())[:: size.every_effect]
-
-
-def _recorded(source: Path, size: _Size) -> list[Recorded]:
-    with tempfile.TemporaryDirectory() as bags:
-        return read_recorded(import_biotac20(source, bags, size.slides, size.materials, 'fast'))
 
 
 def _recipe(name: str) -> Recipe:

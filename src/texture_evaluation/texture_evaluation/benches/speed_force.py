@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from texture_estimation.learners.svm_rbf import SvmRbf
+from texture_evaluation.benches.imports import imported
 from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.datasets.fabricslide import import_fabricslide
-from texture_evaluation.datasets.ntp21 import import_ntp21
 from texture_evaluation.held_out import Outcome
 from texture_evaluation.protocols.conditions import Conditions
 from texture_evaluation.protocols.fabricslide import COMPLETE, Fabricslide
@@ -36,16 +33,10 @@ QUICK_FABRICSLIDE: Mapping[str, Any] = {'learner': SvmRbf(folds=2, common_scale=
 
 def run(bench: Bench) -> BenchResult:
     """Leave out speeds, forces and directions of both data sets."""
-    array, pad = bench.recordings('ntp21', 'fabricslide')
-    with tempfile.TemporaryDirectory() as folder:
-        textures = import_ntp21(
-            array,
-            Path(folder) / 'ntp21',
-            QUICK_SLIDES if bench.quick else '',
-            QUICK_TEXTURES if bench.quick else (),
-        )
-        fabrics = import_fabricslide(pad, Path(folder) / 'fabricslide', QUICK_RUNS if bench.quick else '', COMPLETE)
+    slides, surfaces = (QUICK_SLIDES, QUICK_TEXTURES) if bench.quick else ('', ())
+    with imported(bench, 'ntp21', slides, surfaces) as textures:
         ntp21 = Ntp21(Conditions(whole_slides(textures, 'signal')), **(QUICK_NTP21 if bench.quick else {}))
+    with imported(bench, 'fabricslide', QUICK_RUNS if bench.quick else '', COMPLETE) as fabrics:
         fabricslide = Fabricslide(
             Conditions(whole_slides(fabrics, 'signal_static')), **(QUICK_FABRICSLIDE if bench.quick else {})
         )
