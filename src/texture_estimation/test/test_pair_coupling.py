@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from sklearn.linear_model import LogisticRegression
 
 from texture_estimation.learners.pair_coupling import PairCoupling, fit_coupling, uncalibrated
 
@@ -40,3 +41,20 @@ def test_separable_pairs_keep_finite_slopes():
     coupling = fit_coupling(decisions, codes, 3)
     assert np.isfinite(coupling.slopes).all()
     assert np.isfinite(coupling(decisions)).all()
+
+
+@pytest.mark.parametrize(
+    ('apart', 'scale', 'n_first', 'n_second'), [(1.0, 1.0, 80, 50), (0.2, 30.0, 9, 300), (2.0, 1e-3, 40, 4)]
+)
+def test_sigmoids_are_those_of_a_logistic_regression_on_softened_labels(apart, scale, n_first, n_second):
+    rng = np.random.default_rng(0)
+    codes = np.repeat([0, 1], [n_first, n_second])
+    decisions = scale * (np.where(codes == 0, apart, -apart) + rng.normal(size=len(codes)))
+    coupling = fit_coupling(decisions[:, None], codes, 2)
+    # A label that is true to 0.9 is nine tenths of a row with it, and a tenth of one without.
+    first = np.where(codes == 0, (n_first + 1) / (n_first + 2), 1 / (n_second + 2))
+    regression = LogisticRegression(C=1e12, tol=1e-10, max_iter=1000, solver='newton-cholesky')
+    values = np.tile(decisions / scale, 2)[:, None]
+    regression.fit(values, np.repeat([1, 0], len(codes)), sample_weight=np.concatenate([first, 1 - first]))
+    assert coupling.slopes[0] == pytest.approx(max(regression.coef_[0, 0] / scale, 1e-3), rel=1e-4)
+    assert coupling.offsets[0] == pytest.approx(regression.intercept_[0], rel=1e-4, abs=1e-6)
