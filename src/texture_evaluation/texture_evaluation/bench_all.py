@@ -26,8 +26,8 @@ SIDE_BY_SIDE = (
     'segmentation',
     'clock',
 )
-# These take minutes and describe other things than recognition, or take a quarter of an hour and longer.
-LONG = frozenset({'recipes', 'optimise', 'optimise_large', 'scenes', 'load', 'motion'})
+# These take minutes and describe other things than recognition, or more than ten.
+LONG = frozenset({'recipes', 'optimise', 'optimise_large', 'scenes', 'load', 'motion', 'sensors', 'stick_slip'})
 # What many of them read is imported once.
 IMPORTED = ('biotac20', 'ntp21')
 

@@ -62,7 +62,7 @@ def cut_slides(slides: Sequence[Slide], feature_set: FeatureSet) -> Iterator[tup
     ModelMismatch
         If a slide has nothing of an input.
     """
-    for slide, messages in read_slides(slides):
+    for slide, messages in read_slides(slides, feature_set.topics):
         yield slide, _cut(slide, messages, feature_set)
 
 
@@ -76,7 +76,8 @@ def _cut(slide: Slide, messages: Sequence[Message], feature_set: FeatureSet) -> 
             cutter.add_signal(topic, value)
         pieces += cutter.take()
     if cutter.waiting_for:
-        present = ', '.join(sorted({topic for topic, _, _ in messages} - {'exploration'})) or 'states'
+        [(_, everything)] = read_slides([slide])
+        present = ', '.join(sorted({topic for topic, _, _ in everything} - {'exploration'})) or 'states'
         raise ModelMismatch(
             f"slide '{slide.name}' in '{slide.bag}' has no '{cutter.waiting_for[0]}', only {present}; "
             f'the windows need {", ".join(feature_set.topics)}: use another recipe or record the missing topic'

@@ -10,6 +10,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib import import_module
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -142,7 +143,7 @@ class Setting:
 
 class _Job(NamedTuple):
     setting: str
-    recipe: str
+    recipes: tuple[str, ...]
 
 
 class _Tried(NamedTuple):
@@ -153,33 +154,39 @@ class _Tried(NamedTuple):
 
 
 def run(bench: Bench) -> BenchResult:
-    """Try all shipped recipes on all recorded data sets that are there."""
-    settings = _settings(bench)
-    numbers = _numbers(settings, bench)
+    """Try all shipped recipes, and variants of some, on all recorded data sets that are there."""
+    numbers = _numbers(_settings(bench), (*_shipped(bench), *(() if bench.quick else VARIANTS)), bench)
     bench.out.mkdir(parents=True, exist_ok=True)
     (bench.out / 'recipes.md').write_text(recipe_table(numbers), encoding='utf-8')
     return result_of('recipes', numbers, bench)
 
 
 def run_later(bench: Bench) -> BenchResult:
-    """Try them on slides of a later time and at other speeds alone: what the chart shows, in a third of the time."""
+    """Try the shipped ones on slides of a later time and at other speeds alone: their chart, in a third of the time."""
     settings = {
         name: replace(setting, splits=dict(list(setting.splits.items())[-1:]))
         for name, setting in _settings(bench).items()
     }
-    return result_of('recipes_later', _numbers(settings, bench), bench)
+    return result_of('recipes_later', _numbers(settings, _shipped(bench), bench), bench)
 
 
-def _numbers(settings: Mapping[str, Setting], bench: Bench) -> dict[str, Any]:
+def _shipped(bench: Bench) -> Sequence[str]:
+    if bench.quick:
+        return QUICK_RECIPES
+    return sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+
+
+def _numbers(settings: Mapping[str, Setting], names: Sequence[str], bench: Bench) -> dict[str, Any]:
     numbers: dict[str, Any] = {name: {split: {} for split in setting.splits} for name, setting in settings.items()}
-    for job, tried in _try_all(settings, _jobs(settings, bench), bench.seed).items():
-        setting = settings[job.setting]
-        for split, figures in tried.figures.items():
-            numbers[job.setting][split][job.recipe] = figures
-        if tried.model:
-            latency = latency_us(setting.recipe(job.recipe), tried.model, setting.recorded)
-            for figures in tried.figures.values():
-                figures['latency_us'] = latency
+    for job, tried in _try_all(settings, _jobs(settings, names, bench), bench.seed).items():
+        for name, (of_splits, model) in tried.items():
+            for split, figures in of_splits.items():
+                numbers[job.setting][split][name] = figures
+            if model:
+                setting = settings[job.setting]
+                latency = latency_us(setting.recipe(name), model, setting.recorded)
+                for figures in of_splits.values():
+                    figures['latency_us'] = latency
     return numbers
 
 
@@ -249,15 +256,20 @@ def _ntp21(bench: Bench) -> dict[str, Setting]:
     return {ARRAY: Setting(recorded, splits, rate_hz, of_motion=True)}
 
 
-def _jobs(settings: Mapping[str, Setting], bench: Bench) -> list[_Job]:
-    shipped = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
-    names = QUICK_RECIPES if bench.quick else (*shipped, *VARIANTS)
-    jobs = [_Job(name, recipe) for name in settings for recipe in names if PLACES.get(recipe, name) == name]
+def _jobs(settings: Mapping[str, Setting], names: Sequence[str], bench: Bench) -> list[_Job]:
+    """Return what is tried; recipes with the same windows and features together: they are described once."""
+    groups: dict[tuple[str, object, float], list[str]] = {}
+    for setting, name in product(settings, names):
+        if PLACES.get(name, setting) == setting:
+            features = settings[setting].recipe(name).feature_set
+            apart_s = VARIANTS.get(name, SHIPPED).apart_s
+            groups.setdefault((setting, (features.windows, features.inputs), apart_s), []).append(name)
+    jobs = [_Job(setting, tuple(group)) for (setting, *_), group in groups.items()]
     if not bench.quick and minirocket.installed() and VIBRATION in settings:
-        jobs.append(_Job(VIBRATION, MINIROCKET))
+        jobs.append(_Job(VIBRATION, (MINIROCKET,)))
     # What takes long first, so that no core waits at the end.
     trainings = {name: sum(map(len, setting.splits.values())) for name, setting in settings.items()}
-    return sorted(jobs, key=lambda job: (not SLOW.search(job.recipe), -trainings[job.setting]))
+    return sorted(jobs, key=lambda job: (not any(map(SLOW.search, job.recipes)), -trainings[job.setting]))
 
 
 _shared: dict[str, Setting] = {}
@@ -269,27 +281,31 @@ def _share(settings: Mapping[str, Setting]) -> None:
     import_module('threadpoolctl').threadpool_limits(1)  # one core each
 
 
-def _try(job: _Job, seed: int) -> _Tried:
+def _try(job: _Job, seed: int) -> dict[str, _Tried]:
     setting = _shared[job.setting]
-    if job.recipe == MINIROCKET:
-        return _Tried(
-            {name: minirocket.try_minirocket(setting.recorded, divisions, seed)
-             for name, divisions in setting.splits.items()},
-            None,
-        )  # fmt: skip
-    recipe = setting.recipe(job.recipe)
-    apart_s = VARIANTS.get(job.recipe, SHIPPED).apart_s
-    lessons = describe_all(every(apart_s, recipe), setting.recorded) if apart_s < LENGTH_S else None
-    described = describe_all(recipe, setting.recorded)
-    outcomes = {
-        split: try_described(recipe, described, divisions, lessons, apart_s)
-        for split, divisions in setting.splits.items()
-    }
-    *_, last = outcomes.values()
-    return _Tried({split: outcome.numbers() for split, outcome in outcomes.items()}, last.model)
+    if job.recipes == (MINIROCKET,):
+        figures = {
+            name: minirocket.try_minirocket(setting.recorded, divisions, seed)
+            for name, divisions in setting.splits.items()
+        }
+        return {MINIROCKET: _Tried(figures, None)}
+    recipes = {name: setting.recipe(name) for name in job.recipes}
+    first = recipes[job.recipes[0]]
+    apart_s = VARIANTS.get(job.recipes[0], SHIPPED).apart_s
+    lessons = describe_all(every(apart_s, first), setting.recorded) if apart_s < LENGTH_S else None
+    described = describe_all(first, setting.recorded)
+    tried = {}
+    for name, recipe in recipes.items():
+        outcomes = {
+            split: try_described(recipe, described, divisions, lessons, apart_s)
+            for split, divisions in setting.splits.items()
+        }
+        *_, last = outcomes.values()
+        tried[name] = _Tried({split: outcome.numbers() for split, outcome in outcomes.items()}, last.model)
+    return tried
 
 
-def _try_all(settings: Mapping[str, Setting], jobs: Sequence[_Job], seed: int) -> dict[_Job, _Tried]:
+def _try_all(settings: Mapping[str, Setting], jobs: Sequence[_Job], seed: int) -> dict[_Job, dict[str, _Tried]]:
     context = multiprocessing.get_context('fork')
     with ProcessPoolExecutor(os.cpu_count(), context, _share, (settings,)) as pool:
         return dict(zip(jobs, pool.map(partial(_try, seed=seed), jobs), strict=True))
