@@ -34,7 +34,7 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
-    'recipes_later': recipes.run_later,  # the same on slides of a later time and at other speeds alone
+    'recipes_later': recipes.run_later,  # the same on the vibration of slides of a later time alone
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
     'ablation': ablation.run,  # which features, numbers, units and channels are worth their time, recorded
     'decisions': decisions.run,  # early decisions, calibration, candidates and unknown surfaces, recorded
