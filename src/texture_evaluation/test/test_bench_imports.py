@@ -56,3 +56,25 @@ def test_what_is_missing_is_told_by_the_benchmark_that_needs_it(asked, tmp_path:
         ):
             pass
     assert asked == []
+
+
+def test_a_damaged_data_set_stops_no_benchmark_but_those_that_need_it(asked, monkeypatch, tmp_path: Path) -> None:
+    good = imports.IMPORTS['felt']
+
+    def damaged(source: Path, out: Path, *_: object) -> list[Path]:
+        (Path(out) / 'half').mkdir(parents=True)
+        raise InvalidData('it is no file of this data set')
+
+    monkeypatch.setattr(imports, 'IMPORTS', {'cork': damaged, 'felt': good})
+    (tmp_path / 'cork').mkdir()
+    with importing_once(Bench(tmp_path, tmp_path), ('cork', 'felt')) as bench:
+        with imported(bench, 'felt') as bags:
+            assert len(bags) == 2
+        with pytest.raises(InvalidData, match='no file of this data set'), imported(bench, 'cork'):
+            pass
+
+
+def test_a_quick_run_imports_its_parts_alone(asked, tmp_path: Path) -> None:
+    with importing_once(Bench(tmp_path, tmp_path, quick=True), ('felt',)):
+        pass
+    assert asked == []

@@ -26,7 +26,7 @@ SIDE_BY_SIDE = (
     'segmentation',
     'clock',
 )
-# These take minutes and describe other things than recognition, or more than ten.
+# These take half a minute or more for other things than recognition, or ten and more for it.
 LONG = frozenset({'recipes', 'optimise', 'optimise_large', 'scenes', 'load', 'motion', 'sensors', 'stick_slip'})
 # What many of them read is imported once.
 IMPORTED = ('biotac20', 'ntp21')

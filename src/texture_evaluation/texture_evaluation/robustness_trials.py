@@ -17,6 +17,7 @@ from texture_estimation.recipe import Recipe
 from texture_estimation.training import train
 from texture_evaluation.degradations import Degradation
 from texture_evaluation.recipe_trials import Recorded, describe, describe_all, examples_of
+from texture_features.feature_set import FeatureSet
 
 TOPIC = 'signal'
 AT_ONCE = 512  # windows judged together: many for speed, few enough for the memory
@@ -82,9 +83,9 @@ def _changed(run: TactileSignal, degradation: Degradation, strength: float, rng:
 
 def _sharing(recipes: Mapping[str, Recipe]) -> list[list[Recipe]]:
     """Return the recipes that have the same windows and features together."""
-    groups: dict[object, list[Recipe]] = {}
+    groups: dict[FeatureSet, list[Recipe]] = {}
     for recipe in recipes.values():
-        groups.setdefault((recipe.feature_set.windows, recipe.feature_set.inputs), []).append(recipe)
+        groups.setdefault(recipe.feature_set, []).append(recipe)
     return list(groups.values())
 
 

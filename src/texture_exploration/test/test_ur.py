@@ -204,7 +204,8 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(bench, rec
     assert speed_m_s == pytest.approx(0.02, rel=0.02)
     assert np.all(np.abs(forces_n - 2.0) <= 0.1)
     assert places_m[-1] - places_m[0] == pytest.approx(0.05, abs=0.001)
-    assert -0.001 < end.position[2] - home[2] < 0.004  # in a pause of the machine it goes on being lifted
+    # In a pause of the machine, of which steps too late tell, it goes on being lifted.
+    assert -0.001 < end.position[2] - home[2] < (0.004 if explorer.counts['late_steps'] else 0.001)
     assert abs(end.force_n) < 0.2
     assert counts['refused'] == 0
 

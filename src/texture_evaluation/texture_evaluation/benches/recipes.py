@@ -40,6 +40,7 @@ from texture_evaluation.recipe_trials import (
     try_described,
 )
 from texture_evaluation.train import with_channels
+from texture_features.feature_set import FeatureSet
 
 VIBRATION, ALL_CHANNELS, ARRAY = 'biotac20, PAC at 1 kHz', 'biotac20, all channels', 'ntp21'
 DATA = {
@@ -257,12 +258,11 @@ def _ntp21(bench: Bench) -> dict[str, Setting]:
 
 def _jobs(settings: Mapping[str, Setting], names: Sequence[str], bench: Bench) -> list[_Job]:
     """Return what is tried; recipes with the same windows and features together: they are described once."""
-    groups: dict[tuple[str, object, float], list[str]] = {}
+    groups: dict[tuple[str, FeatureSet, float], list[str]] = {}
     for setting, name in product(settings, names):
         if PLACES.get(name, setting) == setting:
-            features = settings[setting].recipe(name).feature_set
             apart_s = VARIANTS.get(name, SHIPPED).apart_s
-            groups.setdefault((setting, (features.windows, features.inputs), apart_s), []).append(name)
+            groups.setdefault((setting, settings[setting].recipe(name).feature_set, apart_s), []).append(name)
     jobs = [_Job(setting, tuple(group)) for (setting, *_), group in groups.items()]
     if not bench.quick and minirocket.installed() and VIBRATION in settings:
         jobs.append(_Job(VIBRATION, (MINIROCKET,)))
