@@ -4,7 +4,7 @@ from pathlib import Path
 from socket import gethostname
 
 import pytest
-from aiohttp import WSMsgType
+from aiohttp import ClientSession, WSMsgType
 from aiohttp.test_utils import TestClient, TestServer
 
 from texture_bringup.dashboard.access import Access
@@ -126,6 +126,33 @@ def test_the_web_socket_sends_the_newest_frame_and_is_closed_to_other_pages() ->
         assert answer.status == 403
 
     with_client(story)
+
+
+def test_a_page_that_opens_is_not_sent_a_frame_of_before() -> None:
+    async def story(client, _nodes):
+        client.app[VIEWERS].show('{"number": 1}')
+        async with client.ws_connect('/ws') as socket:
+            client.app[VIEWERS].show('{"number": 2}')
+            assert await socket.receive_json() == {'number': 2}
+
+    with_client(story)
+
+
+def test_whether_anybody_looks_is_known_so_that_no_frames_are_made_for_nobody() -> None:
+    serving = Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', 0)
+
+    async def look():
+        async with ClientSession() as session, session.ws_connect(f'http://127.0.0.1:{serving.port}/ws') as socket:
+            while not serving.watched:
+                await asyncio.sleep(0.01)
+            serving.show('{}')
+            assert await socket.receive_json() == {}
+
+    try:
+        assert not serving.watched
+        asyncio.run(asyncio.wait_for(look(), DEADLINE_S))
+    finally:
+        serving.close()
 
 
 def test_an_oversized_message_closes_its_own_socket_alone() -> None:

@@ -72,6 +72,11 @@ class Feed:
         if estimate.exploration_id == self._roughness.exploration_id or not self._roughness.exploration_id:
             self._roughness = estimate
 
+    @property
+    def exploring(self) -> bool:
+        """Whether an exploration is going on, whose frames are kept."""
+        return bool(self._state.exploration_id) and self._state.phase not in ENDED
+
     def frame(self, time_s: float) -> str:
         """Return everything the page shows at a time of the monotonic clock, s, and keep it for replay."""
         frame = {
@@ -83,8 +88,7 @@ class Feed:
             'roughness': {name: _plain(value) for name, value in asdict(self._roughness).items()},
         }
         text = json.dumps(frame, allow_nan=False)
-        going_on = self._state.exploration_id and self._state.phase not in ENDED
-        if going_on:
+        if self.exploring:
             self.history.add(self._state.exploration_id, {}, text)
         rest = {'lights': self.lights.shown(time_s), 'past': self.history.listed(), 'recording': self.recording}
         return f'{text[:-1]}, {json.dumps(rest)[1:]}'

@@ -61,23 +61,22 @@ class Viewers:
 
     def __init__(self) -> None:
         self._frame = ''
-        self._number = 0
+        self.number = 0
         self._news = asyncio.Event()
         self.sockets: set[web.WebSocketResponse] = set()
 
     def show(self, frame: str) -> None:
         """Replace the frame; called in the loop of the server."""
-        self._frame, self._number = frame, self._number + 1
+        self._frame, self.number = frame, self.number + 1
         self._news.set()
         self._news = asyncio.Event()
 
-    async def send_to(self, socket: web.WebSocketResponse) -> None:
-        """Send the newest frame, again and again, until the socket closes."""
-        sent = 0
+    async def send_to(self, socket: web.WebSocketResponse, sent: int) -> None:
+        """Send the newest frame after number `sent`, again and again, until the socket closes."""
         while not socket.closed:
-            if sent == self._number:
+            if sent == self.number:
                 await self._news.wait()
-            sent = self._number
+            sent = self.number
             await socket.send_str(self._frame)
 
 
@@ -138,10 +137,11 @@ def _watch(viewers: Viewers) -> Handler:
     async def watch(request: web.Request) -> web.StreamResponse:
         if len(viewers.sockets) >= MOST_VIEWERS:
             return _said(503, f'{MOST_VIEWERS} pages are open already; close one')
+        before = viewers.number  # old by now, as no frames are made while nobody looks
         socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MOST_MESSAGE_BYTES, timeout=CLOSING_S)
         await socket.prepare(request)
         viewers.sockets.add(socket)
-        sending = asyncio.create_task(viewers.send_to(socket))
+        sending = asyncio.create_task(viewers.send_to(socket, before))
         try:
             async for _ in socket:  # a page says nothing; this notices when it goes
                 pass

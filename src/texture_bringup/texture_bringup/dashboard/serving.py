@@ -38,6 +38,11 @@ class Serving:
                 f"the dashboard cannot listen on '{host}' port {port}: {error.strerror or error}; choose another port"
             ) from error
 
+    @property
+    def watched(self) -> bool:
+        """Whether a page is open."""
+        return bool(self._app[VIEWERS].sockets)
+
     def show(self, frame: str) -> None:
         """Give a frame to all viewers; never waits for them."""
         self._loop.call_soon_threadsafe(self._app[VIEWERS].show, frame)

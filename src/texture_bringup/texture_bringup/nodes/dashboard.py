@@ -172,7 +172,8 @@ class Dashboard(Node):
     def _show(self) -> None:
         self._recorder.watch()
         self._feed.recording = self._recorder.bag
-        self._serving.show(self._feed.frame(time.monotonic()))
+        if self._serving.watched or self._feed.exploring:
+            self._serving.show(self._feed.frame(time.monotonic()))
 
     def _report(self) -> Report:
         trouble = self._recorder.trouble
