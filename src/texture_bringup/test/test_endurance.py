@@ -3,6 +3,7 @@
 import json
 import math
 import os
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -14,7 +15,7 @@ from texture_bringup.endurance.faults import FAULTS, strikes
 from texture_bringup.endurance.orders import orders
 from texture_bringup.endurance.processes import Processes
 from texture_bringup.endurance.record import Explored, Record, Struck
-from texture_bringup.endurance.usage import Use, read_use
+from texture_bringup.endurance.usage import Pace, Use, measure_pace, read_use
 from texture_bringup.endurance.verdict import judge, lives, unexplained_vectors
 
 HOUR_S = 3600
@@ -37,7 +38,8 @@ def explored(**changed):
 def record(**changed):
     given = {
         'begin_s': 0.0, 'end_s': float(HOUR_S), 'seed': 0, 'explored': [explored()], 'struck': [], 'uses': uses(),
-        'totals': {}, 'signal': SignalBook(), 'vectors': 10, 'unanswered': {}, 'said': [], 'ends': [], 'trouble': '',
+        'paces': [], 'totals': {}, 'signal': SignalBook(), 'vectors': 10, 'unanswered': {}, 'said': [], 'ends': [],
+        'trouble': '',
     }  # fmt: skip
     return Record(**{**given, **changed})
 
@@ -124,6 +126,19 @@ def test_what_does_not_hold_is_named(changed, asked) -> None:
 def test_computing_time_that_rises_is_seen() -> None:
     rising = [Use(use.time_s, 'bench', 1, MIB, MIB, 1e-4 * use.time_s**2, 8, 20) for use in uses()]
     assert failed(uses=rising) == ['computing time is flat']
+
+
+def test_a_machine_that_grows_slower_is_not_taken_for_computing_time_that_rises() -> None:
+    slower = [Pace(use.time_s, 0.01 + 2e-6 * use.time_s) for use in uses()]
+    work_s = np.cumsum([0.2 * 10 * pace.work_s / 0.01 for pace in slower])
+    same_work = [replace(use, cpu_s=float(s)) for use, s in zip(uses(), work_s, strict=True)]
+    assert failed(uses=same_work) == ['computing time is flat']
+    assert failed(uses=same_work, paces=slower) == []
+    assert failed(paces=[replace(pace, work_s=1e-4 / pace.work_s) for pace in slower]) == ['computing time is flat']
+
+
+def test_the_fixed_piece_of_work_takes_some_milliseconds_of_this_thread() -> None:
+    assert 1e-4 < measure_pace(0.0).work_s < 1.0
 
 
 def test_samples_that_nobody_counted_are_seen() -> None:

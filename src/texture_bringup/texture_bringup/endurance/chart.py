@@ -9,6 +9,7 @@ import numpy as np
 
 from texture_bringup.endurance.record import ABORTED, LOST, REFUSED, SUCCESS, Record
 from texture_bringup.endurance.verdict import by_process, cpu_shares
+from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 
 MIB = 2**20
@@ -48,11 +49,19 @@ def _memory(axes: Any, record: Record, colours: dict[str, str]) -> None:
 
 def _computing(axes: Any, record: Record, colours: dict[str, str]) -> None:
     for node, (times_s, shares) in cpu_shares(record.uses).items():
-        width = min(SMOOTHED, len(shares))
-        smooth = np.convolve(shares, np.full(width, 1 / width), mode='valid')
-        axes.plot((times_s[width - 1 :] - record.begin_s) / 60, 100 * smooth, color=colours.get(node), label=node)
+        axes.plot(*_means(record, times_s, 100 * shares), color=colours.get(node), label=node)
+    if record.paces:
+        times_s, works_s = np.array([(pace.time_s, pace.work_s) for pace in record.paces]).T
+        lines = axes.plot(*_means(record, times_s, 1e3 * works_s), color='grey', linestyle=':', label='same work (ms)')
+        axes.legend(handles=lines, loc='center left', bbox_to_anchor=(1.0, 0.5))
     axes.set(ylabel='computing time (% of a core)', title='2. Computing time of each node, means of a minute')
     axes.set_ylim(bottom=0)
+
+
+def _means(record: Record, times_s: Array, values: Array) -> tuple[Array, Array]:
+    """Return minutes and means of a minute."""
+    width = min(SMOOTHED, len(values))
+    return (times_s[width - 1 :] - record.begin_s) / 60, np.convolve(values, np.full(width, 1 / width), mode='valid')
 
 
 def _endings(axes: Any, record: Record) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from texture_bringup.endurance.books import SignalBook
-from texture_bringup.endurance.usage import Use
+from texture_bringup.endurance.usage import Pace, Use
 
 SUCCESS, ABORTED, REFUSED, LOST = 'success', 'aborted', 'refused', 'lost'
 # A fault may still be felt for so long: connections are made anew, queues are emptied.
@@ -105,8 +105,8 @@ class Record:
         When it began and ended (monotonic clock).
     seed
         Of orders and faults.
-    explored, struck, uses
-        What was explored, what struck, and what processes used, in the order of time.
+    explored, struck, uses, paces
+        What was explored, what struck, what processes used, and how quick the machine was, in the order of time.
     totals
         Sum of each counter on /diagnostics over all lives of each node.
     signal
@@ -127,6 +127,7 @@ class Record:
     explored: Sequence[Explored]
     struck: Sequence[Struck]
     uses: Sequence[Use]
+    paces: Sequence[Pace]
     totals: Mapping[str, Mapping[str, int]]
     signal: SignalBook
     vectors: int

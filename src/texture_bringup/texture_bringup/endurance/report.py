@@ -15,7 +15,7 @@ import numpy as np
 
 from texture_bringup.endurance.chart import draw
 from texture_bringup.endurance.record import Record
-from texture_bringup.endurance.verdict import Verdict, cpu_change, judge, lives
+from texture_bringup.endurance.verdict import Verdict, cpu_change, judge, lives, work_change
 from texture_evaluation.benches.result import machine
 
 MIB = 2**20
@@ -51,6 +51,7 @@ def as_json(record: Record, verdicts: Sequence[Verdict]) -> dict[str, Any]:
             {**asdict(life), 'growth': life.growth, 'own_growth': life.own_growth} for life in lives(record.uses)
         ],
         'cpu_share_early_late': dict(cpu_change(record)),
+        'fixed_work_s_early_late': work_change(record),
         'counters': record.totals,
         'signal': {
             'samples': record.signal.samples,
@@ -72,6 +73,7 @@ def events_as_json(record: Record) -> dict[str, Any]:
         'explorations': [_since(record, asdict(item)) for item in record.explored],
         'faults': [_since(record, asdict(item)) for item in record.struck],
         'usage': [_since(record, asdict(item)) for item in record.uses],
+        'pace': [_since(record, asdict(item)) for item in record.paces],
     }
 
 
@@ -127,6 +129,8 @@ def as_page(record: Record, verdicts: Sequence[Verdict]) -> list[str]:
         ),
         '',
         '## Computing time',
+        '',
+        'At the median speed of the machine in the run, told by a fixed piece of work.',
         '',
         *_table(
             ('node', 'first third after warm-up (% of a core)', 'last third'),

@@ -28,7 +28,7 @@ from texture_bringup.endurance.record import (
     Record,
     in_force,
 )
-from texture_bringup.endurance.usage import Use, read_use
+from texture_bringup.endurance.usage import Pace, Use, measure_pace, read_use
 from texture_bringup.launcher.child import ChildLauncher
 from texture_bringup.ros.operator import Operator
 from texture_bringup.ros.striker import Striker
@@ -50,10 +50,11 @@ SLIDES = SlidePlan(slides=5, speed_m_s=0.08, force_n=1.5, slide_s=1.0)
 
 
 class Looks:
-    """Look at what the processes use from time to time, in a thread of its own; use it in a `with` block."""
+    """Look from time to time at what the processes use and how quick the machine is; use it in a `with` block."""
 
     def __init__(self, processes: Processes) -> None:
         self.uses: list[Use] = []
+        self.paces: list[Pace] = []
         self._processes = processes
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='looks', daemon=True)
@@ -72,6 +73,7 @@ class Looks:
                 use = read_use(node, pid, time.monotonic())
                 if use is not None:
                     self.uses.append(use)
+            self.paces.append(measure_pace(time.monotonic()))
 
 
 class Day:
@@ -202,6 +204,7 @@ def endure(plan: Plan, log: Path, say: Callable[[str], None], faults: Iterable[S
         explored=[replace(item, faults=in_force(struck, item.begin_s, item.end_s)) for item in day.explored],
         struck=struck,
         uses=looks.uses,
+        paces=looks.paces,
         totals={node: totals.sums for node, totals in watcher.totals.items()},
         signal=watcher.signal,
         vectors=sum(watcher.ledger.vectors.values()),

@@ -87,16 +87,29 @@ def cpu_shares(uses: Sequence[Use]) -> Mapping[str, tuple[Array, Array]]:
 
 
 def cpu_change(record: Record) -> Mapping[str, tuple[float, float]]:
-    """Return of each node the median share of a core in the first and in the last third after the warm-up."""
+    """Return of each node the median share of a core in the first and in the last third after the warm-up.
+
+    Both as they would be had the machine been as quick as in its median of the run (`work_change`).
+    """
+    works_s, usual_s = work_change(record), float(np.median([pace.work_s for pace in record.paces] or [1.0]))
+    early_s, late_s = works_s or (usual_s, usual_s)
+    changes = {node: _early_and_late(record, *shares) for node, shares in cpu_shares(record.uses).items()}
+    return {node: (pair[0] * usual_s / early_s, pair[1] * usual_s / late_s) for node, pair in changes.items() if pair}
+
+
+def work_change(record: Record) -> tuple[float, float] | None:
+    """Return how long the fixed piece of work took in the first and in the last third after the warm-up, s, medians."""
+    paces = np.array([(pace.time_s, pace.work_s) for pace in record.paces]).reshape(-1, 2)
+    return _early_and_late(record, paces[:, 0], paces[:, 1])
+
+
+def _early_and_late(record: Record, times_s: Array, values: Array) -> tuple[float, float] | None:
+    """Return the medians in the first and in the last third after the warm-up; None if one of them has no values."""
     begin_s = min(record.begin_s + WARM_UP_S, (record.begin_s + record.end_s) / 2)
     third_s = (record.end_s - begin_s) / 3
-    found = {}
-    for node, (times_s, shares) in cpu_shares(record.uses).items():
-        first = shares[(times_s >= begin_s) & (times_s < begin_s + third_s)]
-        last = shares[times_s >= record.end_s - third_s]
-        if len(first) and len(last):
-            found[node] = float(np.median(first)), float(np.median(last))
-    return found
+    early = values[(times_s >= begin_s) & (times_s < begin_s + third_s)]
+    late = values[times_s >= record.end_s - third_s]
+    return (float(np.median(early)), float(np.median(late))) if len(early) and len(late) else None
 
 
 def unrecorded_samples(record: Record) -> int:
@@ -175,6 +188,10 @@ def _cpu_is_flat(record: Record) -> Verdict:
     steep = [n for n, (a, b) in changes.items() if b - a > max(CPU_POINTS, CPU_SHARE * a)]
     all_first, all_last = (sum(pair[i] for pair in changes.values()) for i in (0, 1))
     seen = f'all together {all_first:.1%} of a core early, {all_last:.1%} late; rose: {", ".join(steep) or "none"}'
+    works_s = work_change(record)
+    if works_s:
+        early_ms, late_ms = (1e3 * work_s for work_s in works_s)
+        seen += f'; the same work took {early_ms:.1f} ms early, {late_ms:.1f} ms late, which is accounted for'
     return Verdict('computing time is flat', seen, not steep)
 
 
