@@ -154,6 +154,12 @@ def test_an_abort_during_a_fault_and_one_that_was_asked_for_are_explained() -> N
     assert failed(explored=[explored(ending='aborted', message='why', wanted='aborted')]) == []
 
 
+def test_vectors_that_the_classifier_counted_as_lost_are_no_secret() -> None:
+    lost = {'unanswered': {'a': 2}, 'explored': [explored(exploration_id='a', faults=('feature_extractor killed',))]}
+    assert failed(**lost, totals={'classifier': {'lost_vectors': 1}}) == ['every feature vector is answered or counted']
+    assert failed(**lost, totals={'classifier': {'lost_vectors': 2}}) == []
+
+
 def test_vectors_that_a_killed_classifier_did_not_answer_are_explained() -> None:
     killed = explored(exploration_id='a', faults=('classifier killed',))
     assert unexplained_vectors(record(unanswered={'a': 3}, explored=[killed])) == 0

@@ -25,7 +25,7 @@ EXAMPLES = [
         STAMP, 'a/b', ('x', 'y'), 'Pa', 2200.0, 2**40, np.array([[1.5, math.nan], [-3e-20, 7]], np.float32), 'tip'
     ),
     ExplorationState(STAMP, 'e-1', 'linear_slide', Phase.SLIDE, 0.1, 0.05, 1.0, math.pi / 4, 0.5, 'felt'),
-    FeatureVector(STAMP, 'e-1', 0.5, 0.1, ('a', 'b'), np.array([0.1, math.nan]), 0.05, 1.0, 'f', False, 3),
+    FeatureVector(STAMP, 'e-1', 0.5, 0.1, ('a', 'b'), np.array([0.1, math.nan]), 0.05, 1.0, 'f', False, 3, 12),
     FeatureVector(STAMP, 'e-1', 0.0, 0.1, last=True),
     TextureEstimate(
         STAMP, 'e-1', 'felt', True, 0.9, ('felt', 'wool'), (0.9, 0.1), True, ('felt',), 4, 0.8, True, 1e-4, 'm', 'ok'

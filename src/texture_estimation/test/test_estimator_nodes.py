@@ -137,6 +137,18 @@ def test_broken_messages_are_counted_and_survived(graph, case):
     assert bench.report()[2]['broken_messages'] == 1
 
 
+def test_vectors_that_do_not_come_are_counted_and_a_new_extractor_begins_anew(graph, case):
+    kind, path, vectors = case
+    bench = Bench(graph, kind, path)
+    numbered = [dataclasses.replace(vector, number=7 + k) for k, vector in enumerate(vectors)]
+    bench.ask(numbered)
+    assert (bench.report()[0], bench.report()[2]['lost_vectors']) == ('OK', 0)
+    bench.ask([dataclasses.replace(vectors[-1], number=9 + len(vectors))])  # two of the same extractor are missing
+    assert (bench.report()[0], bench.report()[2]['lost_vectors']) == ('WARN', 2)
+    bench.ask([dataclasses.replace(vectors[-1], number=1)])  # and the first of another one
+    assert bench.report()[2]['lost_vectors'] == 3
+
+
 def test_a_wrong_model_at_the_start_is_an_error(graph, case, tmp_path):
     with pytest.raises(ModelMismatch, match='cannot be read'):
         Bench(graph, case[0], tmp_path / 'none.skops')

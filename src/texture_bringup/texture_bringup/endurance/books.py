@@ -12,7 +12,7 @@ COUNTERS: Mapping[str, tuple[str, ...]] = {
     'bench': ('samples', 'skipped samples', 'bytes nobody took', 'refused datagrams'),
     'sensor': ('samples', 'lost', 'bogus', 'refused_bytes', 'damaged_stamps', 'reopened', 'revived', 'clock_steps'),
     'feature_extractor': ('windows', 'skipped', 'lost_samples', 'restarts', 'old_states', 'broken_messages'),
-    'classifier': ('estimates', 'refused_vectors', 'not_finite_vectors', 'broken_messages'),
+    'classifier': ('estimates', 'refused_vectors', 'not_finite_vectors', 'lost_vectors', 'broken_messages'),
     'explorer': ('done', 'aborted', 'refused', 'late_steps'),
 }
 

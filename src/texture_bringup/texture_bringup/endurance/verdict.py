@@ -205,9 +205,13 @@ def _samples_are_accounted_for(record: Record) -> Verdict:
 
 
 def _vectors_are_answered(record: Record) -> Verdict:
-    missing = sum(record.unanswered.values())
-    seen = f'{missing} of {record.vectors} without an estimate, {unexplained_vectors(record)} while the classifier ran'
-    return Verdict('every feature vector is answered', seen, not unexplained_vectors(record))
+    missing, unexplained = sum(record.unanswered.values()), unexplained_vectors(record)
+    counted = record.totals.get('classifier', {}).get('lost_vectors', 0)
+    seen = (
+        f'{missing} of {record.vectors} without an estimate, {unexplained} while the classifier ran, which counted '
+        f'{counted} as lost'
+    )
+    return Verdict('every feature vector is answered or counted', seen, unexplained <= counted)
 
 
 CHECKS: Sequence[Callable[[Record], Verdict]] = (

@@ -33,6 +33,8 @@ class EstimatorNode(Node):
         on_change(self, self.params, self._change)
         self._estimates = 0
         self._broken = 0
+        self._lost = 0
+        self._next_number: int | None = None
         self._reported = 0
         self._processing_s = 0.0
         self._publisher = self.create_publisher(*self.estimate, ESTIMATE_QOS)
@@ -57,6 +59,7 @@ class EstimatorNode(Node):
 
     def _on_features(self, message: msg.FeatureVector) -> None:
         began = time.perf_counter()
+        self._count_lost(message.number)
         try:
             vector = from_msg(message)
         except TextureError as error:
@@ -70,6 +73,12 @@ class EstimatorNode(Node):
         self._publisher.publish(to_msg(dataclasses.replace(estimate, processing_s=self._processing_s)))
         self._estimates += 1
 
+    def _count_lost(self, number: int) -> None:
+        """Count the vectors that did not come: their numbers run on, and begin anew with another extractor."""
+        if self._next_number is not None:
+            self._lost += number - (self._next_number if number >= self._next_number else 0)
+        self._next_number = number + 1
+
     def _change(self, params: Any) -> None:
         try:
             self._evidence = self._load(params.model)
@@ -78,7 +87,7 @@ class EstimatorNode(Node):
 
     def _report(self) -> Report:
         model = self._evidence.model
-        faults = {**self._faults(), 'broken_messages': self._broken}
+        faults = {**self._faults(), 'broken_messages': self._broken, 'lost_vectors': self._lost}
         numbers = {
             'model': model.name if model else '',
             'estimates': self._estimates,

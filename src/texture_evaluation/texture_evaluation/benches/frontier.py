@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +25,7 @@ from texture_evaluation.benches.recipes import (
 )
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import evidence_chart, line_chart
+from texture_evaluation.forked import each_on_a_core
 from texture_evaluation.frontier_charts import early_chart, size_chart
 from texture_evaluation.recipe_trials import (
     LENGTH_S,
@@ -177,14 +176,8 @@ def _recorded(bench: Bench) -> list[Recorded]:
     return [item.at_rate('signal', RATE_HZ) for item in recorded]
 
 
-_shared: list[tuple[Sequence[Recorded], Sequence[Division]]] = []
-
-
-def _try(job: _Job) -> _Point:
-    """Train and test on one core."""
-    recorded, divisions = _shared[0]
-    with one_thread_each():
-        outcome = try_recipe(job.recipe(), recorded, divisions)
+def _try(recorded: Sequence[Recorded], divisions: Sequence[Division], job: _Job) -> _Point:
+    outcome = try_recipe(job.recipe(), recorded, divisions)
     results = outcome.results
     early = metrics.decided_at(results, CONFIDENCES)
     return _Point(outcome.model, outcome.numbers(), metrics.curve(results), early, metrics.early_decision(results))
@@ -192,10 +185,7 @@ def _try(job: _Job) -> _Point:
 
 def _try_all(jobs: Sequence[_Job], recorded: Sequence[Recorded], divisions: Sequence[Division]) -> dict[_Job, _Point]:
     """Return what comes of each job, one on each core; the computing time of windows is taken alone, at the end."""
-    context = multiprocessing.get_context('fork')  # so workers have the slides: nothing is copied
-    _shared[:] = [(recorded, divisions)]
-    with ProcessPoolExecutor(len(os.sched_getaffinity(0)), context) as pool:
-        tried = dict(zip(jobs, pool.map(_try, jobs), strict=True))
+    tried = dict(zip(jobs, each_on_a_core(partial(_try, recorded, divisions), jobs), strict=True))
     with one_thread_each():
         for job, point in tried.items():
             point.figures['latency_us'] = latency_us(job.recipe(), point.model, recorded)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from importlib import import_module
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +20,7 @@ from texture_evaluation import minirocket
 from texture_evaluation.benches.imports import imported
 from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import front_chart
+from texture_evaluation.forked import each_on_a_core
 from texture_evaluation.recipe_table import recipe_table
 from texture_evaluation.recipe_trials import (
     LENGTH_S,
@@ -178,7 +175,8 @@ def _shipped(bench: Bench) -> Sequence[str]:
 
 def _numbers(settings: Mapping[str, Setting], names: Sequence[str], bench: Bench) -> dict[str, Any]:
     numbers: dict[str, Any] = {name: {split: {} for split in setting.splits} for name, setting in settings.items()}
-    for job, tried in _try_all(settings, _jobs(settings, names, bench), bench.seed).items():
+    jobs = _jobs(settings, names, bench)
+    for job, tried in zip(jobs, each_on_a_core(partial(_try, settings, bench.seed), jobs), strict=True):
         for name, (of_splits, model) in tried.items():
             for split, figures in of_splits.items():
                 numbers[job.setting][split][name] = figures
@@ -271,17 +269,8 @@ def _jobs(settings: Mapping[str, Setting], names: Sequence[str], bench: Bench) -
     return sorted(jobs, key=lambda job: (not any(map(SLOW.search, job.recipes)), -trainings[job.setting]))
 
 
-_shared: dict[str, Setting] = {}
-
-
-def _share(settings: Mapping[str, Setting]) -> None:
-    """Keep the settings in a worker, which has them by being forked: nothing is copied."""
-    _shared.update(settings)
-    import_module('threadpoolctl').threadpool_limits(1)  # one core each
-
-
-def _try(job: _Job, seed: int) -> dict[str, _Tried]:
-    setting = _shared[job.setting]
+def _try(settings: Mapping[str, Setting], seed: int, job: _Job) -> dict[str, _Tried]:
+    setting = settings[job.setting]
     if job.recipes == (MINIROCKET,):
         figures = {
             name: minirocket.try_minirocket(setting.recorded, divisions, seed)
@@ -302,12 +291,6 @@ def _try(job: _Job, seed: int) -> dict[str, _Tried]:
         *_, last = outcomes.values()
         tried[name] = _Tried({split: outcome.numbers() for split, outcome in outcomes.items()}, last.model)
     return tried
-
-
-def _try_all(settings: Mapping[str, Setting], jobs: Sequence[_Job], seed: int) -> dict[_Job, dict[str, _Tried]]:
-    context = multiprocessing.get_context('fork')
-    with ProcessPoolExecutor(os.cpu_count(), context, _share, (settings,)) as pool:
-        return dict(zip(jobs, pool.map(partial(_try, seed=seed), jobs), strict=True))
 
 
 def _note(bench: Bench) -> str:

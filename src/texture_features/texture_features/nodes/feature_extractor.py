@@ -40,6 +40,7 @@ class FeatureExtractor(Node):
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.topics)
         self._broken = 0
         self._reported = 0
+        self._sent = 0
         self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         for topic in self._feature_set.topics:
@@ -67,7 +68,10 @@ class FeatureExtractor(Node):
 
     def _publish(self, pieces: list[Piece]) -> None:
         for piece in pieces:
-            self._publisher.publish(to_msg(self._feature_set.describe(piece)))
+            vector = to_msg(self._feature_set.describe(piece))
+            vector.number = self._sent
+            self._publisher.publish(vector)
+            self._sent += 1
 
     def _report(self) -> Report:
         numbers = {**self._cutter.counts, 'broken_messages': self._broken}
