@@ -1,7 +1,9 @@
 """The sensor on a pseudo-terminal fed with packets made by hand."""
 
+import fcntl
 import os
 import struct
+import termios
 import time
 import tty
 from collections.abc import Iterator
@@ -43,11 +45,19 @@ class Wire:
         except BlockingIOError:
             return b''
 
-    def say(self, stamp_ms: int, dynamic: int, image: list[int] | None = None, more: bytes = b'') -> None:
+    def say(self, stamp_ms: int, dynamic: int, image: list[int] | None = None, more: bytes = b'') -> int:
+        """Send a packet, and return how many bytes it has."""
         items = b'\x70' + struct.pack('>Q', stamp_ms) + b'\x20' + struct.pack('>h', dynamic) + more
         if image:
             items += b'\x10' + struct.pack(f'>{len(image)}H', *image)
-        os.write(self.device, bytes([0x9A, 0, 0x58, len(items)]) + items)
+        return os.write(self.device, bytes([0x9A, 0, 0x58, len(items)]) + items)
+
+    def wait_until_there(self, count: int) -> None:
+        """Wait until so many bytes can be read: the kernel carries them over in its own time."""
+        deadline_s = time.monotonic() + DEADLINE_S
+        while struct.unpack('i', fcntl.ioctl(self.host, termios.FIONREAD, bytes(4)))[0] < count:
+            assert time.monotonic() < deadline_s
+            time.sleep(0.001)
 
 
 class Clock:
@@ -96,14 +106,14 @@ class Feeder:
         image: list[int] | None = None,
         more: bytes = b'',
     ) -> None:
-        sent = 0
         for first in range(0, milliseconds, 10):
+            said = 0
             for ms in range(first, min(first + 10, milliseconds)):
                 if ms not in missing:
-                    self.wire.say(self.stamp_ms, ms % 1000, image, more)
-                    sent += 1
+                    said += self.wire.say(self.stamp_ms, ms % 1000, image, more)
                 self.stamp_ms += 1
                 self.clock.now_ns += NANOSECONDS // 1000
+            self.wire.wait_until_there(said)
             self.read()
 
     def read(self) -> None:
