@@ -33,7 +33,7 @@ def benches(monkeypatch: pytest.MonkeyPatch) -> dict:
 def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(benches, tmp_path: Path, capfd) -> None:
     assert set(LONG) > {'recipes'}
     for more, count in (([], 1), (['--long'], 2)):
-        assert main(['bench', 'all', '--out', str(tmp_path), *more]) == 0
+        assert main(['bench', 'all', '--out', str(tmp_path), '--data', str(tmp_path), *more]) == 0
         said = capfd.readouterr().out
         assert f'{count} benchmarks in ' in said
         assert "missing: left out: no recorded data in 'no folder'" in said
@@ -43,7 +43,7 @@ def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(
 def test_all_go_on_when_one_fails_and_the_command_ends_with_1(benches, tmp_path: Path, capfd) -> None:
     benches['clock'] = bad
     benches['last'] = good
-    assert main(['bench', 'all', '--out', str(tmp_path)]) == 1
+    assert main(['bench', 'all', '--out', str(tmp_path), '--data', str(tmp_path)]) == 1
     said = capfd.readouterr()
     assert '2 benchmarks in ' in said.out
     assert 'failed: clock' in said.out
