@@ -4,7 +4,7 @@ from pathlib import Path
 from socket import gethostname
 
 import pytest
-from aiohttp import ClientSession, WSMsgType
+from aiohttp import ClientSession, WSMsgType, web
 from aiohttp.test_utils import TestClient, TestServer
 
 from texture_bringup.dashboard.access import Access
@@ -112,6 +112,16 @@ def test_a_request_that_is_too_large_broken_or_of_another_page_is_refused_and_re
 ) -> None:
     async def story(client, nodes):
         assert (await post(client, body=body, **headers))[0] == status
+        assert nodes.asked == []
+
+    with_client(story)
+
+
+def test_a_refusal_holds_though_a_response_counts_as_false_as_in_older_aiohttp(monkeypatch) -> None:
+    monkeypatch.setattr(web.StreamResponse, '__bool__', lambda _self: False, raising=False)
+
+    async def story(client, nodes):
+        assert (await post(client, Origin='http://evil.example'))[0] == 403
         assert nodes.asked == []
 
     with_client(story)

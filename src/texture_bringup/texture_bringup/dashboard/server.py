@@ -104,7 +104,9 @@ def _guard(access: Access) -> Any:
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
         try:
-            response = _refusal(access, request) or await handler(request)
+            refusal = _refusal(access, request)
+            # Not `or`: to Ubuntu's aiohttp, 3.9, a response in which nothing was stored is false.
+            response = await handler(request) if refusal is None else refusal
         except web.HTTPException as error:
             error.headers.update(HEADERS)
             raise
