@@ -13,9 +13,10 @@ from texture_bringup.endurance import report
 from texture_bringup.endurance.books import SignalBook, Totals
 from texture_bringup.endurance.faults import FAULTS, strikes
 from texture_bringup.endurance.orders import orders
+from texture_bringup.endurance.pace import Pace, measure_pace
 from texture_bringup.endurance.processes import Processes
 from texture_bringup.endurance.record import Explored, Record, Struck
-from texture_bringup.endurance.usage import Pace, Use, measure_pace, read_use
+from texture_bringup.endurance.usage import Use, read_use
 from texture_bringup.endurance.verdict import judge, lives, unexplained_vectors
 
 HOUR_S = 3600

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from texture_bringup.endurance.books import SignalBook
-from texture_bringup.endurance.usage import Pace, Use
+from texture_bringup.endurance.pace import Pace
+from texture_bringup.endurance.usage import Use
 
 SUCCESS, ABORTED, REFUSED, LOST = 'success', 'aborted', 'refused', 'lost'
 # A fault may still be felt for so long: connections are made anew, queues are emptied.

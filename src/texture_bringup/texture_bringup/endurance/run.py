@@ -17,6 +17,7 @@ import numpy as np
 from texture_bringup.demo.isolation import Isolation, isolate
 from texture_bringup.endurance.faults import Strike, strikes
 from texture_bringup.endurance.orders import Order, orders
+from texture_bringup.endurance.pace import Pace, measure_pace
 from texture_bringup.endurance.processes import Processes
 from texture_bringup.endurance.record import (
     ABORTED,
@@ -28,7 +29,7 @@ from texture_bringup.endurance.record import (
     Record,
     in_force,
 )
-from texture_bringup.endurance.usage import Pace, Use, measure_pace, read_use
+from texture_bringup.endurance.usage import Use, read_use
 from texture_bringup.launcher.child import ChildLauncher
 from texture_bringup.ros.operator import Operator
 from texture_bringup.ros.striker import Striker
