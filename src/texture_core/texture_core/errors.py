@@ -33,6 +33,10 @@ class DeviceError(TextureError):
     """A device that cannot be reached or does not answer."""
 
 
+class CommandRefused(DeviceError):
+    """A command that an arm or a hand does not carry out: not finite, too fast, or too hard."""
+
+
 class MotionRefused(TextureError):
     """A motion that is unknown, unsafe or impossible now."""
 

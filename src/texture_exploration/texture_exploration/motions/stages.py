@@ -115,7 +115,7 @@ class Settle(Stage):
         """Nothing has settled yet."""
         super().begin(time_ns, arm)
         self._outside_ns = time_ns
-        self._first_n = min(arm.force_n, self._force_n)
+        self._first_n = max(0.0, min(arm.force_n, self._force_n))
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Hold the force."""

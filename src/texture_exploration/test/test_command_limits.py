@@ -1,0 +1,56 @@
+"""The limits of a single command, which hold for whoever commands an arm."""
+
+import math
+
+import pytest
+
+from texture_core.errors import CommandRefused, DeviceError
+from texture_exploration.arms.command_limits import CommandLimits
+from texture_exploration.arms.protocol import ArmCommand
+
+LIMITS = CommandLimits()
+REFUSED = {
+    'speed that is not a number': ArmCommand(tangential_m_s=(math.nan, 0.0)),
+    'endless speed': ArmCommand(tangential_m_s=(0.0, -math.inf)),
+    'fast': ArmCommand(tangential_m_s=(5.0, 0.0)),
+    'fast by both axes together': ArmCommand(tangential_m_s=(0.8, 0.8)),
+    'fast away': ArmCommand(normal_m_s=5.0),
+    'fast towards the surface': ArmCommand(normal_m_s=-5.0),
+    'normal speed that is not a number': ArmCommand(normal_m_s=math.nan),
+    'hidden by a force': ArmCommand(normal_m_s=math.nan, force_n=1.0),
+    'force that is not a number': ArmCommand(force_n=math.nan),
+    'endless force': ArmCommand(force_n=math.inf),
+    'negative force': ArmCommand(force_n=-1.0),
+    'hard': ArmCommand(force_n=60.0),
+}
+
+
+@pytest.mark.parametrize('name', REFUSED)
+def test_a_command_out_of_range_is_refused_after_the_arm_was_stopped(name):
+    stops = []
+    with pytest.raises(CommandRefused, match=r'was refused and the arm stopped: the .* is .*; allowed is .* to '):
+        LIMITS.check(REFUSED[name], lambda: stops.append('stop'))
+    assert stops == ['stop']
+
+
+def test_the_sentence_tells_what_came_and_what_is_allowed():
+    with pytest.raises(CommandRefused, match=r'the speed along the normal is -5 m/s; allowed is -0\.5 to 0\.5 m/s$'):
+        LIMITS.check(ArmCommand(normal_m_s=-5.0))
+
+
+@pytest.mark.parametrize(
+    'command',
+    [
+        ArmCommand(),
+        ArmCommand(tangential_m_s=(0.6, 0.8)),
+        ArmCommand(normal_m_s=-0.5),
+        ArmCommand((0.25, 0.0), force_n=50.0),
+        ArmCommand(force_n=0.0),
+    ],
+)
+def test_a_command_within_the_limits_passes_and_stops_nothing(command):
+    LIMITS.check(command, lambda: pytest.fail('the arm was stopped'))
+
+
+def test_whoever_handles_errors_of_devices_handles_a_refused_command():
+    assert issubclass(CommandRefused, DeviceError)
