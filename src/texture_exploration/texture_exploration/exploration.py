@@ -153,7 +153,9 @@ class Exploration:
             self.outcome, step = Outcome(False, NOT_SEEN_SLIDING, False), replace(step, phase=Phase.ABORTED)
         elif step.phase in ENDED:
             self.outcome = Outcome(step.phase is Phase.DONE, self._motion.message, self._slid)
-        if step.phase is self.state.phase and now_ns < self._next_state_ns:
+        # A promise that is withdrawn is told at once: until then windows may be cut on it.
+        as_before = step.phase is self.state.phase and (step.steady_s > 0) is (self.state.steady_s > 0)
+        if as_before and now_ns < self._next_state_ns:
             return
         self._next_state_ns = now_ns + STATE_PERIOD_NS - STATE_SLACK_NS
         vx, vy, _ = arm.velocity

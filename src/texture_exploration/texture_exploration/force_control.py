@@ -54,7 +54,7 @@ class ForceLoopParams:
         """Return the gain for a contact, m/s/N: below the border by the margin."""
         return border_gain(self.loop(stiffness_n_m, period_s)) / self.gain_margin
 
-    def check(self, period_s: float) -> None:
+    def check_gain(self, period_s: float) -> None:
         """Refuse a gain that is not stable on the stiffest contact.
 
         Raises
@@ -134,7 +134,7 @@ class ForceLoop:
     """
 
     def __init__(self, params: ForceLoopParams, period_s: float) -> None:
-        params.check(period_s)
+        params.check_gain(period_s)
         self._params = params
         self._period_s = period_s
         self.stiffness = StiffnessEstimate()

@@ -76,7 +76,7 @@ def slide_trial(
         while now_ns + ARM_PERIOD_NS <= due_ns:
             now_ns += ARM_PERIOD_NS
             moving.step(ARM_PERIOD_NS * 1e-9)
-        log.append((exploration.state.phase, moving.state()))
+        log.append((exploration.state.phase, replace(moving.state(), force_n=moving.true_force_n)))
 
     outcome = exploration.run(pace)
     moving.close()

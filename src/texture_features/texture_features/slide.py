@@ -29,6 +29,9 @@ class Span:
 class Slide:
     """The covered time of consecutive `slide` states, handed out window by window.
 
+    A state that promises nothing after others that did withdraws their promise: neither what is left of it nor the
+    time up to the next state is covered, as the finger has lost the surface or turns.
+
     All it says depends on the order of the states alone, never on when they arrived: the mean speed and force of a
     window are those of the shortest beginning of the states that covers it.
 
@@ -52,6 +55,8 @@ class Slide:
         self._intervals: deque[list[int]] = deque()
         # stamp, end of the covered time known with this state, speed, force
         self._states: deque[tuple[int, int, float, float]] = deque(maxlen=MAX_STATES)
+        self._promising = False
+        self._withdrawn = False
         self.add(state)
 
     def add(self, state: ExplorationState) -> bool:
@@ -62,8 +67,12 @@ class Slide:
             before = self._states[-1][0]
             if stamp < before:
                 return False
-            start = before if stamp - before <= LINK_NS else stamp
+            start = before if stamp - before <= LINK_NS and not self._withdrawn else stamp
+        self._promising |= state.steady_s > 0
         self._cover(start, stamp + _promise_ns(state.steady_s))
+        self._withdrawn = self._promising and not state.steady_s > 0
+        if self._withdrawn:
+            self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
         self._states.append((stamp, self._intervals[-1][1], state.speed_m_s, state.force_n))
         return True
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -57,6 +58,17 @@ class Arm(Protocol):
 
     def stop(self) -> None:
         """Stand still and hold the position, whatever the arm was doing; may be called from any thread."""
+
+
+class ForceReading(enum.Enum):
+    """What the measured force of an arm does by itself; decides what counts as a frozen reading.
+
+    An arm says it by an attribute `force_reading`; one that has none counts as `CONTROLLED`, which asks least.
+    """
+
+    NOISY = enum.auto()  # never twice the same to the last bit: a force sensor finer than its noise
+    MEASURED = enum.auto()  # may stay the same, but not while the finger moves along the normal in contact
+    CONTROLLED = enum.auto()  # the arm may keep it the same while it follows a surface: motor currents, own force mode
 
 
 @runtime_checkable

@@ -8,10 +8,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from texture_core.errors import DeviceError
 from texture_core.finger import FingerSender, FingerState
 from texture_core.parameters import param
-from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+from texture_exploration.arms.command_limits import CommandLimits
+from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading, Vector
 from texture_exploration.arms.simulated_surface import SimulatedSurface, SimulatedSurfaceParams
 from texture_exploration.arms.velocity_only import VelocityOnly
 from texture_exploration.force_control import ForceLoopParams
@@ -19,16 +22,28 @@ from texture_exploration.force_control import ForceLoopParams
 RATE_HZ = 250.0
 RESTING_PERIOD_S = 0.05  # a finger at rest is still reported, but costs next to nothing
 STANDSTILL = ArmCommand()
+STEEPEST = 1.0  # slope that the arm's own force mode follows
 
 
 @dataclass(frozen=True)
-class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams):
+class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams, CommandLimits):
     """The simulated arm and the surface under it."""
 
     force_mode: bool = param(
         True, 'The arm controls forces itself, ideally; false: it knows velocities alone, and follows late.'
     )
 
+    undeclared_lag_s: float = param(
+        0.0,
+        "Lag of an arm without force mode beyond 'loop_delay_s', which nobody told it.",
+        unit='s',
+        low=0.0,
+        high=0.2,
+    )
+    force_noise_n: float = param(
+        0.001, 'Standard deviation of the measured force of an arm without force mode.', unit='N', low=0.0, high=1.0
+    )
+    seed: int = param(1, 'Seed of the noise.', low=0)
     stiffness_n_m: float = param(2000.0, 'Stiffness of finger and surface; 0: there is none.', unit='N/m', low=0.0)
     admittance_m_s_n: float = param(
         0.01, "Normal speed per force error of the arm's own force mode.", unit='m/s/N', low=1e-4, high=1.0
@@ -74,17 +89,28 @@ class SimulatedArm:
         self._frozen = False
         self._fault = ''
         self._push_n = 0.0
+        self._true_n = 0.0
+        self._stuck_n: float | None = None  # what a frozen force sensor shows
+        self._drift_n = self._drift_n_s = 0.0
+        self._noise_n = 0.0 if params.force_mode else params.force_noise_n
+        self._rng = np.random.default_rng(params.seed)
+        self.force_reading = _force_reading(params)
         self._wake = threading.Event()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._bench = FingerSender(params.finger_port)
         self._surface = SimulatedSurface(params, params.stiffness_n_m)
-        self._slow = None if params.force_mode else VelocityOnly(params, 1 / RATE_HZ, clock())
+        self._slow = (
+            None
+            if params.force_mode
+            else VelocityOnly(params, 1 / RATE_HZ, clock(), params.loop_delay_s + params.undeclared_lag_s)
+        )
 
     def connect(self) -> None:
         """Start to move in time; clears what was injected."""
         self.close()
         self._frozen, self._fault, self._push_n = False, '', 0.0
+        self._stuck_n, self._drift_n, self._drift_n_s = None, 0.0, 0.0
         self._closing.clear()
         self.step(0.0)
         if self._own_thread:
@@ -109,6 +135,7 @@ class SimulatedArm:
         """Follow a command from the next step on."""
         if self._closing.is_set():
             raise DeviceError('the simulated arm is not connected; connect it first')
+        self._params.check(command, self.stop)
         was_resting = self._resting
         self._order = (command, self._clock())
         if was_resting:
@@ -131,6 +158,19 @@ class SimulatedArm:
         """Add a force as if somebody pushed the finger, until connected again."""
         self._push_n = force_n
 
+    def freeze_force(self) -> None:
+        """Behave like an arm whose force sensor hangs: it shows the same force, until connected again."""
+        self._stuck_n = self._state.force_n
+
+    def drift_force(self, rate_n_s: float) -> None:
+        """Let the measured force depart from the true one at a constant rate, N/s, until connected again."""
+        self._drift_n_s = rate_n_s
+
+    @property
+    def true_force_n(self) -> float:
+        """How hard the finger really presses, whatever the force sensor shows."""
+        return self._true_n
+
     def shove(self, way_m: Vector) -> None:
         """Move as if somebody shoved the finger."""
         x, y, z = (at + way for at, way in zip(self._state.position, way_m, strict=True))
@@ -152,15 +192,23 @@ class SimulatedArm:
             velocity = (0.0, 0.0, 0.0)
             command = STANDSTILL
             self._order = (STANDSTILL, now_ns)
-        force_n = self._surface.force_n(x, z) + self._push_n
-        self._state = ArmState(now_ns, (x, y, z), velocity, force_n, self._fault)
+        self._true_n = self._surface.force_n(x, z) + self._push_n
+        self._state = ArmState(now_ns, (x, y, z), velocity, self._measured_n(dt_s), self._fault)
         if self._slow:
             self._slow.ask(command, self._state, dt_s)
-        self._bench.send(FingerState(now_ns, x, y, z, *velocity, force_n))
+        self._bench.send(FingerState(now_ns, x, y, z, *velocity, self._true_n))
 
     @property
     def _resting(self) -> bool:
         return self._order[0] == STANDSTILL
+
+    def _measured_n(self, dt_s: float) -> float:
+        """Return what the force sensor shows of the true force."""
+        if self._stuck_n is not None:
+            return self._stuck_n
+        self._drift_n += self._drift_n_s * dt_s
+        noise_n = self._noise_n * self._rng.standard_normal() if self._noise_n else 0.0
+        return self._true_n + self._drift_n + noise_n
 
     def _moved_m(self, command: ArmCommand, dt_s: float) -> Vector:
         vx, vy = command.tangential_m_s
@@ -178,8 +226,10 @@ class SimulatedArm:
         decay_s = admittance * self._params.stiffness_n_m
         effective_s = -math.expm1(-decay_s * dt_s) / decay_s if decay_s > 0 else dt_s
         x = self._state.position[0]
-        rise = self._surface.height_m(x + command.tangential_m_s[0] * dt_s) - self._surface.height_m(x)
-        follow = rise if self._state.force_n > 0 else 0.0
+        way = command.tangential_m_s[0] * dt_s
+        rise = self._surface.height_m(x + way) - self._surface.height_m(x)
+        # A step is met or lost, not followed.
+        follow = rise if self._state.force_n > 0 and abs(rise) <= STEEPEST * abs(way) else 0.0
         return admittance * (self._state.force_n - command.force_n) * effective_s + follow
 
     def _run(self) -> None:
@@ -202,3 +252,9 @@ def _speed(moved_m: Vector, dt_s: float) -> Vector:
         return 0.0, 0.0, 0.0
     x, y, z = (way / dt_s for way in moved_m)
     return x, y, z
+
+
+def _force_reading(params: SimulatedArmParams) -> ForceReading:
+    if params.force_mode:
+        return ForceReading.CONTROLLED
+    return ForceReading.NOISY if params.force_noise_n else ForceReading.MEASURED

@@ -22,11 +22,13 @@ class VelocityOnly:
         How often it asks.
     now_ns
         The time.
+    delay_s
+        After which a velocity really comes into effect; the loop is only told that of `params`.
     """
 
-    def __init__(self, params: ForceLoopParams, period_s: float, now_ns: int) -> None:
+    def __init__(self, params: ForceLoopParams, period_s: float, now_ns: int, delay_s: float) -> None:
         self._loop = ForceLoop(params, period_s)
-        self._late = DelayedVelocity(params.loop_delay_s, now_ns)
+        self._late = DelayedVelocity(delay_s, now_ns)
         self._way_m = 0.0
 
     def moved_m(self, now_ns: int) -> Vector:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from texture_core.exploration import ExplorationRequest
 from texture_exploration.arms.protocol import Vector
+from texture_exploration.motions.contact import ContactWatch
 from texture_exploration.motions.path import Follower
 from texture_exploration.motions.staged_motion import StagedMotion
-from texture_exploration.motions.stages import Accelerate, Approach, Brake, GoHome, Lift, Settle, Slide
+from texture_exploration.motions.stages import Accelerate, Approach, Brake, GoHome, Halt, Lift, Settle, Slide, Stage
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -16,14 +17,24 @@ def slide_over(
 ) -> StagedMotion:
     """Return the motion along a path, for a request whose speed and force are filled in and checked."""
     speed, force = request.speed_m_s, request.force_n
-    slide = Slide(follower, speed, force, limits)
+    contact = ContactWatch(force, touch)
+    slide = Slide(follower, speed, force, touch, limits, contact=contact)
+
+    def come_down() -> list[Stage]:
+        return [
+            Approach(force, touch, limits),
+            Settle(force, touch, limits),
+            Accelerate(follower, speed, force, touch, limits, contact=contact),
+        ]
+
+    def seek() -> list[Stage]:
+        return [Halt(follower, speed, touch, limits), *come_down()]
+
     stages = [
         GoHome(home, touch, limits),
-        Approach(force, touch, limits),
-        Settle(force, touch, limits),
-        Accelerate(follower, speed, force, touch, limits),
+        *come_down(),
         slide,
-        Brake(follower, speed, force, touch, limits),
+        Brake(follower, speed, force, touch, limits, contact=contact),
         Lift(home, touch, limits),
     ]
-    return StagedMotion(stages, slide)
+    return StagedMotion(stages, slide, seek if touch.seek_lost_contact else None)

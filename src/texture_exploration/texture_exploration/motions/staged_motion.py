@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from texture_core.errors import MotionAborted
 from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState
+from texture_exploration.motions.contact import ContactLost
 from texture_exploration.motions.protocol import MotionStep
 from texture_exploration.motions.stages import Slide, Stage
+
+SEEKS = 3  # a surface that is lost more often is not one to slide on
 
 
 class StagedMotion:
@@ -20,12 +23,19 @@ class StagedMotion:
         In their order; the last one lifts.
     slide
         The one among them that slides.
+    seek
+        Returns new stages that bring the finger back to the surface and to its speed after the contact was lost while
+        it moved along; without it a lost contact aborts.
     """
 
-    def __init__(self, stages: Sequence[Stage], slide: Slide) -> None:
+    def __init__(
+        self, stages: Sequence[Stage], slide: Slide, seek: Callable[[], Sequence[Stage]] | None = None
+    ) -> None:
         self._ahead = list(stages)
         self._lift = stages[-1]
         self._slide = slide
+        self._seek = seek
+        self._seeks = 0
         self._stage: Stage | None = None
         self._phase = Phase.IDLE
         self._abort_reason = ''
@@ -82,6 +92,18 @@ class StagedMotion:
                     f'waited {stage.timeout_s:.1f} s for {stage.goal}; the force is {arm.force_n:.2f} N'
                 )
         except MotionAborted as trouble:
-            self.abort(str(trouble))
+            if not self._sought(trouble, stage):
+                self.abort(str(trouble))
             return None
         return command
+
+    def _sought(self, trouble: MotionAborted, stage: Stage) -> bool:
+        """Put the stages ahead that bring a lost contact back; return whether there are any."""
+        if self._seek is None or self._seeks >= SEEKS or not isinstance(trouble, ContactLost):
+            return False
+        if stage.phase is Phase.LIFT:  # the slide is over
+            return False
+        self._seeks += 1
+        again = [stage] if stage is self._slide else []
+        self._stage, self._ahead = None, [*self._seek(), *again, *self._ahead]
+        return True

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 from texture_core.errors import MotionAborted
 from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
+from texture_exploration.motions.contact import ContactLost, ContactWatch
 from texture_exploration.motions.path import STEADY_S, Follower, smooth
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
@@ -131,7 +133,14 @@ class Accelerate(Stage):
     """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
 
     def __init__(
-        self, follower: Follower, speed_m_s: float, force_n: float, touch: TouchParams, limits: SafetyLimits
+        self,
+        follower: Follower,
+        speed_m_s: float,
+        force_n: float,
+        touch: TouchParams,
+        limits: SafetyLimits,
+        *,
+        contact: ContactWatch,
     ) -> None:
         self._ramp_s = touch.ramp_s(speed_m_s)
         super().__init__(
@@ -143,10 +152,17 @@ class Accelerate(Stage):
         self._speed_m_s = speed_m_s
         self._force_n = force_n
         self._touch = touch
+        self._contact = contact
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """The force has settled: the finger touches."""
+        super().begin(time_ns, arm)
+        self._contact.restart()
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp, then wait for the arm to follow."""
         self._follower.update(time_ns, arm)
+        self._contact.update(arm)
         elapsed_s = self.elapsed_s(time_ns)
         if elapsed_s >= self._ramp_s + STEADY_S and self._reached(arm):
             return None
@@ -163,15 +179,29 @@ class Accelerate(Stage):
 class Slide(Stage):
     """Keep speed and force for the length of the path."""
 
-    def __init__(self, follower: Follower, speed_m_s: float, force_n: float, limits: SafetyLimits) -> None:
+    def __init__(
+        self,
+        follower: Follower,
+        speed_m_s: float,
+        force_n: float,
+        touch: TouchParams,
+        limits: SafetyLimits,
+        *,
+        contact: ContactWatch,
+    ) -> None:
         planned_s = follower.length_m / speed_m_s
         super().__init__(Phase.SLIDE, planned_s + limits.slide_overtime_s, 'the slide to end')
         self._follower = follower
         self._speed_m_s = speed_m_s
         self._force_n = force_n
-        self._start_m = 0.0
+        self._contact = contact
+        # A slide begins within twice the tolerance, so a smaller share would refuse what was let in.
+        self._mean_share = max(touch.mean_force_share, 2 * touch.force_tolerance)
+        self._start_m: float | None = None
         self._promised_ns = 0
         self._finish = False
+        self._force_sum_n = 0.0
+        self._steps = 0
         self.progress = 0.0
 
     @property
@@ -180,27 +210,34 @@ class Slide(Stage):
         return self._follower.direction_rad
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
-        """The slide counts from here."""
+        """The slide counts from here, also if it goes on later after the contact was lost."""
         super().begin(time_ns, arm)
-        self._start_m = self._follower.travelled_m
+        if self._start_m is None:
+            self._start_m = self._follower.travelled_m
 
     def finish(self) -> None:
         """End as soon as what was promised is kept."""
         self._finish = True
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Keep on sliding, and promise how long."""
+        """Keep on sliding, and promise how long: nothing while the finger does not touch."""
         self._follower.update(time_ns, arm)
+        self.steady_s = 0.0
+        self._contact.update(arm)
+        self._force_sum_n += arm.force_n
+        self._steps += 1
         left_s = self._left_s(time_ns, arm)
         # Anything shorter than a microsecond is rounding, not sliding.
         if left_s < 1e-6:
-            self.steady_s = 0.0
+            self._check_mean_force()
             return None
-        self.steady_s = min(PROMISE_S, left_s, self._follower.steady_m / self._speed_m_s)
-        self._promised_ns = max(self._promised_ns, time_ns + int(self.steady_s * 1e9))
+        if self._contact.touching:
+            self.steady_s = min(PROMISE_S, left_s, self._follower.steady_m / self._speed_m_s)
+            self._promised_ns = max(self._promised_ns, time_ns + int(self.steady_s * 1e9))
         return ArmCommand(self._follower.velocity(self._speed_m_s), force_n=self._force_n)
 
     def _left_s(self, time_ns: int, arm: ArmState) -> float:
+        assert self._start_m is not None
         age_s = max(0.0, (time_ns - arm.time_ns) * 1e-9)
         slid_m = self._follower.travelled_m - self._start_m + self._speed_m_s * age_s
         length_m = self._follower.length_m
@@ -208,26 +245,81 @@ class Slide(Stage):
         by_length = (length_m - slid_m) / self._speed_m_s
         return min(by_length, (self._promised_ns - time_ns) * 1e-9) if self._finish else by_length
 
+    def _check_mean_force(self) -> None:
+        mean_n = self._force_sum_n / self._steps
+        if not abs(mean_n - self._force_n) <= self._mean_share * self._force_n:
+            raise MotionAborted(
+                f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_share:.0%} off the '
+                f'{self._force_n:g} N that were asked for; slide more slowly, or check the force control of the arm'
+            )
+
 
 class Brake(Stage):
-    """Lose speed smoothly along the path, still pressing: a finger that lifts at speed is plucked off."""
+    """Lose speed smoothly along the path, still pressing: a finger that lifts at speed is plucked off.
+
+    The slide itself is over: a surface that ends here costs nothing, and the finger only keeps its height. A contact
+    that was lost in the slide and does not come back aborts.
+    """
 
     def __init__(
-        self, follower: Follower, speed_m_s: float, force_n: float, touch: TouchParams, limits: SafetyLimits
+        self,
+        follower: Follower,
+        speed_m_s: float,
+        force_n: float,
+        touch: TouchParams,
+        limits: SafetyLimits,
+        *,
+        contact: ContactWatch,
     ) -> None:
         super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to come to rest')
         self._follower = follower
         self._speed_m_s = speed_m_s
         self._force_n = force_n
         self._ramp_s = touch.ramp_s(speed_m_s)
+        self._contact = contact
+        self._whole = False  # the slide ended with contact
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """Note whether the slide ended with contact."""
+        super().begin(time_ns, arm)
+        self._whole = self._contact.touching
+
+    def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
+        """Follow the ramp down."""
+        self._follower.update(time_ns, arm)
+        touching = self._touches(arm)
+        share = self.elapsed_s(time_ns) / self._ramp_s
+        if share >= 1.0:
+            if not self._whole:
+                self._contact.refuse()
+            return None
+        velocity = self._follower.velocity(self._speed_m_s * smooth(1.0 - share))
+        return ArmCommand(velocity, force_n=self._force_n if touching else None)
+
+    def _touches(self, arm: ArmState) -> bool:
+        if not self._whole:
+            self._contact.update(arm)
+            self._whole = self._contact.touching
+            return True  # may come back: keep pressing
+        with suppress(ContactLost):
+            self._contact.update(arm)
+        return self._contact.touching
+
+
+class Halt(Stage):
+    """Lose speed along the path at a constant height, after the contact was lost."""
+
+    def __init__(self, follower: Follower, speed_m_s: float, touch: TouchParams, limits: SafetyLimits) -> None:
+        super().__init__(Phase.APPROACH, limits.lift_timeout_s, 'the finger to come to rest')
+        self._follower = follower
+        self._speed_m_s = speed_m_s
+        self._ramp_s = touch.ramp_s(speed_m_s)
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Follow the ramp down."""
         self._follower.update(time_ns, arm)
         share = self.elapsed_s(time_ns) / self._ramp_s
-        if share >= 1.0:
-            return None
-        return ArmCommand(self._follower.velocity(self._speed_m_s * smooth(1.0 - share)), force_n=self._force_n)
+        return None if share >= 1.0 else ArmCommand(self._follower.velocity(self._speed_m_s * smooth(1.0 - share)))
 
 
 class Lift(Stage):

@@ -34,6 +34,22 @@ class TouchParams:
     )
     jerk_m_s3: float = param(50.0, 'Highest jerk of the same.', unit='m/s³', low=1.0, high=1000.0)
     arm_lag_s: float = param(0.005, 'The arm follows a command after.', unit='s', low=0.0, high=0.1)
+    lost_force_share: float = param(
+        0.25, 'While sliding, a force below this share of the wanted one counts as no contact.', low=0.05, high=0.9
+    )
+    lost_contact_s: float = param(
+        0.1,
+        'Contact lost for longer ends the slide; shorter gaps are bounces on a rough surface.',
+        unit='s',
+        low=0.02,
+        high=5.0,
+    )
+    seek_lost_contact: bool = param(
+        False, 'Stop where contact was lost, come down again and go on, up to 3 times; false: abort.'
+    )
+    mean_force_share: float = param(
+        0.3, 'A slide whose mean measured force differs by more than this share ends as aborted.', low=0.05, high=1.0
+    )
     lift_speed_m_s: float = param(0.05, 'Speed away from the surface.', unit='m/s', low=0.005, high=0.5)
     clearance_m: float = param(0.005, 'The finger is lifted at least so far.', unit='m', low=0.001, high=0.1)
 

@@ -1,0 +1,198 @@
+"""What happens when the finger loses the surface: it is noticed, named, and nothing of it counts as sliding."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_exploration.arms.simulated import SimulatedArmParams
+from texture_exploration.motions.touch import TouchParams
+from texture_features.windows import CutWindow, WindowParams, cut_recording
+
+REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.15)
+DROP = SimulatedArmParams(step_m=-0.012, step_from_m=0.06)
+EDGE_IN_SLIDE_M = 0.06
+RATE_HZ = 1000.0
+WINDOWS = WindowParams(length_s=0.1, hop_s=0.02)
+
+
+def sliding(table):
+    return [state for state in table.states if state.phase is Phase.SLIDE]
+
+
+def windows_from(table):
+    """Cut a recording of the exploration whose samples are 1 where the finger touched, else 0."""
+    begin_ns, end_ns = table.states[0].stamp_ns, table.states[-1].stamp_ns
+    times = np.arange(begin_ns, end_ns, round(NANOSECONDS / RATE_HZ))
+    stamps, touches = zip(*table.touches, strict=True)
+    touching = np.array(touches)[np.searchsorted(stamps, times).clip(max=len(stamps) - 1)]
+    samples = touching[:, None].astype(np.float32)
+    batches = [
+        TactileSignal(int(times[first]), 's', ('touch',), '', RATE_HZ, first, samples[first : first + 5])
+        for first in range(0, len(times), 5)
+    ]
+    pieces = cut_recording({'signal': batches}, table.states, WINDOWS)
+    return [piece.windows['signal'].samples[:, 0] for piece in pieces if isinstance(piece, CutWindow)]
+
+
+@pytest.fixture
+def make_logged_table(make_table):
+    """Return a maker of tables that log when the finger touched."""
+
+    def make(*args, **kwargs):
+        table = make_table(*args, **kwargs)
+        table.touches, go_on = [], table.pace
+
+        def pace():
+            go_on()
+            table.touches.append((table.now_ns, table.arm.true_force_n > 0))
+
+        table.pace = pace
+        return table
+
+    return make
+
+
+@pytest.mark.parametrize('arm', [DROP, SimulatedArmParams(edge_m=EDGE_IN_SLIDE_M)], ids=['a drop', 'an edge'])
+@pytest.mark.parametrize('force_mode', [True, False])
+def test_a_surface_that_is_lost_in_the_slide_aborts_with_its_reason(make_logged_table, arm, force_mode):
+    table = make_logged_table(replace(arm, force_mode=force_mode, start_height_m=0.002))
+    outcome = table.explore(REQUEST)
+    assert not outcome.success
+    assert outcome.message.startswith('the contact with the surface was lost for 1')
+    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
+
+
+def test_no_state_without_contact_promises_anything_and_no_window_is_cut_from_air(make_logged_table):
+    table = make_logged_table(DROP)
+    table.explore(REQUEST)
+    assert min(state.force_n for state in sliding(table)) < 0.1
+    assert all(state.steady_s == 0.0 for state in sliding(table) if state.force_n < 0.1)
+    windows = windows_from(table)
+    assert len(windows) > 10
+    # A loss is known one step of the exploration after it happened, 10 ms.
+    assert min(window.mean() for window in windows) >= 0.9
+
+
+def test_a_rough_surface_that_the_finger_bounces_over_is_slid_on(make_logged_table):
+    table = make_logged_table()
+    go_on, slid = table.pace, []
+
+    def pace():
+        go_on()
+        if table.phases[-1:] == [Phase.SLIDE]:
+            slid.append(table.now_ns)
+            table.arm.push(-4.0 if len(slid) % 50 < 6 else 0.0)  # off the surface for 60 ms, twice a second
+
+    table.pace = pace
+    outcome = table.explore(REQUEST)
+    assert outcome.success, outcome.message
+    assert sum(state.steady_s == 0.0 for state in sliding(table)) > 10
+    assert min(window.mean() for window in windows_from(table)) >= 0.8
+
+
+def test_a_lost_contact_is_sought_again_if_asked(make_logged_table):
+    table = make_logged_table(DROP, TouchParams(seek_lost_contact=True))
+    outcome = table.explore(REQUEST)
+    assert outcome.success, outcome.message
+    assert [phase for phase in table.phases if phase is Phase.SLIDE] == [Phase.SLIDE, Phase.SLIDE]
+    assert table.arm.state().position[0] < 0.19
+    assert min(window.mean() for window in windows_from(table)) >= 0.9
+
+
+def test_seeking_a_surface_that_has_ended_gives_up(make_table):
+    table = make_table(SimulatedArmParams(edge_m=EDGE_IN_SLIDE_M), TouchParams(seek_lost_contact=True))
+    outcome = table.explore(REQUEST)
+    assert not outcome.success
+    assert outcome.message.startswith(('no surface within', 'the finger left the workspace: z'))
+
+
+@pytest.mark.parametrize(
+    ('edge_m', 'success'),
+    [
+        (0.002, False),  # while it gains speed
+        (0.150, False),  # 0.1 s before the end of the slide
+        (0.160, True),  # while it brakes
+    ],
+)
+def test_a_surface_that_ends_counts_only_if_the_slide_was_whole(make_table, edge_m, success):
+    table = make_table(SimulatedArmParams(edge_m=edge_m))
+    outcome = table.explore(REQUEST)
+    assert (outcome.success, table.arm.state().force_n) == (success, 0.0)
+    if not success:
+        assert 'the contact with the surface was lost' in outcome.message
+
+
+def test_contact_lost_on_the_last_step_of_the_slide_is_no_success(make_table):
+    whole = make_table()
+    whole.explore(REQUEST)
+    last_m = max(
+        place[0] for state, place in zip(whole.states, whole.places, strict=True) if state.phase is Phase.SLIDE
+    )
+    table = make_table(SimulatedArmParams(edge_m=last_m - 0.0002))
+    outcome = table.explore(REQUEST)
+    assert not outcome.success
+    assert 'the contact with the surface was lost' in outcome.message
+
+
+def test_finishing_while_the_contact_is_lost_is_no_success(make_table):
+    table = make_table(DROP)
+    on_state = table.on_state
+
+    def finish_in_the_air(state):
+        on_state(state)
+        if state.phase is Phase.SLIDE and state.force_n < 0.1:
+            table.exploration.finish('the operator had enough')
+
+    table.on_state = finish_in_the_air
+    outcome = table.explore(REQUEST)
+    assert not outcome.success
+    assert 'the contact with the surface was lost' in outcome.message
+
+
+@pytest.mark.parametrize('tilt_rad', [-0.1745, 0.1745])
+@pytest.mark.parametrize('force_mode', [True, False])
+def test_a_surface_that_tilts_by_ten_degrees_is_not_lost(make_table, tilt_rad, force_mode):
+    table = make_table(SimulatedArmParams(tilt_rad=tilt_rad, force_mode=force_mode, start_height_m=0.005))
+    outcome = table.explore(replace(REQUEST, distance_m=0.05))
+    assert outcome.success, outcome.message
+
+
+def test_a_force_that_stays_just_above_the_limit_of_contact_is_no_success(make_table):
+    table = make_table()
+    go_on, pushed = table.pace, [0.0]
+
+    def pace():
+        go_on()
+        if table.phases[-1:] == [Phase.SLIDE]:
+            pushed[0] += 0.3 - table.arm.true_force_n
+            table.arm.push(pushed[0])
+
+    table.pace = pace
+    outcome = table.explore(REQUEST)
+    assert not outcome.success
+    assert outcome.message.startswith(('the mean force of the slide was 0.', 'the contact with the surface was lost'))
+
+
+def test_a_force_at_the_edge_of_its_tolerance_is_a_success(make_table):
+    table = make_table(SimulatedArmParams(admittance_m_s_n=7e-4, stiffness_n_m=2000.0))
+    table.when[Phase.SLIDE] = lambda: table.arm.push(-0.19)
+    assert table.explore(REQUEST).success
+
+
+@pytest.mark.parametrize(
+    'request_',
+    [
+        ExplorationRequest('circular', speed_m_s=0.05, force_n=1.0, radius_m=0.02, turns=1.0, direction_rad=3.1416),
+        ExplorationRequest('in_hand_sliding', speed_m_s=0.02, force_n=1.0, distance_m=0.03, duration_s=3.0),
+    ],
+    ids=lambda request_: request_.motion,
+)
+def test_circles_and_strokes_that_leave_the_surface_abort_too(make_table, request_):
+    table = make_table(SimulatedArmParams(edge_m=0.017))
+    outcome = table.explore(request_)
+    assert not outcome.success
+    assert 'the contact with the surface was lost' in outcome.message
+    assert all(state.steady_s == 0.0 for state in sliding(table) if state.force_n < 0.1)
