@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
+from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidParameter
+from texture_core.files import MB, FileRefused, read_text
 
-MOST_CHARACTERS = 1_000_000
+MOST_CHARACTERS = 200_000  # of YAML; the longest settings in use have a tenth
 MOST_VALUES = 200_000  # with every alias written out
+MOST_DEPTH = 50  # of lists and mappings within each other, in YAML and JSON
+MOST_CARD_BYTES = 5 * MB
+MOST_JSON_VALUES = 5_000_000
+JSON_STRING = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
 # What the parsers raise, depending on what is wrong; a value such as 2024-99-99 or !!bool x is no YAMLError.
 BROKEN = (
     yaml.YAMLError, OSError, ValueError, LookupError, AttributeError, TypeError, OverflowError, RecursionError,
@@ -28,7 +36,7 @@ def load_yaml(path: Path, what: str) -> Any:
         If it cannot be read, is no YAML, or holds more than a file of settings does.
     """
     try:
-        return parse_yaml(path.read_text(encoding='utf-8'))
+        return parse_yaml(read_text(path, 4 * MOST_CHARACTERS))
     except BROKEN as error:
         raise InvalidParameter(f"{what} '{path}' is no YAML that can be read: {error}") from error
 
@@ -42,7 +50,7 @@ def load_card(path: Path) -> Any:
         If it cannot be read as such.
     """
     try:
-        return parse_json(path.read_text(encoding='utf-8')).get('recipe')
+        return load_json(path, MOST_CARD_BYTES).get('recipe')
     except BROKEN as error:
         raise InvalidParameter(f"model card '{path}' cannot be read: {error}") from error
 
@@ -51,7 +59,7 @@ def parse_yaml(text: str) -> Any:
     """Return the plain values in a text; one of `BROKEN` is raised if it is no YAML, or too much of it."""
     if len(text) > MOST_CHARACTERS:
         raise ValueError(f'it has {len(text)} characters; {MOST_CHARACTERS} are allowed')
-    loader = yaml.SafeLoader(text)
+    loader = _BoundedLoader(text)
     try:
         node = loader.get_single_node()
         if node is None:
@@ -63,8 +71,26 @@ def parse_yaml(text: str) -> Any:
         loader.dispose()
 
 
+def load_json(path: Path, most_bytes: int) -> Any:
+    """Return the plain values in a JSON file.
+
+    Raises
+    ------
+    OSError, ValueError
+        If it cannot be read, is no JSON, or larger than `most_bytes`.
+    """
+    return parse_json(read_text(path, most_bytes))
+
+
 def parse_json(text: str) -> Any:
-    """Return the plain values in a text; ValueError if it is no JSON."""
+    """Return the plain values in a text; ValueError if it is no JSON, or one with too many or too deep values."""
+    marks = np.frombuffer(JSON_STRING.sub('', text).encode('utf-8', 'replace'), np.uint8)
+    depth = int(_among(marks, b'[{').sum(initial=0)) and int(np.cumsum(_steps(marks)).max(initial=0))
+    if depth > MOST_DEPTH:
+        raise FileRefused(f'it is nested {depth} deep; {MOST_DEPTH} is allowed')
+    n_values = int(_among(marks, b'[{,:').sum())
+    if n_values > MOST_JSON_VALUES:
+        raise FileRefused(f'it has {n_values} values; {MOST_JSON_VALUES} are allowed')
     try:
         return json.loads(text)
     except RecursionError as error:
@@ -77,6 +103,31 @@ def shown(value: Any) -> str:
         return repr(value)
     except RecursionError:
         return 'something nested too deeply'
+
+
+class _BoundedLoader(yaml.SafeLoader):
+    """Build a tree of nodes that is neither deep nor large."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        self._depth += 1
+        if self._depth > MOST_DEPTH:
+            raise FileRefused(f'it is nested more than {MOST_DEPTH} deep')
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+
+def _among(marks: AnyArray, wanted: bytes) -> AnyArray:
+    return np.isin(marks, np.frombuffer(wanted, np.uint8))
+
+
+def _steps(marks: AnyArray) -> AnyArray:
+    """Return +1 where a list or an object begins and -1 where one ends."""
+    return _among(marks, b'[{').astype(np.int32) - _among(marks, b']}')
 
 
 def _weight(node: yaml.Node, known: dict[int, float]) -> float:

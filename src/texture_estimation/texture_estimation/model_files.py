@@ -8,21 +8,23 @@ import json
 import os
 import struct
 import zipfile
-import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from texture_core.errors import ModelMismatch, TextureError
-from texture_core.plain_data import parse_json
-from texture_estimation.plain_parts import plain_parts
+from texture_core.files import MB, Archive, FileRefused, read_bounded
+from texture_core.plain_data import MOST_CARD_BYTES, load_json, parse_json
+from texture_estimation.plain_parts import SCHEMA, plain_parts
 
 FORMAT = 1
-MOST_BYTES = 500_000_000  # of what a file unpacks to
+MOST_BYTES = 200 * MB  # of a file of parts; ensembles of networks over many features come to 20 MB
+MOST_SCHEMA_BYTES = 2 * MB  # each node in it becomes objects of 2 kB
+NODES = ('DictNode', 'ListNode', 'TupleNode', 'JsonNode', 'NdArrayNode', 'TypeNode', 'ObjectNode')
 # What unpacking, and using what came out, raises at files that are damaged or made to do harm, found by trying.
 BROKEN = (
     TextureError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RuntimeError,
-    ImportError, EOFError, SyntaxError, struct.error, zipfile.BadZipFile, zlib.error,
+    ImportError, EOFError, SyntaxError, struct.error, zipfile.BadZipFile,
 )  # fmt: skip
 
 
@@ -63,18 +65,42 @@ def read(path: str | Path) -> tuple[dict[str, Any], bytes]:
 
 def parts_of(content: bytes, trusted: Sequence[str]) -> dict[str, Any]:
     """Return what was learnt; nothing is built of types that are not `trusted`, and no code of the file is run."""
-    with zipfile.ZipFile(io.BytesIO(content)) as file:
-        if sum(part.file_size for part in file.infolist()) > MOST_BYTES:
-            raise ModelMismatch(f'it unpacks to more than {MOST_BYTES / 1e6:g} MB, which no model of this suite does')
+    with Archive(io.BytesIO(content)) as file:
         plain = plain_parts(file)
     if plain is not None:
         return plain
+    with Archive(io.BytesIO(content)) as file:
+        _check_parts(file, trusted)
     from skops.io import get_untrusted_types, loads  # noqa: PLC0415  # takes seconds, and few models need it
 
     unexpected = sorted(set(get_untrusted_types(data=content)) - set(trusted))
     if unexpected:
         raise ModelMismatch(f'it holds {", ".join(unexpected)}, which no model of this suite holds')
     return dict(loads(content, trusted=list(trusted)))
+
+
+def _check_parts(file: Archive, trusted: Sequence[str]) -> None:
+    """Raise ModelMismatch or FileRefused unless skops, which counts nothing, may read the members of an archive.
+
+    A member may be named by many nodes, each of which makes an array of its own; and some kinds of node would read
+    archives within the archive, or call functions.
+    """
+    schema = parse_json(file.read(SCHEMA, MOST_SCHEMA_BYTES).decode())
+    for node in _nodes(schema):
+        kind, name = str(node['__loader__']), f'{node.get("__module__")}.{node.get("__class__")}'
+        if kind not in NODES or (kind == 'ObjectNode' and name not in trusted):
+            raise ModelMismatch(f'it holds {name} ({kind}), which no model of this suite holds')
+        if kind == 'NdArrayNode' and node.get('type') == 'numpy':
+            file.array(str(node['file']))
+
+
+def _nodes(value: Any) -> Iterator[Mapping[str, Any]]:
+    """Yield the nodes of a schema."""
+    if isinstance(value, Mapping) and '__loader__' in value:
+        yield value
+    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+    for part in parts:
+        yield from _nodes(part)
 
 
 def replace(path: Path, content: bytes) -> None:
@@ -89,7 +115,7 @@ def replace(path: Path, content: bytes) -> None:
 
 def _read_card(path: Path) -> dict[str, Any]:
     try:
-        card = parse_json(path.read_text(encoding='utf-8'))
+        card = load_json(path, MOST_CARD_BYTES)
     except (OSError, ValueError) as error:
         raise ModelMismatch(f"model card '{path}' cannot be read: {error}; give the path of a trained model") from error
     if not isinstance(card, dict) or card.get('format') != FORMAT or not isinstance(card.get('recipe'), dict):
@@ -99,8 +125,8 @@ def _read_card(path: Path) -> dict[str, Any]:
 
 def _read_parts(path: Path, digest: str) -> bytes:
     try:
-        content = path.read_bytes()
-    except OSError as error:
+        content = read_bounded(path, MOST_BYTES)
+    except (OSError, FileRefused) as error:
         raise ModelMismatch(f"model file '{path}' cannot be read: {error}; it belongs beside its card") from error
     if hashlib.sha256(content).hexdigest() != digest:
         raise ModelMismatch(f"model file '{path}' is damaged or of another card; copy both files again or train again")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,9 +13,12 @@ import numpy as np
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.files import MB, read_text
 
 SMOOTH, ROUGH = 1.0, 5.0
 GRADES = np.arange(1, 6)
+MOST_BYTES = 1 * MB
+MOST_CELLS = 1_000_000  # people × textures
 COLUMNS = ('rater', 'texture', 'grade')
 SYNONYMS = {'rating': 'grade'}
 
@@ -72,6 +76,10 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
     rows = _read_rows(Path(path))
     raters = tuple(dict.fromkeys(row['rater'] for _, row in rows))
     textures = tuple(dict.fromkeys(row['texture'] for _, row in rows))
+    if len(raters) * len(textures) > MOST_CELLS:
+        raise InvalidData(
+            f"'{path}' has {len(raters)} raters and {len(textures)} textures; their product may be {MOST_CELLS}"
+        )
     rater_at = {name: index for index, name in enumerate(raters)}
     texture_at = {name: index for index, name in enumerate(textures)}
     grades = np.full((len(raters), len(textures)), np.nan)
@@ -91,12 +99,11 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
 def _read_rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
     """Return number and columns of each line."""
     try:
-        with path.open(newline='', encoding='utf-8-sig') as file:
-            reader = csv.DictReader(file)
-            names = [SYNONYMS.get(name.strip().lower(), name.strip().lower()) for name in reader.fieldnames or ()]
-            reader.fieldnames = names
-            rows: list[tuple[int, Mapping[str, str]]] = [(reader.line_num, row) for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reader = csv.DictReader(io.StringIO(read_text(path, MOST_BYTES, 'utf-8-sig'), newline=''))
+        names = [SYNONYMS.get(name.strip().lower(), name.strip().lower()) for name in reader.fieldnames or ()]
+        reader.fieldnames = names
+        rows: list[tuple[int, Mapping[str, str]]] = [(reader.line_num, row) for row in reader]
+    except (OSError, ValueError, csv.Error) as error:
         raise InvalidData(f"'{path}' cannot be read: {error}; give a CSV file of ratings") from error
     missing = [name for name in COLUMNS if name not in names]
     if missing:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,6 +11,7 @@ from aiohttp import WSCloseCode, web
 
 from texture_bringup.dashboard.access import COOKIE, Access
 from texture_core.errors import TextureError
+from texture_core.plain_data import parse_json
 
 MOST_BODY_BYTES = 4096
 MOST_MESSAGE_BYTES = 1024
@@ -162,7 +162,7 @@ def _command(command: Callable[[Mapping[str, Any]], Awaitable[Answer]]) -> Handl
         if request.content_type != 'application/json':
             return _said(415, f'the request is {request.content_type}; application/json is needed')
         try:
-            asked = json.loads(await request.text())
+            asked = parse_json(await request.text())
         except ValueError:
             return _said(400, 'the request is no JSON')
         if not isinstance(asked, dict):

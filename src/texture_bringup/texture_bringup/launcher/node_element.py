@@ -52,7 +52,10 @@ def command_line(text: str, scope: Scope) -> tuple[str, ...]:
     parts = template.parse(text)
     values = {f'\0{index}\0': part for index, part in enumerate(parts) if isinstance(part, template.Call)}
     marked = ''.join(part if isinstance(part, str) else f'\0{index}\0' for index, part in enumerate(parts))
-    words = shlex.split(marked)
+    try:
+        words = shlex.split(marked)
+    except ValueError as error:
+        raise InvalidLaunch(f"'args' of <node> is '{text}', whose quotes are not closed") from error
     for mark, call in values.items():
         value = template.expand((call,), scope.perform)
         words = [word.replace(mark, value) for word in words]

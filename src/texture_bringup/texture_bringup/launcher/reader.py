@@ -7,7 +7,7 @@ scope of its own, an `include` is not, so the arguments given to it stay set beh
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,8 +19,39 @@ from texture_bringup.launcher.node_element import joined_namespace, read_node
 from texture_bringup.launcher.scope import Scope
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidLaunch, TextureError
+from texture_core.files import FileRefused, read_bounded
 
-MOST_INCLUDES = 20
+MOST_INCLUDES = 20  # of files within each other
+MOST_BYTES = 200_000  # of one file; the longest in use has 5 kB
+MOST_DEPTH = 30  # of elements within each other
+MOST_ELEMENTS = 5000  # in one file, and that are performed in all files together
+
+
+class _BoundedTree(ElementTree.TreeBuilder):
+    """Build the tree of a file that is neither deep nor large, and defines no entities."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._depth = self._count = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> Element:
+        """Begin an element."""
+        self._depth += 1
+        self._count += 1
+        if self._depth > MOST_DEPTH or self._count > MOST_ELEMENTS:
+            raise FileRefused(
+                f'it has more than {MOST_ELEMENTS} elements, or some more than {MOST_DEPTH} deep within each other'
+            )
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> Element:
+        """End an element."""
+        self._depth -= 1
+        return super().end(tag)
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Refuse what could define entities that multiply."""
+        raise FileRefused('it has a DOCTYPE, which no launch file needs')
 
 
 @dataclass
@@ -30,6 +61,7 @@ class Reading:
     nodes: list[NodeDescription] = field(default_factory=list)
     declared: set[str] = field(default_factory=set)
     files: list[Path] = field(default_factory=list)
+    elements: int = 0
 
 
 def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
@@ -64,20 +96,34 @@ def declared_arguments(path: Path) -> list[Argument]:
 def all_arguments(path: Path, environment: Mapping[str, str]) -> list[Argument]:
     """Return the arguments of a launch file, and of those it includes at a place that no argument decides."""
     found = {argument.name: argument for argument in declared_arguments(path)}
+    for included in _certain_includes(path, environment, {path}):
+        for argument in declared_arguments(included):
+            found.setdefault(argument.name, argument)
+    return list(found.values())
+
+
+def _certain_includes(path: Path, environment: Mapping[str, str], seen: set[Path]) -> Iterator[Path]:
+    """Yield the files that a file includes at a place that no argument decides, and those that they include, once."""
     for element in _parse(path).iter('include'):
         with contextlib.suppress(TextureError):
             included = Path(Scope({}, dict(environment)).expand(attribute(element, 'file')))
-            for argument in all_arguments(included, environment):
-                found.setdefault(argument.name, argument)
-    return list(found.values())
+            if included in seen or len(seen) > MOST_INCLUDES:
+                continue
+            seen.add(included)
+            inner = list(_certain_includes(included, environment, seen))
+            yield included
+            yield from inner
 
 
 def _parse(path: Path) -> Element:
     try:
-        root = ElementTree.parse(path).getroot()
+        content = read_bounded(path, MOST_BYTES)
+        root: Element = ElementTree.fromstring(content, ElementTree.XMLParser(target=_BoundedTree()))
     except OSError as error:
         raise InvalidLaunch(f"launch file '{path}' cannot be read: {error.strerror}") from error
-    except ElementTree.ParseError as error:
+    except FileRefused as error:
+        raise InvalidLaunch(f"launch file '{path}' is not read: {error}") from error
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: of its encoding
         raise InvalidLaunch(f"launch file '{path}' is not well-formed XML: {error}") from error
     if root.tag != 'launch':
         raise InvalidLaunch(f"launch file '{path}' begins with <{root.tag}>; <launch> is needed")
@@ -101,6 +147,11 @@ def _read_file(path: Path, scope: Scope, reading: Reading) -> None:
 
 def _read_children(parent: Element, scope: Scope, reading: Reading) -> None:
     for element in parent:
+        reading.elements += 1
+        if reading.elements > MOST_ELEMENTS:
+            raise InvalidLaunch(
+                f'the files included have more than {MOST_ELEMENTS} elements; do they include each other?'
+            )
         if element.tag not in READERS:
             raise unknown(element.tag, READERS, 'launch element')
         check_form(element, element.tag)

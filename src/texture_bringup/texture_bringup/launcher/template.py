@@ -8,6 +8,9 @@ from dataclasses import dataclass
 
 from texture_core.errors import InvalidLaunch
 
+# A text in a launch file is a path, a number or a short list. Twenty that double each other would fill the memory.
+MOST_CHARACTERS = 10_000
+MOST_DEPTH = 30  # of calls within each other
 NAME = re.compile(r'[A-Za-z][\w-]*')
 
 
@@ -35,12 +38,23 @@ def parse(text: str) -> Template:
     InvalidLaunch
         If a call is not closed or not well formed.
     """
-    return _Reader(text).template(stop='')
+    return _Reader(_bounded(text)).template(stop='')
 
 
 def expand(template: Template, perform: Perform) -> str:
     """Return the text of a template; `perform(name, arguments)` gives the text of a call, innermost first."""
-    return ''.join(part if isinstance(part, str) else _expand_call(part, perform) for part in template)
+    expanded = ''
+    for part in template:
+        expanded = _bounded(expanded + (part if isinstance(part, str) else _expand_call(part, perform)))
+    return expanded
+
+
+def _bounded(text: str) -> str:
+    if len(text) > MOST_CHARACTERS:
+        raise InvalidLaunch(
+            f'a text has {len(text)} characters, with what stands for its calls; {MOST_CHARACTERS} are allowed'
+        )
+    return text
 
 
 def _expand_call(call: Call, perform: Perform) -> str:
@@ -53,6 +67,7 @@ class _Reader:
     def __init__(self, text: str) -> None:
         self._text = text
         self._at = 0
+        self._depth = 0
 
     def template(self, stop: str) -> Template:
         """Return the parts up to the end or the first plain character of `stop`."""
@@ -74,6 +89,9 @@ class _Reader:
 
     def _call(self) -> Call:
         start = self._at
+        self._depth += 1
+        if self._depth > MOST_DEPTH:
+            raise InvalidLaunch(f'a text has substitutions more than {MOST_DEPTH} deep within each other')
         self._at += len('$(')
         name = NAME.match(self._text, self._at)
         if not name:
@@ -86,6 +104,7 @@ class _Reader:
         if not self._text.startswith(')', self._at):
             raise self._malformed(start)
         self._at += 1
+        self._depth -= 1
         return Call(name.group(), tuple(arguments))
 
     def _argument(self, start: int) -> Template:

@@ -10,6 +10,7 @@ import yaml
 from texture_bringup.launcher import template
 from texture_core.catalogue import find
 from texture_core.errors import InvalidLaunch
+from texture_core.plain_data import BROKEN, parse_yaml
 
 SCALARS = (bool, int, float, str)
 # The `type` attribute of a param; (type, whether a list of it); None lets YAML decide.
@@ -62,7 +63,7 @@ def _scalar(text: str, kind: type | None, pending: bool) -> Any:
         return text
     try:
         return CONVERT[kind](text)
-    except (ValueError, yaml.YAMLError) as error:
+    except BROKEN as error:
         if pending or (kind is None and isinstance(error, yaml.YAMLError)):
             return text
         wanted = kind.__name__ if kind else 'bool, int, float, str or a list of one of them'
@@ -70,14 +71,14 @@ def _scalar(text: str, kind: type | None, pending: bool) -> Any:
 
 
 def _boolean(text: str) -> bool:
-    value = yaml.safe_load(text) if text not in BOOLEANS else BOOLEANS[text]
+    value = parse_yaml(text) if text not in BOOLEANS else BOOLEANS[text]
     if not isinstance(value, bool):
         raise ValueError(text)
     return value
 
 
 def _by_yaml(text: str) -> Any:
-    value = yaml.safe_load(text)
+    value = parse_yaml(text)
     if not isinstance(value, (*SCALARS, list)):
         raise ValueError(text)
     return value
@@ -87,7 +88,10 @@ CONVERT: Mapping[type | None, Callable[[str], Any]] = {int: int, float: float, b
 
 
 def _list(text: str, kind: type | None) -> list[Any]:
-    value = yaml.safe_load(text)
+    try:
+        value = parse_yaml(text)
+    except BROKEN as error:
+        raise InvalidLaunch(f"parameter value '{text}' is no list in YAML: {error}") from error
     if not isinstance(value, list) or not all(isinstance(item, (str, kind or str)) for item in value):
         raise InvalidLaunch(f"parameter value '{text}' is no list of {kind.__name__ if kind else 'values'}")
     return value

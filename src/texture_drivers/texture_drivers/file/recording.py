@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import io
 import struct
-import tokenize
 import warnings
-import zipfile
-import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import BinaryIO, TextIO
 
 import numpy as np
 from scipy.io import wavfile
 
-from texture_core.arrays import Array, Samples
+from texture_core.arrays import AnyArray, Array, Samples
 from texture_core.errors import InvalidData
+from texture_core.files import MB, Arrays, Budget, open_regular, read_array, take_all
 
 TIME_COLUMNS = ('time_s', 'time', 't')
+MOST_BYTES = 2000 * MB  # of a file
+MOST_COLUMNS = 10_000
+MOST_LINE = 16 * MOST_COLUMNS
 # What the readers of numpy and scipy raise at files that are damaged or something else, found by trying.
 FAULTS = (
     ValueError,
@@ -27,12 +29,9 @@ FAULTS = (
     ArithmeticError,
     MemoryError,
     NotImplementedError,
-    SyntaxError,
     UnboundLocalError,
+    TypeError,
     struct.error,
-    tokenize.TokenError,
-    zipfile.BadZipFile,
-    zlib.error,
 )
 UNEVEN = 0.1  # deviation of a time step from their median above which a recording is not evenly sampled
 
@@ -66,7 +65,8 @@ def load_recording(path: Path) -> Recording:
     if path.suffix.lower() not in LOADERS:
         raise InvalidData(f"recording '{path}' ends in '{path.suffix}'; allowed are {', '.join(LOADERS)}")
     try:
-        recording = LOADERS[path.suffix.lower()](path)
+        with open_regular(path) as file:
+            recording = LOADERS[path.suffix.lower()](file)
     except OSError as error:
         raise InvalidData(f"recording '{path}' cannot be read: {error.strerror or error}; give another path") from error
     except FAULTS as error:
@@ -89,23 +89,23 @@ def _checked(path: Path, recording: Recording) -> Recording:
     return recording
 
 
-def load_csv(path: Path) -> Recording:
+def load_csv(file: BinaryIO) -> Recording:
     """Return a table: one column for each channel, comma, semicolon or blanks between, names in the first line or none.
 
     A column `time_s` gives the rate and is no channel. Lines with # are passed over.
     """
-    with path.open(encoding='utf-8-sig') as file:
-        first = next((line for line in file if line.strip() and not line.startswith('#')), '')
+    text = io.TextIOWrapper(file, encoding='utf-8-sig')
+    first = next(_lines(text), '')
     delimiter = next((sign for sign in ',;' if sign in first), None)
     names = [name.strip().strip('"') for name in first.strip().split(delimiter)]
     named = not all(_is_number(name) for name in names)
-    with path.open(encoding='utf-8-sig') as file:
-        lines = (line for line in file if line.strip() and not line.startswith('#'))
-        if named:
-            next(lines, None)
-        with warnings.catch_warnings():
-            warnings.simplefilter('ignore')  # an empty table is refused below, in our words
-            table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, dtype=np.float64)
+    text.seek(0)
+    lines = _lines(text)
+    if named:
+        next(lines, None)
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore')  # an empty table is refused below, in our words
+        table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, dtype=np.float64)
     if not named:
         return Recording(table)
     if table.size and table.shape[1] != len(names):
@@ -115,6 +115,15 @@ def load_csv(path: Path) -> Recording:
         return Recording(table, None, tuple(names))
     del names[time]
     return Recording(np.delete(table, time, axis=1), rate_of(table[:, time]), tuple(names))
+
+
+def _lines(text: TextIO) -> Iterator[str]:
+    """Yield the lines of a table that hold something; one that never ends is refused while it is read."""
+    while line := text.readline(MOST_LINE + 1):
+        if len(line) > MOST_LINE:
+            raise ValueError(f'it has a line of more than {MOST_LINE} characters; that is no table')
+        if line.strip() and not line.startswith('#'):
+            yield line
 
 
 def _is_number(text: str) -> bool:
@@ -138,11 +147,11 @@ def rate_of(time_s: Array) -> float:
     return float(len(steps) / (time_s[-1] - time_s[0]))
 
 
-def load_wav(path: Path) -> Recording:
+def load_wav(file: BinaryIO) -> Recording:
     """Return a WAV file; whole numbers are scaled so that full scale is 1."""
     with warnings.catch_warnings():
         warnings.simplefilter('ignore', wavfile.WavFileWarning)  # chunks of no interest
-        rate_hz, samples = wavfile.read(path)
+        rate_hz, samples = wavfile.read(io.BytesIO(take_all(file, MOST_BYTES)))
     if samples.dtype == np.uint8:  # WAV's only unsigned format
         samples = samples.astype(np.int16) - 128
         full_scale = 128.0
@@ -151,31 +160,39 @@ def load_wav(path: Path) -> Recording:
     return Recording(_columns(samples) / full_scale, float(rate_hz))
 
 
-def load_npy(path: Path) -> Recording:
+def load_npy(file: BinaryIO) -> Recording:
     """Return an array of shape (n_samples, n_channels) or (n_samples,)."""
-    return Recording(_columns(np.load(path, allow_pickle=False)))
+    return Recording(_columns(read_array(file, Budget(_values_bytes(file)))))
 
 
-def load_npz(path: Path) -> Recording:
+def _values_bytes(file: BinaryIO) -> int:
+    """Return how many bytes the values may come to as float64, of a file that is not compressed: a byte each at least.
+
+    The file is at its beginning afterwards.
+    """
+    n_bytes = file.seek(0, io.SEEK_END)
+    file.seek(0)
+    return 8 * n_bytes
+
+
+def load_npz(file: BinaryIO) -> Recording:
     """Return the array `samples`; `rate_hz` and `channels` beside it are used if they are there."""
-    with np.load(path, allow_pickle=False) as arrays:
-        if 'samples' not in arrays:
-            raise ValueError(f"it holds {', '.join(arrays.files) or 'nothing'}; an array called 'samples' is needed")
-        rate_hz = float(arrays['rate_hz']) if 'rate_hz' in arrays else None
-        channels = tuple(str(name) for name in np.atleast_1d(arrays['channels'])) if 'channels' in arrays else ()
-        return Recording(_columns(arrays['samples']), rate_hz, channels)
+    arrays = Arrays(file)
+    if 'samples' not in arrays:
+        raise ValueError(f"it holds {', '.join(arrays.names) or 'nothing'}; an array called 'samples' is needed")
+    rate_hz = float(arrays['rate_hz']) if 'rate_hz' in arrays else None
+    channels = tuple(str(name) for name in np.atleast_1d(arrays['channels'])) if 'channels' in arrays else ()
+    return Recording(_columns(arrays['samples']), rate_hz, channels)
 
 
-def _columns(values: Any) -> Samples:
-    if not isinstance(values, np.ndarray):
-        raise ValueError('it holds several arrays; write one array, or call the file .npz')
+def _columns(values: AnyArray) -> Samples:
     if values.dtype.kind not in 'iuf':
         raise ValueError(f'it holds values of type {values.dtype}; real numbers are needed')
-    samples: Samples = values.astype(np.float64)
+    samples: Samples = values.astype(np.float64, copy=False)
     return samples[:, None] if samples.ndim == 1 else samples
 
 
-LOADERS: Mapping[str, Callable[[Path], Recording]] = {
+LOADERS: Mapping[str, Callable[[BinaryIO], Recording]] = {
     '.csv': load_csv,
     '.wav': load_wav,
     '.npy': load_npy,

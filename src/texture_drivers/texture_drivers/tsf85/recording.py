@@ -7,6 +7,8 @@ no measurement; unless it was told otherwise, the program has subtracted it from
 
 from __future__ import annotations
 
+import io
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData
+from texture_core.files import open_regular
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.tsf85 import tables
 from texture_drivers.tsf85.finger import IMU, SIGNAL, STATIC
@@ -26,6 +29,7 @@ FIRST_COLUMN = 'Time(ms)'
 Stream = tuple[str, tuple[str, ...], str, float]
 DYNAMIC: Stream = (tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, tables.UNIT, tables.RATE_HZ)
 TAXEL: Stream = (tables.STATIC_SENSOR, tables.STATIC_CHANNELS, tables.UNIT, tables.STATIC_RATE_HZ)
+MOST_LINE = 10_000  # characters; a number has 25 at most
 COLUMNS = 1 + tables.FINGERS * (1 + TAXELS + AXES + AXES)
 
 
@@ -112,10 +116,12 @@ def load_vendor_csv(path: Path) -> VendorRecording:
         If there is no such file, or it is another one.
     """
     try:
-        with path.open(encoding='utf-8-sig') as file:
-            names = file.readline().strip().split(';')
-            lines = [line for line in file if line.strip()]
-        table = np.loadtxt(lines, delimiter=';', ndmin=2) if lines else np.empty((0, COLUMNS))
+        with open_regular(path) as file, io.TextIOWrapper(file, encoding='utf-8-sig') as text:
+            names = text.readline(MOST_LINE).strip().split(';')
+            lines = (line for line in iter(lambda: text.readline(MOST_LINE), '') if line.strip())
+            with warnings.catch_warnings():
+                warnings.simplefilter('ignore')  # an empty table is refused below, in our words
+                table = np.loadtxt(lines, delimiter=';', ndmin=2)
     except OSError as error:
         raise InvalidData(f"recording '{path}' cannot be read: {error.strerror or error}; give another path") from error
     except ValueError as error:

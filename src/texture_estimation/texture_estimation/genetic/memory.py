@@ -12,10 +12,13 @@ from typing import Any
 import numpy as np
 
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.files import MB
+from texture_core.plain_data import load_json
 from texture_estimation.genetic.trial import EMPTY, Record
 from texture_estimation.genetic.variables import Individual
 
 FORMAT = 1
+MOST_BYTES = 50 * MB  # of a checkpoint; a search of 10 000 individuals writes 10
 
 
 @dataclass
@@ -75,7 +78,7 @@ class Memory:
             If it cannot be read, or belongs to other data, another search space or another seed.
         """
         try:
-            content = json.loads(Path(path).expanduser().read_text(encoding='utf-8'))
+            content = load_json(Path(path).expanduser(), MOST_BYTES)
             identity = content['identity'] if content['format'] == FORMAT else None
             records = {
                 tuple(entry['individual']): Record(np.array(entry['learning'], float), np.array(entry['test'], float))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,9 +11,11 @@ from pathlib import Path
 
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidData
+from texture_core.files import MB, read_text
 from texture_core.resources import find_file
 from texture_estimation.roughness.head import ROUGH, SMOOTH
 
+MOST_BYTES = 1 * MB
 TRAIN, TEST = 'train', 'test'
 
 
@@ -59,11 +62,11 @@ def read_grades(path: str | Path) -> Grades:
     """
     place = find_file(str(path), 'texture_simulation', 'config/grades', 'table of grades', '.csv')
     try:
-        with place.open(newline='', encoding='utf-8-sig') as file:
-            reader = csv.DictReader(line for line in file if not line.startswith('#'))
-            rows = list(enumerate(reader, 2))
-            columns = tuple(reader.fieldnames or ())
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        file = io.StringIO(read_text(place, MOST_BYTES, 'utf-8-sig'), newline='')
+        reader = csv.DictReader(line for line in file if not line.startswith('#'))
+        rows = list(enumerate(reader, 2))
+        columns = tuple(reader.fieldnames or ())
+    except (OSError, ValueError, csv.Error) as error:
         raise InvalidData(f"'{place}' cannot be read: {error}; give a CSV file of grades") from error
     if not {'texture', 'grade'} <= set(columns):
         raise InvalidData(f"'{place}' has the columns {', '.join(columns) or 'none'}; texture and grade are needed")

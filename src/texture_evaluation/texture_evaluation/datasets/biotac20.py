@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from texture_core.arrays import AnyArray, Array
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
+from texture_core.files import Arrays, open_regular
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_evaluation.bag_writer import BagWriter
 from texture_evaluation.slides import parse_selection
@@ -106,12 +106,13 @@ def _import_material(file: Path, out: Path, wanted: frozenset[int] | None, chann
 
 def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[Recording]:
     try:
-        with np.load(file, allow_pickle=False) as content:
-            for slide in sorted({key.split('/')[0] for key in content.files}):
+        with open_regular(file) as opened:
+            content = Arrays(opened)
+            for slide in sorted({key.split('/')[0] for key in content.names}):
                 if wanted is None or int(slide.removeprefix('slide')) in wanted:
                     fields = {name: content[f'{slide}/{name}'] for name in FIELDS}
                     yield Recording(file.stem, slide, epoch=float(content[f'{slide}/epoch']), **fields)
-    except (OSError, ValueError, KeyError, BadZipFile, EOFError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it anew") from error
 
 

@@ -7,13 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
-
-import numpy as np
 
 from texture_core.arrays import AnyArray
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidData
+from texture_core.files import Arrays, open_regular
 from texture_evaluation.datasets.steady_slides import SteadySlide, Stream, write_steady_slides
 from texture_evaluation.slides import parse_selection
 
@@ -62,9 +60,10 @@ class SlideFile:
         if not file.is_file():
             raise InvalidData(f"no file {self.name} in '{folder}'; give the folder that holds it")
         try:
-            with np.load(file, allow_pickle=False) as content:
-                return {key: content[key] for key in content.files}
-        except (OSError, ValueError, KeyError, BadZipFile, EOFError) as error:
+            with open_regular(file) as opened:
+                content = Arrays(opened)
+                return {key: content[key] for key in content.names}
+        except (OSError, ValueError, KeyError) as error:
             raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it anew") from error
 
 
