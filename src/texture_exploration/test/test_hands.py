@@ -24,6 +24,10 @@ from texture_simulation.devices.dynamixel_motors import DynamixelMotors, Pressin
 
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')
+OVERLOAD = (
+    "motor 1 ('press' of index) reports overload; when it has cooled and nothing blocks it, reboot it (service 'reboot'"
+    ') or switch its power off and on'
+)
 needs_sdk = pytest.mark.skipif(importlib.util.find_spec('dynamixel_sdk') is None, reason='dynamixel-sdk is missing')
 
 
@@ -178,7 +182,7 @@ def test_a_motor_that_reports_an_error_is_named_and_may_let_go(bus, torque_off):
     hand = DynamixelHand('leap', str(bus.port.link), torque_off)
     hand.connect()
     bus.motors.tables[1][70] = 1 << 5
-    until(lambda: hand.state().fault == "motor 1 ('press' of index) reports overload")
+    until(lambda: hand.state().fault == OVERLOAD)
     if torque_off:
         until(lambda: not any(table[64] for table in bus.motors.tables.values()))
     else:
@@ -203,7 +207,7 @@ def test_an_unplugged_hand_is_told_and_can_be_connected_again(bus):
 
 @needs_sdk
 def test_a_hand_of_another_model_or_without_power_is_told(bus):
-    with pytest.raises(DeviceError, match="is of model 1220; the profile 'xm430' is for"):
+    with pytest.raises(DeviceError, match=r"is of model 1240 .*; the profile 'xm430' is for"):
         DynamixelHand('xm430', str(bus.port.link)).connect()
     bus.motors.absent = set(LEAP.ids)
     with pytest.raises(DeviceError, match='no motor answers'):

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from texture_core.catalogue import find
 from texture_core.errors import DeviceError, MotionRefused, TextureError
 from texture_core.exploration import ExplorationRequest, ExplorationState
-from texture_exploration.arms.protocol import Arm, Recoverable, Vector
+from texture_exploration.arms.protocol import Arm, Rebootable, Recoverable, Vector, Warns
 from texture_exploration.exploration import Exploration, cannot_move, hear_nothing
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.touch import TouchParams
@@ -94,6 +94,10 @@ class Explorer:
             return str(error)
         return cannot_move(state, self._clock(), self.limits)
 
+    def warning(self) -> str:
+        """Return in a sentence what is not as it should be although the arm moves, '' if nothing."""
+        return self.arm.warning() if isinstance(self.arm, Warns) else ''
+
     @property
     def current(self) -> Exploration | None:
         """The exploration that is running, None if none is."""
@@ -146,6 +150,22 @@ class Explorer:
                     self.arm.recover()
             if self.trouble():
                 self.connect()
+
+    def reboot(self) -> str:
+        """Reboot the motors that report an error; return what was done. The arm lets go, the next request connects.
+
+        Raises
+        ------
+        MotionRefused
+            If an exploration is running, or the arm has no motors that could be rebooted.
+        DeviceError
+            If a motor stays in its error.
+        """
+        with self._lock:
+            self._refuse_two()
+            if not isinstance(self.arm, Rebootable):
+                raise MotionRefused('this arm has no motors that could be rebooted; use recover')
+            return self.arm.reboot()
 
     def close(self) -> None:
         """Abort, wait until the finger is lifted, let the arm go."""

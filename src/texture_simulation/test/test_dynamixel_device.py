@@ -9,7 +9,7 @@ import pytest
 
 from texture_core.finger import FingerState
 from texture_simulation.devices.dynamixel import EmulatedDynamixelBus, crc16
-from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, DynamixelMotors, Pressing, leap_hand
+from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, OVERLOAD, DynamixelMotors, Pressing, leap_hand
 
 DEADLINE_S = 20.0
 PING_1 = bytes.fromhex('fffffd00010300 01 194e'.replace(' ', ''))
@@ -44,7 +44,7 @@ def test_a_ping_answers_with_the_model_and_in_pieces(bus):
     assert bus.hear(PING_1[:4]) == b''
     answer = bus.hear(PING_1[4:])
     assert answer[4] == 1
-    assert struct.unpack('<H', answer[9:11])[0] == 1220
+    assert struct.unpack('<H', answer[9:11])[0] == 1240
 
 
 def test_noise_and_a_wrong_checksum_get_no_answer(bus):
@@ -71,7 +71,7 @@ def test_the_goal_current_bounds_the_force(bus):
     for address, value, size in ((84, 600, 2), (102, 200, 2), (116, 2048 + 400, 4), (64, 1, 1)):
         bus.hear(write(1, address, value, size))
     bus.motors.advance(4000)
-    assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.35 / 0.1, rel=0.01)  # current · torque constant / lever
+    assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)  # current · torque constant / lever
     assert read(bus, 1, 126, '<h') == 200
 
 
@@ -82,7 +82,7 @@ def test_a_motor_presses_calmly_however_stiff_the_object():
     stiff.motors.advance(4000)
     for _ in range(20):
         stiff.motors.advance(1)
-        assert stiff.motors.forces_n[1] == pytest.approx(0.2 * 0.35 / 0.1, rel=0.01)
+        assert stiff.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)
 
 
 def test_a_free_motor_goes_to_its_goal(bus):
@@ -92,10 +92,86 @@ def test_a_free_motor_goes_to_its_goal(bus):
     assert read(bus, 2, 132, '<i') == 1948
 
 
+ALERT, RANGE, LENGTH, LIMIT, ACCESS = 0x80, 4, 5, 6, 7
+S = 2000  # steps of the mechanics in a second
+
+
+def error_of(bus, request):
+    return bus.hear(request)[8]
+
+
+def pressed(bus):
+    """Let motor 1 press with 0.2 A, watched for 0.1 s."""
+    for address, value, size in ((84, 600, 2), (98, 5, 1), (102, 200, 2), (116, 2048 + 400, 4), (64, 1, 1)):
+        assert error_of(bus, write(1, address, value, size)) == 0
+    for _ in range(20):
+        bus.motors.advance(S // 20)
+        bus.hear(packet(2, 1))  # to another motor
+
+
+def test_a_motor_that_hears_nothing_stops_and_takes_no_goal_until_its_watchdog_is_cleared(bus):
+    pressed(bus)
+    assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)
+    assert read(bus, 1, 98, '<b') == 5
+    place = read(bus, 1, 132, '<i')
+    bus.motors.advance(S // 5)
+    assert read(bus, 1, 98, '<b') == -1
+    assert read(bus, 1, 116, '<i') == place
+    assert read(bus, 1, 64, '<b') == 1  # it stops, and holds
+    # What is left of the force: gain 600 · 0.005 A/rad · 0.517 N·m/A against 2000 N/m · (0.1 m)²
+    assert bus.motors.forces_n[1] < 0.2 * 0.2 * 0.517 / 0.1
+    for address, size in ((100, 2), (102, 2), (104, 4), (116, 4)):
+        assert error_of(bus, write(1, address, 100, size)) == RANGE
+    assert error_of(bus, write(1, 98, 0, 1)) == 0
+    assert error_of(bus, write(1, 102, 100, 2)) == 0
+
+
+def test_firmware_whose_watchdog_only_reports_presses_on():
+    motors = DynamixelMotors([1, 2], {1: Pressing(0.1, 0.01)}, watchdog_stops=False)
+    bus = EmulatedDynamixelBus(Path('/nowhere'), motors)
+    pressed(bus)
+    bus.motors.advance(S)
+    assert read(bus, 1, 98, '<b') == -1
+    assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)
+
+
+def test_a_watchdog_that_is_not_armed_or_without_torque_does_not_trip(bus):
+    bus.hear(write(1, 64, 1, 1))
+    bus.hear(write(2, 98, 1, 1))
+    bus.motors.advance(S)
+    assert (read(bus, 1, 98, '<b'), read(bus, 2, 98, '<b')) == (0, 1)
+
+
+def test_an_overload_ends_the_torque_until_a_reboot(bus):
+    pressed(bus)
+    bus.motors.fail(1, OVERLOAD)
+    assert read(bus, 1, 64, '<b') == 0
+    assert error_of(bus, packet(1, 1)) == ALERT
+    assert error_of(bus, write(1, 64, 1, 1)) == ALERT | ACCESS
+    assert error_of(bus, write(1, 64, 0, 1)) == ALERT
+    assert error_of(bus, packet(1, 8)) == ALERT
+    assert bus.hear(packet(1, 1)) == b''  # it starts
+    bus.motors.advance(S)
+    assert error_of(bus, packet(1, 1)) == 0
+    assert error_of(bus, write(1, 64, 1, 1)) == 0
+    assert read(bus, 1, 98, '<b') == 0
+    assert read(bus, 1, 84, '<h') == 400
+
+
+def test_what_a_motor_refuses_it_answers_and_does_not_do(bus):
+    assert error_of(bus, write(1, 102, 1751, 2)) == LIMIT
+    assert error_of(bus, write(1, 102, -1751, 2)) == LIMIT
+    assert error_of(bus, write(1, 102, 1, 1)) == LENGTH
+    assert error_of(bus, write(1, 126, 1, 2)) == ACCESS  # what is measured
+    assert error_of(bus, packet(1, 0x77)) == 2  # no such instruction
+    bus.hear(packet(0xFE, 0x83, struct.pack('<HHBHBH', 102, 2, 1, 1751, 2, 100)))
+    assert (read(bus, 1, 102, '<h'), read(bus, 2, 102, '<h')) == (1750, 100)
+
+
 def test_the_bench_is_told_where_the_finger_is_and_how_hard_it_presses(tmp_path):
     motors, finger = leap_hand(), LEAP_FINGERS['index']
-    # 257 mA · 0.35 N·m/A / 0.09 m = 1 N
-    for motor, current_ma, angle_rad in ((finger.press, 257, 0.4), (finger.across, 350, 0.1)):
+    # 174 mA · 0.517 N·m/A / 0.09 m = 1 N
+    for motor, current_ma, angle_rad in ((finger.press, 174, 0.4), (finger.across, 350, 0.1)):
         motors.write(motor, 84, struct.pack('<H', 600))
         motors.write(motor, 102, struct.pack('<h', current_ma))
         motors.write(motor, 116, struct.pack('<i', 2048 + round(angle_rad / 0.001533981)))

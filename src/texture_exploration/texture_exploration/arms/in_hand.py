@@ -10,9 +10,10 @@ from texture_core.catalogue import find
 from texture_core.errors import DeviceError
 from texture_core.finger import FingerSender, FingerState
 from texture_core.parameters import param
+from texture_exploration.arms.command_limits import CommandLimits
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
 from texture_exploration.hands.dynamixel import DynamixelHand
-from texture_exploration.hands.protocol import FingerSet, Fingertip, Hand
+from texture_exploration.hands.protocol import FingerSet, Fingertip, Hand, RebootableHand
 from texture_exploration.hands.simulated import SimulatedHand
 
 HELD_SHARE = 0.8  # of the wanted force: a finger that presses with it holds the object
@@ -21,7 +22,7 @@ LOOK_S = 0.01
 
 
 @dataclass(frozen=True)
-class InHandParams:
+class InHandParams(CommandLimits):
     """Which hand holds what how."""
 
     hand: str = param('simulated', 'Name of the hand (simulated, dynamixel).', choices=('simulated', 'dynamixel'))
@@ -35,8 +36,8 @@ class InHandParams:
 
 
 HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
-    'simulated': lambda params: SimulatedHand(),
-    'dynamixel': lambda params: DynamixelHand(params.profile, params.device, params.torque_off_on_fault),
+    'simulated': lambda params: SimulatedHand(limits=params),
+    'dynamixel': lambda params: DynamixelHand(params.profile, params.device, params.torque_off_on_fault, params),
 }
 
 
@@ -101,6 +102,17 @@ class InHandArm:
     def stop(self) -> None:
         """Let the sliding fingers stand still; the others hold on."""
         self.command(ArmCommand())
+
+    def warning(self) -> str:
+        """Return what is not as it should be although the hand moves, '' if nothing."""
+        return self.hand.warning()
+
+    def reboot(self) -> str:
+        """Let go and reboot the motors that report an error; the arm is not connected any more."""
+        if not isinstance(self.hand, RebootableHand):
+            raise DeviceError(f"the hand '{self._params.hand}' has no motors that could be rebooted")
+        self.close()
+        return self.hand.reboot()
 
     def _weak(self, share: float) -> str:
         """Return which holding finger presses with less than a share of the wanted force, '' if none."""

@@ -79,6 +79,22 @@ class Recoverable(Protocol):
         """Clear the fault; DeviceError if that is not possible. Whoever calls it sees that the arm may move."""
 
 
+@runtime_checkable
+class Rebootable(Protocol):
+    """An arm of motors that latch an error until they are rebooted."""
+
+    def reboot(self) -> str:
+        """Let go, reboot what reports an error, stay unconnected; return what was done, or raise DeviceError."""
+
+
+@runtime_checkable
+class Warns(Protocol):
+    """An arm that tells what is not as it should be although it moves."""
+
+    def warning(self) -> str:
+        """Return it in a sentence, '' if there is nothing."""
+
+
 class ArmClass(Protocol):
     """A class of arms: its parameter dataclass, and how to make one from it."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import termios
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 import serial
 
 from texture_core.errors import DeviceError
+from texture_exploration.hands.models import describe
 from texture_exploration.hands.profile import Profile
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
@@ -24,6 +26,12 @@ PROTOCOL = 2.0
 SUCCESS = 0
 TRIES = 3
 WAIT_S = 0.001
+TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
+RESTART_S = 3.0  # a motor has rebooted within
+SILENT = 'does not answer'
+GARBLED = 'answers with what cannot be read: is its id given to two motors, or the cable damaged?'
+RESET = 'has lost its torque: it was reset, as by a dip of its supply'
+REMEDY = "; when it has cooled and nothing blocks it, reboot it (service 'reboot') or switch its power off and on"
 HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'electrical shock', 5: 'overload'}
 
 
@@ -42,7 +50,9 @@ class DynamixelBus:
     Attributes
     ----------
     missing : set of int
-        Motors that do not answer; they are left out until `look_for` finds them.
+        Motors that do not answer, or not as they should; they are left out until `look_for` finds them.
+    limits_a : dict of int to float
+        Highest current that each motor takes.
     """
 
     def __init__(self, device: str, profile: Profile) -> None:
@@ -54,6 +64,10 @@ class DynamixelBus:
                 "dynamixel-sdk==4.1.0'"
             ) from error
         self.missing: set[int] = set()
+        self.limits_a: dict[int, float] = {}
+        self._reasons: dict[int, str] = {}  # why a motor is missing, where that is not silence
+        self._energised: set[int] = set()
+        self._goal_currents: dict[int, int] = {}  # as sent last
         self._device = device
         self._profile = profile
         self._port: Any = self._sdk.PortHandler(device)
@@ -65,7 +79,10 @@ class DynamixelBus:
         self._port.ser.timeout = WAIT_S
         first, last = profile.table['present_current'], profile.table['present_position']
         self._block = (first[0], last[0] + last[1] - first[0])
+        first, last = profile.table['torque_enable'], profile.table['goal_current']
+        self._health = (first[0], last[0] + last[1] - first[0])
         self._turn = 0
+        self._garbled = False  # the last answer
 
     def close(self) -> None:
         """Close the port; never raises."""
@@ -73,43 +90,106 @@ class DynamixelBus:
             self._port.closePort()
 
     def start(self) -> None:
-        """Find the motors, set mode and gains, let them hold where they are.
+        """Find and check the motors, set mode and gains; only when all is well, let them hold where they are.
 
         Raises
         ------
         DeviceError
-            If none answers, or one is of another model.
+            If none answers, one is of another model, reports a hardware error, or does not take what it is told.
         """
+        self.torque_off(self._profile.ids)  # a program before may have left it on
         self.missing = set(self._profile.ids)
-        for motor in self._profile.ids:
-            any(self.look_for(motor) for _ in range(TRIES))
-        if len(self.missing) == len(self._profile.ids):
+        found = [motor for motor in self._profile.ids if any(self._prepare(motor) for _ in range(TRIES))]
+        if not found:
             raise DeviceError(
                 f"no motor answers on '{self._device}' at {self._profile.baud} baud; check power, baud rate and the "
                 f"ids of the profile '{self._profile.name}'"
             )
+        if errors := [error for motor in found if (error := self.hardware_error(motor))]:
+            raise DeviceError('; '.join(errors))
+        for motor in found:
+            self._energise(motor)
 
     def look_for(self, motor: int) -> bool:
-        """Take a motor in if it answers; return whether it does."""
+        """Take a motor in if it answers and is well; return whether that is so."""
+        if not self._prepare(motor):
+            return False
+        if error := self.hardware_error(motor):
+            self._reasons[motor] = error
+            return False
+        self._energise(motor)
+        return True
+
+    def why_missing(self, motor: int) -> str:
+        """Return in words why a motor is missing."""
+        return self._reasons.get(motor) or f'{self._profile.owner(motor)} {SILENT}'
+
+    def _prepare(self, motor: int) -> bool:
+        """Set mode, limits and goals of a motor without torque; return whether it answers."""
+        profile = self._profile
+        self._reasons.pop(motor, None)
         with self._line():
             model, result, _ = self._packets.ping(self._port, motor)
+        self._garbled = result == self._sdk.COMM_RX_CORRUPT
         position = self.read_register(motor, 'present_position') if result == SUCCESS else None
         if position is None:
+            if self._garbled:
+                self._reasons[motor] = f'{profile.owner(motor)} {GARBLED}'
             return False
-        if model not in self._profile.models:
+        if model not in profile.models:
             raise DeviceError(
-                f"{self._profile.owner(motor)} is of model {model}; the profile '{self._profile.name}' is for "
-                f'{", ".join(map(str, self._profile.models))}'
+                f"{profile.owner(motor)} is of model {describe(model)}; the profile '{profile.name}' is for "
+                f'{", ".join(map(describe, profile.models))}, and with another its forces would be wrong; use a '
+                'profile for this model'
             )
         self.write(motor, 'torque_enable', 0)  # or the mode cannot be set
-        self.write(motor, 'operating_mode', self._profile.operating_mode)
-        for register, value in self._profile.gains.items():
+        self.write(motor, 'bus_watchdog', 0)  # or no goal is taken after it has stopped the motor
+        self.write(motor, 'operating_mode', profile.operating_mode)
+        for register, value in profile.gains.items():
             self.write(motor, register, value)
-        self.write(motor, 'goal_current', round(self._profile.move_a / self._profile.current_a))
+        limit = self.read_register(motor, 'current_limit')
+        if limit is None:
+            return False
+        self.limits_a[motor] = limit * profile.current_a
+        self._goal_currents[motor] = self._counts(motor, profile.move_a)
+        self.write(motor, 'goal_current', self._goal_currents[motor])
         self.write(motor, 'goal_position', position)
-        self.write(motor, 'torque_enable', 1)
-        self.missing.discard(motor)
         return True
+
+    def _energise(self, motor: int) -> None:
+        """Arm the motor's watchdog, then switch its torque on: it holds where it is."""
+        if self._profile.watchdog:
+            self.write(motor, 'bus_watchdog', self._profile.watchdog)
+        self.write(motor, 'torque_enable', 1)
+        self._energised.add(motor)
+        self.missing.discard(motor)
+
+    def reboot(self) -> list[int]:
+        """Reboot the motors that report a hardware error, all without torque; return which.
+
+        Raises
+        ------
+        DeviceError
+            If one does not come back, or still reports an error.
+        """
+        self.torque_off(self._profile.ids)
+        latched = [motor for motor in self._profile.ids if self.read_register(motor, 'hardware_error')]
+        for motor in latched:
+            with self._line():
+                self._packets.reboot(self._port, motor)
+        for motor in latched:
+            self._wait_for_restart(motor)
+        return latched
+
+    def _wait_for_restart(self, motor: int) -> None:
+        end_s = time.monotonic() + RESTART_S
+        while (bits := self.read_register(motor, 'hardware_error')) != 0:
+            if time.monotonic() > end_s:
+                found = f'still reports {_reasons(bits)}' if bits else SILENT
+                raise DeviceError(
+                    f'{self._profile.owner(motor)} {found} after a reboot; let it cool, look for what blocks it, and '
+                    'switch its power off and on'
+                )
 
     def read(self) -> dict[int, Motor]:
         """Return what all motors measure, {} if a cycle is lost; who does not answer is moved to `missing`."""
@@ -131,28 +211,82 @@ class DynamixelBus:
         return {motor: self._measured(group, motor) for motor in asked}
 
     def write_goals(self, goals: Mapping[int, tuple[float, float]]) -> None:
-        """Send highest current (A) and position (rad) of motors."""
+        """Send highest current (A; no more than the motor's limit) and position (rad) of motors."""
         present = {motor: goal for motor, goal in goals.items() if motor not in self.missing}
         profile = self._profile
-        self._sync_write('goal_current', {m: round(a / profile.current_a) for m, (a, _) in present.items()})
+        currents = {motor: self._counts(motor, current_a) for motor, (current_a, _) in present.items()}
+        self._goal_currents.update(currents)
+        self._sync_write('goal_current', currents)
         self._sync_write(
             'goal_position', {m: round(p / profile.position_rad) + profile.zero for m, (_, p) in present.items()}
         )
 
     def torque_off(self, motors: Iterable[int]) -> None:
         """Let motors go, also those that do not answer: they may hear."""
+        self._energised.difference_update(motors)
         self._sync_write('torque_enable', dict.fromkeys(motors, 0))
 
-    def next_hardware_error(self) -> str:
-        """Ask one motor after the other, one with each call; return in words what it reports, '' if nothing."""
+    def let_go(self) -> None:
+        """Let all motors go and see that they did, as far as they can be reached; raises nothing that a line does."""
+        self._port.is_using = False  # whatever was interrupted
+        with contextlib.suppress(DeviceError):
+            for _ in range(TRIES):
+                self.torque_off(self._profile.ids)
+                here = [motor for motor in self._profile.ids if motor not in self.missing]
+                if not any(self.read_register(motor, 'torque_enable') for motor in here):
+                    return
+
+    def check_next(self) -> str:
+        """Look after one motor, another one with each call; return in words what it reports, '' if nothing.
+
+        Raises
+        ------
+        DeviceError
+            If its watchdog has stopped it, or it refuses what it is told.
+        """
         present = [motor for motor in self._profile.ids if motor not in self.missing]
         if not present:
             return ''
         motor = present[self._turn % len(present)]
         self._turn += 1
-        bits = self.read_register(motor, 'hardware_error') or 0
-        reasons = [text for bit, text in HARDWARE_ERRORS.items() if bits >> bit & 1]
-        return f'{self._profile.owner(motor)} reports {" and ".join(reasons)}' if reasons else ''
+        with self._line():
+            data, result, _error = self._packets.readTxRx(self._port, motor, *self._health)
+        if result != SUCCESS or len(data) != self._health[1]:
+            return ''  # that it is silent is noticed elsewhere
+
+        def value(register: str) -> int:
+            address, size = self._profile.table[register]
+            at = address - self._health[0]
+            return int.from_bytes(bytes(data[at : at + size]), 'little')
+
+        owner = self._profile.owner(motor)
+        if bits := value('hardware_error'):
+            return f'{owner} reports {_reasons(bits)}{REMEDY}'
+        if motor not in self._energised:
+            return ''
+        if value('bus_watchdog') == TRIPPED:
+            raise DeviceError(
+                f'{owner} heard nothing for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the computer '
+                'or the bus was held up; all motors were let go'
+            )
+        if not value('torque_enable'):
+            self._reasons[motor] = f'{owner} {RESET}'
+            self._energised.discard(motor)
+            self.missing.add(motor)
+        elif signed(value('goal_current'), 2) != self._goal_currents[motor]:
+            # Nobody answers to what is sent to all motors at once. Lost on the way, or refused: then this tells why.
+            self.write(motor, 'goal_current', self._goal_currents[motor])
+        return ''
+
+    def hardware_error(self, motor: int) -> str:
+        """Return in words which hardware error a motor reports and what to do, '' if none."""
+        bits = self.read_register(motor, 'hardware_error')
+        return f'{self._profile.owner(motor)} reports {_reasons(bits)}{REMEDY}' if bits else ''
+
+    def _counts(self, motor: int, current_a: float) -> int:
+        """Return a current in counts, no more than the motor takes: it would refuse the whole command."""
+        limit_a = self.limits_a[motor]
+        return round(min(limit_a, max(-limit_a, current_a)) / self._profile.current_a)
 
     def write(self, motor: int, register: str, value: int) -> None:
         """Write one register, and see that it was taken."""
@@ -171,12 +305,13 @@ class DynamixelBus:
     def read_register(self, motor: int, register: str) -> int | None:
         """Return one register, signed if it is longer than a byte; None if the motor does not answer."""
         address, size = self._profile.table[register]
-        ask = {1: 'read1ByteTxRx', 2: 'read2ByteTxRx', 4: 'read4ByteTxRx'}[size]
         for _ in range(TRIES):
             with self._line():
-                value, result, _error = getattr(self._packets, ask)(self._port, motor, address)
-            if result == SUCCESS:
-                return signed(value, size) if size > 1 else int(value)
+                data, result, _error = self._packets.readTxRx(self._port, motor, address, size)
+            self._garbled = result == self._sdk.COMM_RX_CORRUPT
+            if result == SUCCESS and len(data) == size:  # or it is a late answer to an earlier question
+                value = int.from_bytes(bytes(data), 'little')
+                return signed(value, size) if size > 1 else value
         return None
 
     def _answers(self, motor: int) -> bool:
@@ -216,6 +351,12 @@ class DynamixelBus:
                 f"the hand on '{self._device}' cannot be reached ({error}); check that it is plugged in, that you may "
                 'open the device, and that no other program has it open'
             ) from error
+
+
+def _reasons(bits: int) -> str:
+    """Return the bits of the register Hardware Error Status in words."""
+    known = [text for bit, text in HARDWARE_ERRORS.items() if bits >> bit & 1]
+    return ' and '.join(known) or f'hardware error {bits:#04x}'
 
 
 def signed(value: int, size: int) -> int:

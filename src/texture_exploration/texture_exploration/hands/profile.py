@@ -10,22 +10,26 @@ from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter, TextureError
 from texture_core.plain_data import load_yaml
 from texture_core.resources import find_file
+from texture_exploration.hands.models import differs
 from texture_exploration.hands.protocol import FingerSet
 
 ROLES = ('press', 'across', 'along')
 REGISTERS = (
     'operating_mode',
+    'current_limit',
     'torque_enable',
     'hardware_error',
     'position_d',
     'position_i',
     'position_p',
+    'bus_watchdog',
     'goal_current',
     'goal_position',
     'present_current',
     'present_velocity',
     'present_position',
 )
+WATCHDOG_UNIT_S, MOST_WATCHDOG = 0.02, 127  # the register counts by these
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,10 @@ class Joint:
 
 @dataclass(frozen=True)
 class Profile:
-    """What a profile file says; registers are (address, bytes)."""
+    """What a profile file says; registers are (address, bytes).
+
+    `watchdog_s` is how long the motors go on without hearing anything; 0: for ever.
+    """
 
     name: str
     models: tuple[int, ...]
@@ -58,12 +65,18 @@ class Profile:
     finger_sets: Mapping[str, FingerSet]
     start_height_m: float
     hold_pose: tuple[int, ...] = field(default=())
+    watchdog_s: float = 0.3
 
     @property
     def ids(self) -> tuple[int, ...]:
         """All motors."""
         moving = [joint.id for finger in self.fingers.values() for joint in finger.values()]
         return tuple(sorted((*moving, *self.hold_pose)))
+
+    @property
+    def watchdog(self) -> int:
+        """What the register of the Bus Watchdog is set to."""
+        return round(self.watchdog_s / WATCHDOG_UNIT_S)
 
     def owner(self, motor: int) -> str:
         """Return what a motor does, in words."""
@@ -126,10 +139,26 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
         finger_sets=sets,
         start_height_m=float(content['start_height_m']),
         hold_pose=tuple(content.get('hold_pose', ())),
+        watchdog_s=float(content.get('watchdog_s', Profile.watchdog_s)),
     )
+    _check_models(profile, where)
+    if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MOST_WATCHDOG:
+        raise InvalidParameter(
+            f'{where}: watchdog_s is {profile.watchdog_s:g} s; allowed are {WATCHDOG_UNIT_S:g} to '
+            f'{MOST_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors press on when nobody commands them'
+        )
     if len(set(profile.ids)) != len(profile.ids):
         raise InvalidParameter(f'{where}: a motor is named twice; each has one place')
     return profile
+
+
+def _check_models(profile: Profile, where: str) -> None:
+    """Refuse motors for which the torque of the profile is wrong: they would press harder or softer than asked."""
+    for model in profile.models:
+        if difference := differs(model, profile.current_a, profile.torque_nm_a):
+            raise InvalidParameter(
+                f'{where}: {difference}; give each model a profile of its own, with its current_a and torque_nm_a'
+            )
 
 
 def _joints(roles: Mapping[str, Any], where: str) -> dict[str, Joint]:

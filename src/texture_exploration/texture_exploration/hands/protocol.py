@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from texture_exploration.arms.protocol import ArmCommand, Vector
 
@@ -50,7 +50,18 @@ class Hand(Protocol):
         """Return the newest state at once."""
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
-        """Let fingers press with these forces from now on, whatever else is commanded."""
+        """Let fingers press with these forces from now on, whatever else is commanded; CommandRefused as `command`."""
 
     def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        """Let fingers follow a command; it holds for a fraction of a second."""
+        """Let fingers follow a command; it holds for a fraction of a second. CommandRefused if it exceeds limits."""
+
+    def warning(self) -> str:
+        """Return in a sentence what is not as it should be although the hand moves, '' if nothing."""
+
+
+@runtime_checkable
+class RebootableHand(Protocol):
+    """A hand whose motors latch errors until they are rebooted."""
+
+    def reboot(self) -> str:
+        """Let go, reboot what reports an error, stay unconnected; return in words what was done."""

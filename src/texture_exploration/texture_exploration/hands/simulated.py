@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 
+from texture_exploration.arms.command_limits import CommandLimits
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
 from texture_exploration.hands.protocol import FingerSet, Fingertip, HandState
@@ -17,6 +18,7 @@ FINGER_SETS = {
     'kaboli-test': FingerSet(hold=('little', 'ring', 'middle'), slide=('thumb', 'index')),
 }
 START_M = 0.004
+LIMITS = CommandLimits()
 
 
 class SimulatedHand:
@@ -28,14 +30,22 @@ class SimulatedHand:
         CLOCK_MONOTONIC in ns.
     own_thread
         Move by itself once connected. If False, whoever owns the hand calls `step`.
+    limits
+        Of every single command.
     """
 
     finger_sets: Mapping[str, FingerSet] = FINGER_SETS
 
-    def __init__(self, clock: Callable[[], int] = time.monotonic_ns, own_thread: bool = True) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], int] = time.monotonic_ns,
+        own_thread: bool = True,
+        limits: CommandLimits = LIMITS,
+    ) -> None:
         params = SimulatedArmParams(start_height_m=START_M)
         self.fingers = {name: SimulatedArm(params, clock, own_thread=False) for name in FINGERS}
         self._clock = clock
+        self._limits = limits
         self._own_thread = own_thread
         self._grip: dict[str, ArmCommand] = {}
         self._closing = threading.Event()
@@ -71,10 +81,21 @@ class SimulatedHand:
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
         """Press from the next step on."""
-        self._grip = {name: ArmCommand(force_n=force) for name, force in forces_n.items()}
+        grip = {name: ArmCommand(force_n=force) for name, force in forces_n.items()}
+        for command in grip.values():
+            self._limits.check(command)
+        self._grip = grip
 
     def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
         """Follow from the next step on."""
+        self._limits.check(command, lambda: self._send(fingers, ArmCommand()))
+        self._send(fingers, command)
+
+    def warning(self) -> str:
+        """Nothing ever is amiss that `state` does not tell."""
+        return ''
+
+    def _send(self, fingers: Sequence[str], command: ArmCommand) -> None:
         for name in fingers:
             self.fingers[name].command(command)
 

@@ -29,6 +29,7 @@ from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_core.ros.waiting_executor import WaitingExecutor
 from texture_exploration.arms.catalogue import ARMS
+from texture_exploration.arms.protocol import Rebootable
 from texture_exploration.estimates import CertaintyParams, Estimates
 from texture_exploration.exploration import Exploration, hear_nothing
 from texture_exploration.explorer import Explorer
@@ -68,6 +69,8 @@ class ExplorerNode(Node):
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
         self.create_service(Trigger, 'stop', self._on_stop, callback_group=group)
         self.create_service(Trigger, 'recover', self._on_recover, callback_group=group)
+        if isinstance(self._explorer.arm, Rebootable):
+            self.create_service(Trigger, 'reboot', self._on_reboot, callback_group=group)
         ActionServer(
             self,
             action.Explore,
@@ -179,6 +182,14 @@ class ExplorerNode(Node):
         self.get_logger().info(f'recover: {response.message}')
         return response
 
+    def _on_reboot(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.message, response.success = self._explorer.reboot(), True
+        except (DeviceError, MotionRefused) as error:
+            response.message = str(error)
+        self.get_logger().info(f'reboot: {response.message}')
+        return response
+
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
         estimate: TextureEstimate | RoughnessEstimate = from_msg(message)
         estimates = self._open.get(estimate.exploration_id)
@@ -225,7 +236,10 @@ class ExplorerNode(Node):
             'arm_state_age_s': self._explorer.arm_age_s(),
             **self._explorer.counts,
         }
-        return ('ERROR', trouble, numbers) if trouble else ('OK', 'the arm answers', numbers)
+        if trouble:
+            return 'ERROR', trouble, numbers
+        warning = self._explorer.warning()
+        return ('WARN', warning, numbers) if warning else ('OK', 'the arm answers', numbers)
 
 
 def _accept_cancel(_goal: Any) -> CancelResponse:

@@ -14,7 +14,8 @@ from texture_simulation.devices.dynamixel_motors import ALERT, ERROR, PHYSICS_S,
 from texture_simulation.devices.robot_line import RobotLine
 
 HEADER = b'\xff\xff\xfd\x00'
-PING, READ, WRITE, STATUS, SYNC_READ, SYNC_WRITE = 1, 2, 3, 0x55, 0x82, 0x83
+PING, READ, WRITE, REBOOT, STATUS, SYNC_READ, SYNC_WRITE = 1, 2, 3, 8, 0x55, 0x82, 0x83
+UNDEFINED, CUT_SHORT = 2, 5  # errors of a status packet: instruction, length
 TURN_S = 0.002
 IDLE_S = 0.0005
 MOST_STEPS = 100
@@ -41,11 +42,21 @@ class EmulatedDynamixelBus(RobotLine):
         On the bus.
     finger
         Which one is reported to the bench.
+    latency_s
+        What comes from the motors is kept back for so long, as by a USB adapter: 16 ms are the default of FTDI.
     """
 
-    def __init__(self, link: Path, motors: DynamixelMotors, finger: Finger | None = None, finger_port: int = 0) -> None:
+    def __init__(
+        self,
+        link: Path,
+        motors: DynamixelMotors,
+        finger: Finger | None = None,
+        finger_port: int = 0,
+        latency_s: float = 0.0,
+    ) -> None:
         super().__init__(link, finger_port)
         self.motors = motors
+        self.latency_s = latency_s
         self._finger = finger
         self._heard = b''
 
@@ -55,7 +66,10 @@ class EmulatedDynamixelBus(RobotLine):
         while not self.closing.is_set():
             with self.using:
                 data = self.port.read()
-                self.port.write(self.hear(data))
+                answers = self.hear(data)
+                if answers:
+                    self.closing.wait(self.latency_s)
+                self.port.write(answers)
             if not data:
                 self.closing.wait(IDLE_S)
             steps = int((time.monotonic() - due_s) / PHYSICS_S)
@@ -76,6 +90,7 @@ class EmulatedDynamixelBus(RobotLine):
                 break
             self._heard = self._heard[at + 7 + length :]
             if crc16(packet[:-2]) == int.from_bytes(packet[-2:], 'little'):
+                self.motors.hear()
                 answers += self._obey(packet[4], packet[7], packet[8:-2].replace(b'\xff\xff\xfd\xfd', b'\xff\xff\xfd'))
         return answers
 
@@ -86,10 +101,10 @@ class EmulatedDynamixelBus(RobotLine):
         if instruction == SYNC_WRITE:
             address, size = struct.unpack_from('<HH', params)
             for at in range(4, len(params), size + 1):
-                if self._there(params[at]):
+                if self.motors.answers(params[at]):
                     self.motors.write(params[at], address, params[at + 1 : at + 1 + size])
             return b''
-        if not self._there(motor):
+        if not self.motors.answers(motor):
             return b''
         return self._one(motor, instruction, params)
 
@@ -101,26 +116,31 @@ class EmulatedDynamixelBus(RobotLine):
             address, size = struct.unpack('<HH', params)
             return self._status(motor, bytes(table[address : address + size]))
         if instruction == WRITE:
+            if len(params) < 3:
+                return self._status(motor, b'', CUT_SHORT)
             error = self.motors.write(motor, int.from_bytes(params[:2], 'little'), params[2:])
             return self._status(motor, b'', error)
-        return self._status(motor, b'', 2)
+        if instruction == REBOOT:
+            answer = self._status(motor, b'')
+            self.motors.reboot(motor)
+            return answer
+        return self._status(motor, b'', UNDEFINED)
 
     def _sync_read(self, address: int, size: int, ids: bytes) -> bytes:
         answers = b''
         for motor in ids:
-            if not self._there(motor):
+            if not self.motors.answers(motor):
                 break  # each waits for the one before it
             answers += self._status(motor, bytes(self.motors.tables[motor][address : address + size]))
         return answers
-
-    def _there(self, motor: int) -> bool:
-        return motor in self.motors.tables and motor not in self.motors.absent
 
     def _status(self, motor: int, params: bytes, error: int = 0) -> bytes:
         error |= ALERT if self.motors.tables[motor][ERROR] else 0
         body = (bytes([STATUS, error]) + params).replace(b'\xff\xff\xfd', b'\xff\xff\xfd\xfd')
         packet = HEADER + bytes([motor]) + struct.pack('<H', len(body) + 2) + body
-        return packet + struct.pack('<H', crc16(packet))
+        packet += struct.pack('<H', crc16(packet))
+        # Two motors with one id answer at once, and what they send is neither's.
+        return packet[:-2] + bytes(2) if motor in self.motors.twice else packet
 
 
 def main() -> None:

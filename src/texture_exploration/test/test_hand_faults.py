@@ -1,0 +1,272 @@
+"""Whatever ends the command of Dynamixel motors ends their torque, and what is wrong with them is named."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import pytest
+import serial
+
+from texture_core.errors import CommandRefused, DeviceError, InvalidParameter
+from texture_core.plain_data import load_yaml
+from texture_core.resources import find_file
+from texture_exploration.arms.in_hand import InHandArm, InHandParams
+from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.hands.dynamixel import DynamixelHand, Finger
+from texture_exploration.hands.dynamixel_bus import DynamixelBus
+from texture_exploration.hands.profile import load_profile, read_profile
+from texture_exploration.hands.simulated import SimulatedHand
+from texture_exploration.hands.torque_guard import torque_off_packet
+from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
+from texture_simulation.devices.dynamixel_motors import (
+    GOAL_CURRENT,
+    OVERLOAD,
+    TORQUE,
+    TRIPPED,
+    WATCHDOG,
+    DynamixelMotors,
+    leap_hand,
+)
+
+DEADLINE_S = 30.0
+LEAP = load_profile('leap')
+THUMB = LEAP.fingers['thumb']['press'].id
+PARENT = """
+import sys, time
+from texture_exploration.hands.dynamixel import DynamixelHand
+hand = DynamixelHand('leap', sys.argv[1])
+hand.connect()
+hand.grip({'thumb': 2.0})
+print('connected', flush=True)
+time.sleep(600)
+"""
+
+pytest.importorskip('dynamixel_sdk')
+
+
+def until(condition):
+    deadline = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def fault_of(hand):
+    try:
+        return hand.state().fault
+    except DeviceError as error:
+        return str(error)
+
+
+def torque_is_off(bus):
+    return not any(table[TORQUE] for table in bus.motors.tables.values())
+
+
+def register(bus, motor, address):
+    return int.from_bytes(bus.motors.tables[motor][address : address + 2], 'little')
+
+
+@pytest.fixture
+def bus(tmp_path):
+    with EmulatedDynamixelBus(tmp_path / 'bus', leap_hand()) as made:
+        yield made
+
+
+@pytest.fixture
+def hand(bus):
+    made = DynamixelHand('leap', str(bus.port.link))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def parent(bus):
+    """A process that grips with the thumb, once the thumb has the object."""
+    command = [sys.executable, '-c', PARENT, str(bus.port.link)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == 'connected\n'
+            until(lambda: bus.motors.forces_n[THUMB] > 1.8)
+            yield process
+        finally:
+            process.kill()
+
+
+def test_a_failed_connection_leaves_no_motor_under_torque(bus, hand):
+    bus.motors.fail(THUMB, OVERLOAD)
+    with pytest.raises(
+        DeviceError, match=r"motor 13 \('press' of thumb\) reports overload; .*reboot it \(service 'reboot'\)"
+    ):
+        hand.connect()
+    assert torque_is_off(bus)
+
+
+@pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')  # it is raised on purpose
+def test_an_error_in_the_program_lets_go_and_is_told(bus, hand, monkeypatch):
+    hand.connect()
+    monkeypatch.setattr(Finger, 'goals', lambda *_arguments: 1 / 0)
+    until(lambda: 'error in its program (ZeroDivisionError' in fault_of(hand))
+    until(lambda: torque_is_off(bus))
+
+
+def test_a_process_that_is_killed_leaves_no_motor_under_torque(bus, parent):
+    parent.send_signal(signal.SIGKILL)
+    until(lambda: torque_is_off(bus))
+
+
+def test_a_process_that_hangs_is_noticed_by_the_motors_and_the_force_runs_out(bus, parent):
+    parent.send_signal(signal.SIGSTOP)
+    until(lambda: all(table[WATCHDOG] == TRIPPED for table in bus.motors.tables.values()))
+    # The goal is now where the motor was, and its gain holds against the object: k·l² = 16 N·m/rad, gain 1.6 N·m/rad.
+    until(lambda: bus.motors.forces_n[THUMB] < 0.25 * 2.0)
+
+
+def test_a_cable_that_is_pulled_out_stops_the_motors(bus, hand):
+    hand.connect()
+    bus.unplug()
+    until(lambda: 'cannot be reached' in fault_of(hand))
+    until(lambda: all(table[WATCHDOG] == TRIPPED for table in bus.motors.tables.values()))
+    bus.plug()
+    hand.connect()
+    assert hand.state().fault == ''
+    assert {table[WATCHDOG] for table in bus.motors.tables.values()} == {15}  # 0.3 s
+
+
+def test_motors_that_were_stopped_by_their_watchdog_are_a_named_fault(bus, hand):
+    hand.connect()
+    bus.motors.tables[5][WATCHDOG] = TRIPPED
+    until(lambda: "motor 5 ('press' of middle) heard nothing for 0.3 s, and its watchdog stopped it" in fault_of(hand))
+    until(lambda: torque_is_off(bus))
+
+
+def test_no_more_current_is_asked_for_than_a_motor_takes(bus, hand):
+    bus.motors.write(1, 38, (100).to_bytes(2, 'little'))
+    hand.connect()
+    until(lambda: register(bus, 1, GOAL_CURRENT) == 100)  # and not 350, of the profile
+    with pytest.raises(CommandRefused, match=r'the Current Limit of its motor allows 0\.574 N'):  # 0.1 A · 0.517 / 0.09
+        hand.command(['index'], ArmCommand(force_n=1.0))
+    with pytest.raises(CommandRefused, match='the Current Limit of its motor'):
+        hand.grip({'index': 1.0})
+    assert hand.state().fault == ''
+
+
+def test_a_goal_that_a_motor_refuses_is_a_named_fault(bus, hand):
+    hand.connect()
+    bus.motors.tables[1][38:40] = (50).to_bytes(2, 'little')  # lowered behind the program's back
+    hand.grip({'index': 1.0})
+    until(lambda: "motor 1 ('press' of index) did not take 'goal_current'" in fault_of(hand))
+    assert 'exceeds the limit' in fault_of(hand)
+    until(lambda: torque_is_off(bus))
+
+
+def test_a_motor_of_another_model_is_refused(tmp_path):
+    with EmulatedDynamixelBus(tmp_path / 'bus', DynamixelMotors(list(range(1, 10)), {}, model=1010)) as bus:
+        with pytest.raises(DeviceError, match=r"is of model 1010 \(XH430-W210\); the profile 'xm430' is for 1020"):
+            DynamixelHand('xm430', str(bus.port.link)).connect()
+        assert torque_is_off(bus)
+
+
+def test_a_profile_of_motors_with_unlike_torques_is_refused():
+    content = load_yaml(find_file('xm430', 'texture_exploration', 'config/hands', 'hand profile'), 'hand profile')
+    with pytest.raises(InvalidParameter, match=r'model 1010 \(XH430-W210\) makes 1\.92 N·m/A at 1\.34 mA per count'):
+        read_profile({**content, 'models': [1020, 1010]}, 'mine')
+
+
+@pytest.mark.parametrize('watchdog_s', [-1.0, 0.001, 3.0, math.nan])
+def test_a_watchdog_out_of_range_is_refused(watchdog_s):
+    content = load_yaml(find_file('leap', 'texture_exploration', 'config/hands', 'hand profile'), 'hand profile')
+    with pytest.raises(InvalidParameter, match=r'allowed are 0\.02 to 2\.54 s'):
+        read_profile({**content, 'watchdog_s': watchdog_s}, 'mine')
+
+
+def test_a_motor_that_was_reset_is_named_and_taken_in_again(bus, hand):
+    hand.connect()
+    bus.motors.tables[5][TORQUE] = bus.motors.tables[5][WATCHDOG] = 0
+    until(lambda: "motor 5 ('press' of middle) has lost its torque" in fault_of(hand))
+    until(lambda: fault_of(hand) == '')
+    assert bus.motors.tables[5][TORQUE]
+    assert bus.motors.tables[5][WATCHDOG] == 15
+
+
+def test_two_motors_with_one_id_are_told(bus, hand):
+    bus.motors.twice = {5}
+    hand.connect()
+    assert "motor 5 ('press' of middle) answers with what cannot be read: is its id given to two motors" in fault_of(
+        hand
+    )
+
+
+def test_an_adapter_as_it_is_delivered_is_told_as_too_slow(bus, hand):
+    hand.connect()
+    assert hand.warning() == ''
+    bus.latency_s = 0.016
+    until(lambda: 'of 80 cycles a second: set the latency timer of the USB adapter to 1 ms' in hand.warning())
+    assert hand.state().fault == ''
+
+
+def test_a_motor_with_a_latched_error_can_be_rebooted(bus, hand):
+    bus.motors.fail(1, OVERLOAD)
+    assert hand.reboot().startswith("rebooted: motor 1 ('press' of index)")
+    hand.connect()
+    assert hand.state().fault == ''
+    assert hand.reboot().startswith('no motor that answers reports an error')
+    assert torque_is_off(bus)
+
+
+def test_an_error_that_a_reboot_does_not_clear_is_told(bus, hand, monkeypatch):
+    monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.RESTART_S', 0.2)
+    monkeypatch.setattr(bus.motors, 'reboot', lambda _motor: None)
+    bus.motors.fail(1, OVERLOAD)
+    with pytest.raises(DeviceError, match=r'motor 1 .* still reports overload after a reboot; .*switch its power off'):
+        hand.reboot()
+
+
+def test_a_simulated_hand_has_nothing_to_reboot():
+    with pytest.raises(DeviceError, match="the hand 'simulated' has no motors that could be rebooted"):
+        InHandArm().reboot()
+
+
+BAD = {
+    'no number': ArmCommand(force_n=math.nan),
+    'endless': ArmCommand(force_n=math.inf),
+    'negative': ArmCommand(force_n=-1.0),
+    'too high': ArmCommand(force_n=60.0),
+    'speed that is no number': ArmCommand(tangential_m_s=(math.nan, 0.0)),
+    'too fast': ArmCommand(normal_m_s=-5.0),
+}
+
+
+@pytest.mark.parametrize('name', BAD)
+@pytest.mark.parametrize('kind', ['simulated', 'dynamixel'])
+def test_a_hand_refuses_what_exceeds_its_limits_and_goes_on(bus, hand, kind, name):
+    tested = hand if kind == 'dynamixel' else SimulatedHand()
+    tested.connect()
+    with pytest.raises(CommandRefused, match='was refused and the arm stopped: the '):
+        tested.command(['index'], BAD[name])
+    if BAD[name].force_n is not None:
+        with pytest.raises(CommandRefused, match='was refused and the arm stopped: the force is'):
+            tested.grip({'index': BAD[name].force_n})
+    before = tested.state().time_ns
+    until(lambda: tested.state().time_ns > before and tested.state().fault == '')
+    tested.close()
+
+
+def test_the_limits_of_a_hand_are_its_parameters():
+    arm = InHandArm(replace(InHandParams(), command_force_n=0.5))
+    with pytest.raises(CommandRefused, match=r'the force is 2 N; allowed is 0 to 0\.5 N'):
+        arm.connect()
+
+
+def test_the_guard_sends_what_the_sdk_would_send(tmp_path):
+    master, slave = os.openpty()
+    with serial.Serial(os.ttyname(slave)):  # raw
+        line = DynamixelBus(os.ttyname(slave), LEAP)
+        line.torque_off(LEAP.ids)
+        assert os.read(master, 1000) == torque_off_packet(64, LEAP.ids)
+        line.close()
+    os.close(slave)
+    os.close(master)

@@ -1,0 +1,52 @@
+"""Dynamixel models by number: what a count of current is, and how much torque a current makes.
+
+Torque per current is stall torque by stall current at the recommended voltage. Source: ROBOTIS e-Manual, table
+Specifications and registers Model Number and Present Current of each model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+
+class Model(NamedTuple):
+    """Scale of the current in A per count, and torque per current in N·m/A."""
+
+    name: str
+    current_a: float
+    torque_nm_a: float
+
+
+MODELS: Mapping[int, Model] = {
+    1000: Model('XH430-W350', 0.00134, 3.4 / 1.3),
+    1010: Model('XH430-W210', 0.00134, 2.5 / 1.3),
+    1020: Model('XM430-W350', 0.00269, 4.1 / 2.3),
+    1030: Model('XM430-W210', 0.00269, 3.0 / 2.3),
+    1190: Model('XL330-M077', 0.001, 0.215 / 1.47),
+    1200: Model('XL330-M288', 0.001, 0.52 / 1.47),
+    1210: Model('XC330-T181', 0.001, 0.76 / 0.80),
+    1220: Model('XC330-T288', 0.001, 0.92 / 0.80),
+    1230: Model('XC330-M181', 0.001, 0.60 / 1.80),
+    1240: Model('XC330-M288', 0.001, 0.93 / 1.80),
+}
+TOLERANCE = 0.2  # of the torque of a count: motors of one model differ by less, and friction hides the rest
+
+
+def describe(model: int) -> str:
+    """Return a model number with the model's name, if it is in the table."""
+    return f'{model} ({MODELS[model].name})' if model in MODELS else str(model)
+
+
+def differs(model: int, current_a: float, torque_nm_a: float) -> str:
+    """Return how a model's torque per count departs from that of given scales, '' if it does not, or is unknown."""
+    if model not in MODELS:
+        return ''
+    own = MODELS[model]
+    count_nm = own.current_a * own.torque_nm_a
+    if abs(current_a * torque_nm_a / count_nm - 1) <= TOLERANCE:
+        return ''
+    return (
+        f'model {describe(model)} makes {own.torque_nm_a:.2f} N·m/A at {own.current_a * 1000:g} mA per count, and the '
+        f'profile says {torque_nm_a:g} N·m/A at {current_a * 1000:g} mA per count'
+    )
