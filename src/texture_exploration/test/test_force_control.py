@@ -11,6 +11,7 @@ from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.simulated_surface import SimulatedSurface
 from texture_exploration.force_control import ForceController, ForceLoopParams
 from texture_exploration.force_trials import ARM, CIRCLE, SURFACES, slide_trial, surface_trials
+from texture_exploration.lag import LagEstimate
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import growth
@@ -33,6 +34,31 @@ def test_from_soft_to_stiff_the_contact_is_gentle_and_the_slide_steady(stiffness
     assert overshoot < 0.2
     assert rms < 0.05
     assert speed < 0.02
+
+
+@pytest.mark.parametrize('lag_s', [0.0, 0.01, 0.02, 0.05])
+@pytest.mark.parametrize('stiffness', [200.0, 2000.0, 5000.0, 20000.0])
+def test_an_arm_that_is_later_than_declared_does_not_overshoot(stiffness, lag_s):
+    overshoot, rms, _ = slide(stiffness, undeclared_lag_s=lag_s)
+    assert overshoot < 0.2
+    assert rms < 0.1
+
+
+@pytest.mark.parametrize('lag_s', [0.0, 0.004, 0.02, 0.1])
+@pytest.mark.parametrize('speed_m_s', [-0.0005, -0.02, 0.05])
+def test_the_lag_of_an_arm_is_measured_from_its_first_movement(speed_m_s, lag_s):
+    rng, estimate = np.random.default_rng(2), LagEstimate()
+    for time_s in np.arange(100) * PERIOD_S:
+        height_m = 0.01 + speed_m_s * max(0.0, time_s - lag_s) + 1e-6 * rng.standard_normal()
+        estimate.update(height_m, speed_m_s, PERIOD_S)
+    assert estimate.value_s == pytest.approx(lag_s, abs=0.003)
+
+
+def test_a_lag_is_not_measured_on_an_arm_that_was_still_moving():
+    estimate = LagEstimate()
+    for asked_m_s in [0.0] * 50 + [-0.02] * 20 + [0.0] * 5 + [-0.01] * 100:
+        estimate.update(0.0, asked_m_s, PERIOD_S)  # it does not follow at all
+    assert math.isnan(estimate.value_s)
 
 
 @pytest.mark.parametrize('tilt', [-TILT, TILT])
