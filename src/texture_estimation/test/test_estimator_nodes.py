@@ -129,6 +129,15 @@ def test_a_model_may_be_given_later_and_a_bad_one_changes_nothing(graph, case, t
     assert bench.report()[0] == 'OK'
 
 
+def test_who_joins_late_still_gets_the_final_estimate(graph, case):
+    kind, path, vectors = case
+    bench = Bench(graph, kind, path)
+    final = bench.ask(vectors)[-1]
+    late = graph.listen(*kind.estimate, ESTIMATE_QOS)
+    graph.until(lambda: late and late[-1].final)
+    assert from_msg(late[-1]) == final
+
+
 def test_broken_messages_are_counted_and_survived(graph, case):
     kind, path, vectors = case
     bench = Bench(graph, kind, path)

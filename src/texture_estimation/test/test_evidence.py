@@ -43,6 +43,13 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
     assert estimates[-1].labels == model.labels
 
 
+def test_the_final_estimate_says_how_many_windows_are_missing_from_it(model, examples):
+    *windows, last = vectors(examples)
+    final = judge(model, [*windows, dataclasses.replace(last, skipped=6)])[-1]
+    assert final.message == '6 of 14 windows were left out, as samples were lost or not finite'
+    assert judge(model, [*windows, last])[-1].message == ''
+
+
 def test_overlapping_windows_count_the_sliding_time_once(model, examples):
     estimates = judge(model, vectors(examples, hop_s=0.1))
     assert [round(estimate.evidence_s, 3) for estimate in estimates[:4]] == [0.5, 0.6, 0.7, 0.8]

@@ -119,3 +119,23 @@ def test_only_the_latest_explorations_are_remembered(model, silk):
 def test_a_model_without_examples_cannot_be_taught(model):
     with pytest.raises(ModelMismatch, match='train it again'):
         Pupil(dataclasses.replace(model, examples=None))
+
+
+@pytest.mark.parametrize('label', ['../../etc/x', 'x' * 10_000, 'two\nlines'])
+def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_learnt(model, silk, tmp_path, label):
+    path = model.save(tmp_path / 'surfaces')
+    pupil = Pupil(load_model(path), path)
+    felt(pupil, silk)
+    with pytest.raises(InvalidData, match='label'):
+        pupil.learn(label)
+    assert load_model(path).labels == model.labels
+
+
+def test_one_exploration_cannot_stand_under_two_labels(model, silk):
+    pupil = Pupil(model)
+    felt(pupil, silk)
+    pupil.learn('silk')
+    with pytest.raises(InvalidData, match="'e1' was added as 'silk'; it cannot be 'satin', too"):
+        pupil.learn('satin')
+    pupil.undo()
+    assert pupil.learn('satin') == 12

@@ -11,6 +11,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_core.features import FeatureVector
+from texture_core.labels import checked_label
 from texture_estimation.lessons import Lesson, remove_lesson, write_lesson
 from texture_estimation.model import Model
 
@@ -57,11 +58,12 @@ class Pupil:
         Raises
         ------
         InvalidData
-            If there is no label, or nothing usable was felt in that exploration.
+            If there is no label or a forbidden one, nothing usable was felt in that exploration, or it already stands
+            under another label.
         OSError
             If the lesson cannot be kept; it has not been learnt then.
         """
-        label = label.strip()
+        label = checked_label(label)
         if not label:
             raise InvalidData('no label was given; name the texture to learn')
         name = exploration_id or next(reversed(self._felt), '')
@@ -70,11 +72,20 @@ class Pupil:
             raise InvalidData(
                 f"no usable window of exploration '{name}' was felt; explore first. Can be taught: {known}"
             )
+        self._refuse_second_label(name, label)
         lesson = Lesson(label, name, np.stack(self._felt[name]))
         if self._path is not None:
             write_lesson(self._path, len(self.model.lessons) + 1, lesson, self.model.feature_set)
         self._become((*self.model.lessons, lesson), label)
         return len(self._head.examples_of(self.model.labels.index(label)))
+
+    def _refuse_second_label(self, exploration_id: str, label: str) -> None:
+        others = [kept.label for kept in self.model.lessons if kept.exploration_id == exploration_id != '']
+        if others and label not in others:
+            raise InvalidData(
+                f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot be '{label}', too: "
+                'undo that first, or explore again'
+            )
 
     def undo(self) -> Lesson:
         """Unlearn the last lesson and return it.
