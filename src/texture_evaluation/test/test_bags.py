@@ -1,6 +1,9 @@
+import contextlib
 import dataclasses
 import math
+import os
 import re
+import sqlite3
 import sys
 from pathlib import Path
 
@@ -157,14 +160,72 @@ def test_a_damaged_bag_is_refused_or_read_whole_whichever_byte_is_wrong(tmp_path
             continue
 
 
-@pytest.mark.parametrize('packed', [zstd_compress(bytes(10**7)), lz4_compress(bytes(10**7))], ids=['zstd', 'lz4'])
+ONE_RECORD = b'\x05' + (10**7 - 9).to_bytes(8, 'little') + bytes(10**7 - 9)
+
+
+@pytest.mark.parametrize('packed', [zstd_compress(ONE_RECORD), lz4_compress(ONE_RECORD)], ids=['zstd', 'lz4'])
 def test_a_chunk_is_unpacked_no_further_than_it_claims(packed: bytes) -> None:
     kind = 'lz4' if packed.startswith(b'\x04\x22') else 'zstd'
     assert len(storage_mcap.DECOMPRESSORS[kind](packed, 100)) == 101
-    assert storage_mcap.decompress(packed, kind, 10**7, 0) == bytes(10**7)
+    assert storage_mcap.decompress(packed, kind, 10**7, 0) == ONE_RECORD
     for claimed in (100, 10**10):
         with pytest.raises(ReaderError, match=r'claims to unpack|size mismatch'):
             storage_mcap.decompress(packed, kind, claimed, 0)
+
+
+def test_a_chunk_of_few_bytes_holds_few_records() -> None:
+    packed = zstd_compress((b'\x05' + (22).to_bytes(8, 'little') + bytes(22)) * 100_000)
+    with pytest.raises(ReaderError, match=r'more than .* records'):
+        storage_mcap.decompress(packed, 'zstd', 3_100_000, 0)
+
+
+def chunk_bomb(bag: Path) -> None:
+    """Let the index name the first chunk twenty times, as if there were so many."""
+    file = bag / 'bag.mcap'
+    content = file.read_bytes()
+    summary = int.from_bytes(content[-28:-20], 'little')
+    at = summary
+    while content[at] != 0x08:
+        at += 9 + int.from_bytes(content[at + 1 : at + 9], 'little')
+    end = at + 9 + int.from_bytes(content[at + 1 : at + 9], 'little')
+    file.write_bytes(content[:end] + content[at:end] * 19 + content[end:])
+
+
+def test_an_index_that_names_a_chunk_many_times_is_refused(tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag')
+    chunk_bomb(bag)
+    with pytest.raises(InvalidData, match='chunks overlap'):
+        list(read_bag(bag))
+
+
+def test_a_bag_of_a_named_pipe_or_a_device_is_refused_at_once(tmp_path: Path) -> None:
+    for name in ('bag.mcap', 'metadata.yaml'):
+        bag = write(tmp_path / name / 'bag')
+        (bag / name).unlink()
+        os.mkfifo(bag / name)
+        with pytest.raises(InvalidData, match=r'named pipe|no metadata'):
+            list(read_bag(bag))
+        (bag / name).unlink()
+        (bag / name).symlink_to('/dev/zero')
+        with pytest.raises(InvalidData, match=r'device|no metadata'):
+            list(read_bag(bag))
+
+
+COMPUTED = {
+    'a computed column': 'CREATE TABLE messages(id INTEGER, topic_id, timestamp, data AS (zeroblob(100000000)))',
+    'a view': 'CREATE TABLE messages(id, topic_id, timestamp, data); CREATE VIEW schema AS SELECT 1 AS schema_version',
+}
+
+
+@pytest.mark.parametrize('what', COMPUTED)
+def test_an_sqlite_bag_that_computes_is_refused(what: str, tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag')
+    metadata = bag / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace('bag.mcap', 'bag.db3').replace(': mcap', ': sqlite3'))
+    with contextlib.closing(sqlite3.connect(bag / 'bag.db3')) as made:
+        made.executescript(f'CREATE TABLE topics(id, name, type, serialization_format); {COMPUTED[what]}')
+    with pytest.raises(InvalidData, match='tables that are computed'):
+        list(read_bag(bag))
 
 
 def test_a_bag_compressed_as_a_whole_is_refused_with_what_to_do(tmp_path: Path) -> None:

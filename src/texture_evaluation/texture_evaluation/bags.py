@@ -10,27 +10,26 @@ from typing import Any, NamedTuple
 
 import apsw
 import yaml
-from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 from rosbags.interfaces import Connection
-from rosbags.rosbag2 import Reader, ReaderError, storage_mcap
+from rosbags.rosbag2 import Reader, ReaderError
 from rosbags.typesys.base import TypesysError
 
 from texture_core.errors import InvalidData
 from texture_core.plain_data import parse_yaml
 from texture_core.signal import TactileSignal
+from texture_evaluation.bag_limits import CheckedPath, check_index, check_storage, messages_budget
 from texture_evaluation.cdr import MESSAGES, TYPES, SignalDecoder, decode, typestore
 
 if sys.version_info >= (3, 14):
-    from compression.zstd import ZstdDecompressor, ZstdError
+    from compression.zstd import ZstdError
 else:
-    from backports.zstd import ZstdDecompressor, ZstdError
+    from backports.zstd import ZstdError
 
 # What the reader raises, depending on which byte of a file is wrong.
 BROKEN = (
     ReaderError, TypesysError, ZstdError, apsw.Error, yaml.YAMLError, OSError, EOFError, struct.error, RuntimeError,
     ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
 )  # fmt: skip
-MOST_CHUNK_BYTES = 1_000_000_000
 
 
 class RawMessage(NamedTuple):
@@ -143,15 +142,22 @@ def _read(
     if not is_bag(path):
         raise InvalidData(_no_bag(path))
     try:
-        if path.is_dir():
-            _check_metadata(path / 'metadata.yaml')
-        with Reader(path) as reader:
+        checked = CheckedPath(path)
+        files = _files(checked)
+        for file in files:
+            check_storage(file)
+        budget = messages_budget(files)
+        with Reader(checked) as reader:
+            for storage in getattr(reader.storage, 'storages', [reader.storage]):
+                if hasattr(storage, 'chunks'):
+                    check_index(storage)
             connections = [c for c in _of_namespace(path, reader.connections, namespace) if chosen(c)]
             if not connections or not reader.message_count:
                 return
             missing = sum(connection.msgcount for connection in connections)
             for connection, log_ns, data in reader.messages(connections, start_ns, stop_ns):
                 missing -= 1
+                budget.spend(len(data))
                 yield RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
                 raise ReaderError(f'{missing} of its messages are missing')
@@ -161,25 +167,15 @@ def _read(
         ) from error
 
 
-def _check_metadata(path: Path) -> None:
-    """Raise one of `BROKEN` if it is no metadata, or if the bag as a whole may unpack to anything."""
-    facts = parse_yaml(path.read_text(encoding='utf-8'))['rosbag2_bagfile_information']
+def _files(path: Path) -> list[Path]:
+    """Return the files of a bag; one of `BROKEN` is raised if it may as a whole unpack to anything."""
+    if not path.is_dir():
+        return [path]
+    facts = parse_yaml((path / 'metadata.yaml').read_text(encoding='utf-8'))['rosbag2_bagfile_information']
     if str(facts.get('compression_mode') or 'none').lower() != 'none':
         raise ReaderError('it is compressed as a whole; let `ros2 bag convert` make it MCAP, which compresses inside')
-
-
-def _unpacked(decompressor: Any, data: bytes, size: int) -> bytes:
-    """Return a chunk that claims to unpack to `size`; one byte more is enough to tell that it does not."""
-    if size > MOST_CHUNK_BYTES:
-        raise ReaderError(f'a chunk claims to unpack to {size} bytes')
-    return bytes(decompressor.decompress(data, max_length=size + 1))
-
-
-# rosbags unpacks first and compares afterwards, when a chunk of a kilobyte may have filled the memory.
-storage_mcap.DECOMPRESSORS.update(
-    zstd=lambda data, size: _unpacked(ZstdDecompressor(), data, size),
-    lz4=lambda data, size: _unpacked(LZ4FrameDecompressor(), data, size),
-)
+    # As rosbags finds them: beside the metadata, wherever the entry says that they were.
+    return [path / Path(str(name)).name for name in facts['relative_file_paths']]
 
 
 def _of_namespace(path: Path, connections: list[Connection], namespace: str | None) -> list[Connection]:
