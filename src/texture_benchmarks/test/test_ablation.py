@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_evaluation.ablation import (
+from texture_benchmarks.result import Bench
+from texture_benchmarks.scenes import run as scenes
+from texture_benchmarks.scenes.trial import (
     ADDED,
     FRICTION,
     PATCH,
@@ -21,8 +23,6 @@ from texture_evaluation.ablation import (
     variants,
     with_one_more,
 )
-from texture_evaluation.benches import scenes
-from texture_evaluation.benches.result import Bench
 from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.effects.noise import Noise
 from texture_simulation.scene import Scene, load_scene, scene_from
@@ -58,7 +58,7 @@ def test_what_grows_with_the_force_stays_at_its_mean_when_removed_and_comes_back
     scene = two_ridges(patch_growth={})
     removed = variants(scene, TOUCHING)['patch_growth']
     assert removed.contact.blur_m == pytest.approx(scene.contact.blur_m * 4.5 ** (1 / 3))
-    monkeypatch.setattr('texture_evaluation.ablation.LEFT', {'ridges': dict(scene.effects)})
+    monkeypatch.setattr('texture_benchmarks.scenes.trial.LEFT', {'ridges': dict(scene.effects)})
     again = completed(removed, TOUCHING)
     assert again.effects == scene.effects
     assert again.contact.blur_m == pytest.approx(scene.contact.blur_m)

@@ -2,9 +2,9 @@ from pathlib import Path
 
 import pytest
 
+from texture_benchmarks.catalogue import BENCHES, run_bench
+from texture_benchmarks.result import Bench
 from texture_core.errors import InvalidData, UnknownName
-from texture_evaluation.bench import BENCHES, run_bench
-from texture_evaluation.benches.result import Bench
 
 
 def test_an_unknown_benchmark_and_missing_data_are_refused_with_a_sentence(tmp_path: Path) -> None:

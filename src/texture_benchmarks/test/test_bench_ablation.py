@@ -3,10 +3,10 @@ from pathlib import Path
 
 import pytest
 
+from texture_benchmarks.ablation.run import SHIPPED, SLOW_VARIANTS, VARIANTS, changed
+from texture_benchmarks.catalogue import BENCHES
+from texture_benchmarks.result import Bench
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.bench import BENCHES
-from texture_evaluation.benches.ablation import SHIPPED, SLOW_VARIANTS, VARIANTS, changed
-from texture_evaluation.benches.result import Bench
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 

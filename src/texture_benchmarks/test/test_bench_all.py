@@ -4,8 +4,8 @@ import signal
 from functools import partial
 from pathlib import Path
 
-from texture_evaluation.bench import BENCHES
-from texture_evaluation.bench_all import LONG, SIDE_BY_SIDE, in_processes, run_all
+from texture_benchmarks.catalogue import BENCHES
+from texture_benchmarks.run_all import LONG, SIDE_BY_SIDE, in_processes, run_all
 
 NAMES = ('good', 'killed', 'bad', 'clock', 'missing')
 

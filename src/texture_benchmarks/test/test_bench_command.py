@@ -2,12 +2,12 @@ from pathlib import Path
 
 import pytest
 
+from texture_benchmarks import catalogue
+from texture_benchmarks.commands import bench as command
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.run_all import LONG
 from texture_bringup.command import main
-from texture_bringup.commands import bench as command
 from texture_core.errors import InvalidData
-from texture_evaluation import bench as catalogue
-from texture_evaluation.bench_all import LONG
-from texture_evaluation.benches.result import Bench, BenchResult
 
 
 def good(bench: Bench) -> BenchResult:

@@ -3,12 +3,12 @@ from pathlib import Path
 
 import pytest
 
+from texture_benchmarks.catalogue import BENCHES
+from texture_benchmarks.frontier.training_costs import Size, cost, costs
+from texture_benchmarks.recipes.trial import comparable
+from texture_benchmarks.result import Bench
 from texture_estimation.learners.naive_bayes import NaiveBayes
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.bench import BENCHES
-from texture_evaluation.benches.result import Bench
-from texture_evaluation.recipe_trials import comparable
-from texture_evaluation.training_costs import Size, cost, costs
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 

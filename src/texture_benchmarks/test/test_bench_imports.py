@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from texture_benchmarks import imported_data as imports
+from texture_benchmarks.imported_data import imported, importing_once
+from texture_benchmarks.result import Bench
 from texture_core.errors import InvalidData
-from texture_evaluation.benches import imports
-from texture_evaluation.benches.imports import imported, importing_once
-from texture_evaluation.benches.result import Bench
 
 
 @pytest.fixture

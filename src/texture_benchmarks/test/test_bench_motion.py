@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.result import Bench
-from texture_exploration.force_trials import radius_error_m
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.motion.trial import radius_error_m
+from texture_benchmarks.result import Bench
 
 
 def test_force_speed_and_circle_are_kept_and_the_border_is_foretold(tmp_path: Path) -> None:

@@ -1,8 +1,8 @@
 from pathlib import Path
 
-from texture_evaluation.bench import BENCHES, run_bench
-from texture_evaluation.benches.optimise import CASES, DATA, LINEAR
-from texture_evaluation.benches.result import Bench
+from texture_benchmarks.catalogue import BENCHES, run_bench
+from texture_benchmarks.optimise.run import CASES, DATA, LINEAR
+from texture_benchmarks.result import Bench
 
 
 def test_searches_have_the_size_of_the_papers() -> None:

@@ -5,15 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData
-from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_estimation.recipe import load_recipe
-from texture_evaluation.bench import BENCHES
-from texture_evaluation.benches.recipes import QUICK_RECIPES, VIBRATION
-from texture_evaluation.benches.result import Bench
-from texture_evaluation.charts import pareto_front
-from texture_evaluation.recipe_trials import (
+from texture_benchmarks.catalogue import BENCHES
+from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION
+from texture_benchmarks.recipes.trial import (
     Recorded,
     comparable,
     describe_all,
@@ -25,7 +19,13 @@ from texture_evaluation.recipe_trials import (
     try_described,
     try_recipe,
 )
-from texture_evaluation.slides import Slide, find_slides
+from texture_benchmarks.result import Bench
+from texture_core.errors import InvalidData
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_estimation.recipe import load_recipe
+from texture_evaluation.charts import pareto_front
+from texture_recordings.slides import Slide, find_slides
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 SLIDES = [Slide(Path('bag'), f'{s}/{k}', s, k, k, None) for s in ('cork', 'felt') for k in range(1, 11)]

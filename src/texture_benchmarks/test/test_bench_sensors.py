@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.result import Bench
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.result import Bench
 
 
 def test_where_there_is_a_checksum_nothing_false_is_believed(tmp_path: Path) -> None:

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from texture_benchmarks.load.rig import Rig, biotac
 from texture_core.signal import lost_samples
 from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.biotac.tables import LAYOUTS
 from texture_drivers.params import SensorParams
 from texture_simulation.devices.biotac import BoardFaults, EmulatedBioTac
 from texture_simulation.devices.faults import FrameFaults
-from texture_simulation.rig import Rig, biotac
 
 Make = Callable[..., Rig]
 

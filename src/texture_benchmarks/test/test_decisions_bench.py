@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.result import Bench
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.result import Bench
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 

@@ -9,15 +9,15 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from texture_bringup.endurance import report
-from texture_bringup.endurance.books import SignalBook, Totals
-from texture_bringup.endurance.faults import FAULTS, strikes
-from texture_bringup.endurance.orders import orders
-from texture_bringup.endurance.pace import Pace, measure_pace
-from texture_bringup.endurance.processes import Processes
-from texture_bringup.endurance.record import Explored, Record, Struck
-from texture_bringup.endurance.usage import Use, read_use
-from texture_bringup.endurance.verdict import judge, lives, unexplained_vectors
+from texture_benchmarks.endurance import report
+from texture_benchmarks.endurance.books import SignalBook, Totals
+from texture_benchmarks.endurance.faults import FAULTS, strikes
+from texture_benchmarks.endurance.orders import orders
+from texture_benchmarks.endurance.pace import Pace, measure_pace
+from texture_benchmarks.endurance.processes import Processes
+from texture_benchmarks.endurance.record import Explored, Record, Struck
+from texture_benchmarks.endurance.usage import Use, read_use
+from texture_benchmarks.endurance.verdict import judge, lives, unexplained_vectors
 
 HOUR_S = 3600
 MIB = 2**20

@@ -8,12 +8,12 @@ import pytest
 pytestmark = pytest.mark.ros
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.endurance import run  # noqa: E402
-from texture_bringup.endurance.faults import Strike  # noqa: E402
-from texture_bringup.endurance.record import LOST  # noqa: E402
+from texture_benchmarks.endurance import run  # noqa: E402
+from texture_benchmarks.endurance.faults import Strike  # noqa: E402
+from texture_benchmarks.endurance.record import LOST  # noqa: E402
 from texture_bringup.ros import operator as operators  # noqa: E402
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
+from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
 FAULTS = ('explorer killed',)
 DEADLINE_S = 60.0

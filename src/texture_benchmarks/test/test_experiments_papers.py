@@ -4,16 +4,16 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from texture_benchmarks.papers import PROTOCOLS, Experiment, report, run_experiment
+from texture_benchmarks.papers.check import at_least, higher, lower_in, most_errors, seldom
+from texture_benchmarks.papers.gather import gather
+from texture_benchmarks.papers.interval import apart, mean, share
+from texture_benchmarks.papers.outcome import Outcome
+from texture_benchmarks.papers.protocol import Protocol, drawn, folds, halves, learnt_in
+from texture_benchmarks.papers.trial import judge, outcomes, recipe_of, reduced
 from texture_core.errors import InvalidParameter, UnknownName
-from texture_estimation.genetic.fitness import UNDECIDED
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.experiments import PROTOCOLS, Experiment, report, run_experiment
-from texture_evaluation.experiments.check import at_least, higher, lower_in, most_errors, seldom
-from texture_evaluation.experiments.gather import gather
-from texture_evaluation.experiments.interval import apart, mean, share
-from texture_evaluation.experiments.outcome import Outcome
-from texture_evaluation.experiments.protocol import Protocol, drawn, folds, halves, learnt_in
-from texture_evaluation.experiments.trial import judge, outcomes, recipe_of, reduced
+from texture_estimation.search.fitness import UNDECIDED
 from texture_simulation.scene import load_scene
 
 CODES = np.repeat([0, 1, 2], 20)

@@ -1,7 +1,7 @@
 from pathlib import Path
 
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.result import Bench
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.result import Bench
 from texture_features.catalogue import FEATURES
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
+from texture_benchmarks.forked import each_on_a_core
 from texture_core.errors import InvalidData
-from texture_evaluation.forked import each_on_a_core
 
 
 def test_each_job_is_done_in_its_place_with_what_could_not_be_sent() -> None:

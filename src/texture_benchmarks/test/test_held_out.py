@@ -1,9 +1,9 @@
 import numpy as np
 
+from texture_benchmarks.robustness.retime import retimed
+from texture_benchmarks.speed_force.held_out import Mask, one_out, recognised, run_chosen
+from texture_benchmarks.speed_force.turns import TurnFree
 from texture_estimation.learners.svm_rbf import SvmRbf
-from texture_evaluation.held_out import Mask, one_out, recognised, run_chosen
-from texture_evaluation.retime import retimed
-from texture_evaluation.turns import TurnFree
 
 SPEEDS = np.repeat([20.0, 40.0, 60.0], 4)
 RATE_HZ = 200.0

@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.learning.trial import try_course
+from texture_benchmarks.result import Bench
 from texture_core.errors import InvalidData
-from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.result import Bench
-from texture_evaluation.learning_trials import try_course
+from texture_features.labelled_features import LabelledFeatures
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 

@@ -10,17 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_benchmarks.ros.graph import Graph
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.ros.conversions import to_msg
 from texture_estimation.model import Model, load_model
-from texture_evaluation.dataset import cut_slides
-from texture_evaluation.datasets.biotac20 import import_biotac20
 from texture_evaluation.evaluate import judge
-from texture_evaluation.processes import NodeProcess
-from texture_evaluation.ros.graph import Graph
-from texture_evaluation.slides import find_slides
 from texture_evaluation.train import train_from_bags
+from texture_launch.node_process import NodeProcess
+from texture_recordings.dataset import cut_slides
+from texture_recordings.importers.biotac20 import import_biotac20
+from texture_recordings.slides import find_slides
 
 pytestmark = pytest.mark.ros
 
@@ -54,7 +54,7 @@ def live(model: Path, bags: Path, slides: str, rate: float, domain_id: int) -> t
         graph.listen('diagnostics', reader_of(health))
         call_through(graph, heard)
         with node(
-            'texture_evaluation', 'replay', bag=str(bags), slides=slides, rate=rate, start_delay_s=2.0, deadline_s=60.0
+            'texture_recordings', 'replay', bag=str(bags), slides=slides, rate=rate, start_delay_s=2.0, deadline_s=60.0
         ) as replay:
             graph.wait_until(lambda: wanted <= ended(heard), 120.0, 'the final estimates')
             assert replay.wait(60.0) == 0, replay.output

@@ -3,11 +3,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.next_motion.run import MOTIONS
+from texture_benchmarks.next_motion.trial import CHOICES, Trials, described, explored, learnt
+from texture_benchmarks.result import Bench
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.next_motion import MOTIONS
-from texture_evaluation.benches.result import Bench
-from texture_evaluation.motion_choice_trials import CHOICES, Trials, described, explored, learnt
 from texture_simulation.scene import load_scene
 
 

@@ -11,15 +11,15 @@ import pytest
 pytestmark = pytest.mark.ros
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.endurance.processes import Processes  # noqa: E402
-from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
-from texture_bringup.launcher.files import find_launch_file  # noqa: E402
+from texture_benchmarks.endurance.processes import Processes  # noqa: E402
+from texture_benchmarks.ros.graph import Graph  # noqa: E402
 from texture_core.features import FeatureVector  # noqa: E402
 from texture_core.ros.conversions import to_msg  # noqa: E402
 from texture_estimation.model import load_model  # noqa: E402
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
-from texture_evaluation.ros.graph import Graph  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
+from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_launch.files import find_launch_file  # noqa: E402
+from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
 DOMAIN = 225
 DEADLINE_S = 60.0

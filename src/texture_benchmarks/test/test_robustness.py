@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from texture_benchmarks.sensors.trial import CHECKED, LINES, line_figures
 from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.robustness import CHECKED, LINES, line_figures
 
 
 @pytest.mark.parametrize('sensor', LINES)

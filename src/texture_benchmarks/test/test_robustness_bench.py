@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_benchmarks.catalogue import BENCHES
+from texture_benchmarks.recipes.trial import Recorded, comparable, describe
+from texture_benchmarks.result import Bench
+from texture_benchmarks.robustness.chart import Curve, Panel, robustness_chart, robustness_tables
+from texture_benchmarks.robustness.degradations import DEGRADATIONS, Degradation, breakdown, rms
+from texture_benchmarks.robustness.run import LATER
+from texture_benchmarks.robustness.scenes import CONDITIONS, SCENE, Felt, felt_slides
+from texture_benchmarks.robustness.trial import TOPIC, Pupils, degraded
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.bench import BENCHES
-from texture_evaluation.benches.result import Bench
-from texture_evaluation.benches.robustness import LATER
-from texture_evaluation.degradations import DEGRADATIONS, Degradation, breakdown, rms
-from texture_evaluation.recipe_trials import Recorded, comparable, describe
-from texture_evaluation.robustness_charts import Curve, Panel, robustness_chart, robustness_tables
-from texture_evaluation.robustness_scenes import CONDITIONS, SCENE, Felt, felt_slides
-from texture_evaluation.robustness_trials import TOPIC, Pupils, degraded
-from texture_evaluation.slides import Slide
 from texture_evaluation.train import with_channels
+from texture_recordings.slides import Slide
 from texture_simulation.scene import load_scene
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')

@@ -5,11 +5,11 @@ import matplotlib.image
 import numpy as np
 import pytest
 
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.papers import Experiment, run_experiment
+from texture_benchmarks.papers.roughness_answers import Answers
+from texture_benchmarks.result import Bench
 from texture_estimation.roughness.recipe import load_roughness_recipe
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.result import Bench
-from texture_evaluation.experiments import Experiment, run_experiment
-from texture_evaluation.experiments.roughness_answers import Answers
 
 
 @pytest.fixture(scope='module')

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from texture_benchmarks.load.rig import CASES, Feed, Rig
 from texture_core.signal import lost_samples
 from texture_simulation.devices.daq import EmulatedDaq
 from texture_simulation.devices.faults import ByteFaults, FrameFaults
-from texture_simulation.rig import CASES, Feed, Rig
 
 Make = Callable[..., Rig]
 

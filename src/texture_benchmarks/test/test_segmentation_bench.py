@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.result import Bench
-from texture_evaluation.segmentation_trials import try_slide
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.result import Bench
+from texture_benchmarks.segmentation.trial import try_slide
 from texture_simulation.scene import load_scene
 
 

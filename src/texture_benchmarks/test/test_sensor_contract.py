@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from texture_benchmarks.load.rig import CASES, Rig
 from texture_core.errors import DeviceError
 from texture_core.signal import lost_samples
 from texture_drivers.catalogue import SENSORS
 from texture_simulation.devices.catalogue import DEVICES
 from texture_simulation.devices.faults import ByteFaults, FrameFaults
-from texture_simulation.rig import CASES, Rig
 
 WITHOUT_DEVICE = {'file'}
 FAMILIES = ('tsf85', 'biotac', 'daq', 'pvdf')  # the others differ from one of these by a table alone

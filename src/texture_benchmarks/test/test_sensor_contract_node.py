@@ -12,12 +12,12 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import TransitionCallbackReturn
 from texture_msgs import msg
 
+from texture_benchmarks.load.rig import CASES, Rig
 from texture_core.errors import InvalidParameter
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import SENSOR_QOS
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.devices.faults import FrameFaults
-from texture_simulation.rig import CASES, Rig
 
 pytestmark = pytest.mark.ros
 OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'

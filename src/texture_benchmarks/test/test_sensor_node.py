@@ -10,11 +10,11 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from texture_msgs import msg
 
+from texture_benchmarks.load.rig import Rig, biotac
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import SENSOR_QOS
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.devices.biotac import EmulatedBioTac
-from texture_simulation.rig import Rig, biotac
 
 pytestmark = pytest.mark.ros
 

@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 
+from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.result import Bench
 from texture_core.errors import InvalidData
-from texture_evaluation.bench import run_bench
-from texture_evaluation.benches.result import Bench
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 

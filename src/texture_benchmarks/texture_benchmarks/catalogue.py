@@ -5,30 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from texture_benchmarks.ablation import run as ablation
+from texture_benchmarks.biotac20 import run as biotac20
+from texture_benchmarks.clock import run as clock
+from texture_benchmarks.decisions import run as decisions
+from texture_benchmarks.features import run as features
+from texture_benchmarks.frontier import run as frontier
+from texture_benchmarks.latency import run as latency
+from texture_benchmarks.learning import run as learning
+from texture_benchmarks.load import run as load
+from texture_benchmarks.motion import run as motion
+from texture_benchmarks.next_motion import run as next_motion
+from texture_benchmarks.optimise import run as optimise
+from texture_benchmarks.recipes import run as recipes
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.robustness import run as robustness
+from texture_benchmarks.roughness import run as roughness
+from texture_benchmarks.scenes import run as scenes
+from texture_benchmarks.segmentation import run as segmentation
+from texture_benchmarks.sensors import run as sensors
+from texture_benchmarks.speed_force import run as speed_force
+from texture_benchmarks.stick_slip import run as stick_slip
 from texture_core.catalogue import find
-from texture_evaluation.benches import (
-    ablation,
-    biotac20,
-    clock,
-    decisions,
-    features,
-    frontier,
-    latency,
-    learning,
-    load,
-    motion,
-    next_motion,
-    optimise,
-    recipes,
-    robustness,
-    roughness,
-    scenes,
-    segmentation,
-    sensors,
-    speed_force,
-    stick_slip,
-)
-from texture_evaluation.benches.result import Bench, BenchResult
 
 BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time

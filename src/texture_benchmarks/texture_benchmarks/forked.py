@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any, TypeVar
 
-from texture_estimation.genetic.spread import one_thread_each
+from texture_estimation.search.spread import one_thread_each
 
 Job = TypeVar('Job')
 Out = TypeVar('Out')

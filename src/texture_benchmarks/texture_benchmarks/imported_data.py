@@ -8,9 +8,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
+from texture_benchmarks.result import Bench
 from texture_core.errors import InvalidData
-from texture_evaluation.benches.result import Bench
-from texture_evaluation.datasets.catalogue import IMPORTS
+from texture_recordings.importers.catalogue import IMPORTS
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 
-from texture_estimation.genetic.spread import one_thread_each
+from texture_estimation.search.spread import one_thread_each
 
 Act = Callable[[str], int]  # runs a benchmark by its name and returns the exit code of its process
 

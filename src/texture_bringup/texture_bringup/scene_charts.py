@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.scene_view import SceneView, ViewPlan
+from texture_simulation.scene_view import SceneView, ViewPlan
 
 MM, UM = 1e3, 1e6
 SHOWN_S = 0.25

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from texture_estimation.motion import Motion, kinds
+from texture_core.motion import Motion, kinds
 
 ASKED = Motion('linear_slide', 0.0, 0.1, 2.0, 1.0)
 

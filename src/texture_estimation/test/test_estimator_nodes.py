@@ -14,7 +14,6 @@ from texture_core.ros.conversions import from_msg, to_msg
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
 from texture_estimation.evidence import Evidence
-from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.model import load_model
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
@@ -22,6 +21,7 @@ from texture_estimation.roughness.evidence import RoughnessEvidence
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.recipe import RoughnessRecipe
 from texture_estimation.roughness.training import train_grades
+from texture_features.labelled_features import LabelledFeatures
 
 pytestmark = pytest.mark.ros
 GRADE_NAMES = ('signal/integral/f', 'signal/bursts/f')

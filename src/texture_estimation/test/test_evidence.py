@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from texture_core.features import FeatureVector
+from texture_estimation.classification.evidence_rules import MajorityVote
 from texture_estimation.evidence import Evidence
-from texture_estimation.evidence_rules import MajorityVote
 from texture_estimation.fingerprint import difference
 
 

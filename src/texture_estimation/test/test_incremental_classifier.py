@@ -6,8 +6,8 @@ import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.features import FeatureVector
+from texture_estimation.incremental.incremental_classifier import EXPLORATIONS, Pupil
 from texture_estimation.model import load_model
-from texture_estimation.pupil import EXPLORATIONS, Pupil
 
 
 def felt(pupil, values, exploration_id='e1', feature_set=None, last=True):

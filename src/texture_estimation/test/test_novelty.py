@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_estimation.familiarity import Familiarity
+from texture_estimation.open_set.novelty import Familiarity
 
 SURFACES, SLIDES, WINDOWS, FEATURES = 8, 12, 6, 5
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from texture_estimation.incremental.ridge_classifier import MOST_EXAMPLES, TaughtHead, spread
 from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.taught_head import MOST_EXAMPLES, TaughtHead, spread
 
 
 def cloud(centre, count=60, seed=0):

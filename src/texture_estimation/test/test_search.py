@@ -8,28 +8,28 @@ from sklearn.metrics.pairwise import rbf_kernel
 
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_core.window import Window
-from texture_estimation.evidence_rules import MajorityVote
-from texture_estimation.genetic.division import Division
-from texture_estimation.genetic.feature_cache import FeatureCache
-from texture_estimation.genetic.fitness import UNDECIDED, decided_by_slide, decisions, fitness
-from texture_estimation.genetic.halves import random_halves
-from texture_estimation.genetic.judges.ann_pairs import ann_pairs
-from texture_estimation.genetic.judges.exact import exact
-from texture_estimation.genetic.judges.svm_pairs import kernel_of, svm_pairs
-from texture_estimation.genetic.memory import Memory
-from texture_estimation.genetic.optimise import optimise
-from texture_estimation.genetic.pairs import optimise_pairs
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.scans import Scans, Stream
-from texture_estimation.genetic.search import SearchParams, search
-from texture_estimation.genetic.spread import in_turn, over_cores, over_dask
-from texture_estimation.genetic.telling_apart import TellingApart
-from texture_estimation.genetic.trial import Record, has_lost, verdict
-from texture_estimation.genetic.variables import Integer, LogReal, SearchSpace
+from texture_estimation.classification.evidence_rules import MajorityVote
 from texture_estimation.learners.ann_pairs import AnnPairs
 from texture_estimation.learners.svm_pairs import SvmPairs
 from texture_estimation.recipe import load_recipe
-from texture_features.windows import CutWindow
+from texture_estimation.search.division import Division
+from texture_estimation.search.feature_cache import FeatureCache
+from texture_estimation.search.fitness import UNDECIDED, decided_by_slide, decisions, fitness
+from texture_estimation.search.genetic_search import SearchParams, search
+from texture_estimation.search.halves import random_halves
+from texture_estimation.search.judges.ann_pairs import ann_pairs
+from texture_estimation.search.judges.exact import exact
+from texture_estimation.search.judges.svm_pairs import kernel_of, svm_pairs
+from texture_estimation.search.memory import Memory
+from texture_estimation.search.optimise import optimise
+from texture_estimation.search.pairs import optimise_pairs
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.scans import Scans, Stream
+from texture_estimation.search.spread import in_turn, over_cores, over_dask
+from texture_estimation.search.telling_apart import TellingApart
+from texture_estimation.search.trial import Record, has_lost, verdict
+from texture_estimation.search.variables import Integer, LogReal, SearchSpace
+from texture_features.windowing.windows import CutWindow
 
 SMALL = SearchParams(population=6, generations=3, halves=4)
 

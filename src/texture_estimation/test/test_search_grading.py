@@ -1,22 +1,22 @@
 import numpy as np
 import pytest
 
-from texture_estimation.genetic.division import Division
-from texture_estimation.genetic.grade_trial import nearness
-from texture_estimation.genetic.grading import Grading
-from texture_estimation.genetic.halves import random_halves
-from texture_estimation.genetic.judges.ann_grades import ann1, ann5
-from texture_estimation.genetic.judges.exact_grades import exact_grades
-from texture_estimation.genetic.judges.svm_grades import svm5
-from texture_estimation.genetic.optimise import optimise
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.scans import Scans, Stream
-from texture_estimation.genetic.search import SearchParams
 from texture_estimation.roughness.ann1 import Ann1
 from texture_estimation.roughness.ann5 import Ann5
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.svm5 import Svm5
+from texture_estimation.search.division import Division
+from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.grade_trial import nearness
+from texture_estimation.search.grading import Grading
+from texture_estimation.search.halves import random_halves
+from texture_estimation.search.judges.ann_grades import ann1, ann5
+from texture_estimation.search.judges.exact_grades import exact_grades
+from texture_estimation.search.judges.svm_grades import svm5
+from texture_estimation.search.optimise import optimise
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.scans import Scans, Stream
 
 GRADES = Grades({f'surface_{number}': float(number) for number in range(1, 6)})
 

@@ -10,9 +10,9 @@ from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
-from texture_estimation.familiarity import WORTHS
 from texture_estimation.fingerprint import difference
 from texture_estimation.model import Model
+from texture_estimation.open_set.novelty import WORTHS
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
 NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'

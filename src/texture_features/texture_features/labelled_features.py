@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.features import FeatureVector
-from texture_estimation.motion import Motion
+from texture_core.motion import Motion
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from texture_bringup.launcher.description import NodeDescription
-from texture_bringup.launcher.node_element import joined_namespace
-from texture_bringup.launcher.process import command
-from texture_bringup.launcher.reader import all_arguments, declared_arguments, read
 from texture_core.errors import InvalidLaunch, UnknownName
+from texture_launch.description import NodeDescription
+from texture_launch.node_element import joined_namespace
+from texture_launch.process import command
+from texture_launch.reader import all_arguments, declared_arguments, read
 
 NODE = '<node pkg="p" exec="e"/>'
 

@@ -1,7 +1,7 @@
 import pytest
 
-from texture_bringup.launcher.template import expand, parse
 from texture_core.errors import InvalidLaunch
+from texture_launch.template import expand, parse
 
 
 def shown(name, arguments):

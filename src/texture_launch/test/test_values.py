@@ -1,7 +1,7 @@
 import pytest
 
-from texture_bringup.launcher.values import parameter_value
 from texture_core.errors import InvalidLaunch, UnknownName
+from texture_launch.values import parameter_value
 
 VARIABLES = {'$(var n)': '5', '$(var x)': '0.5', '$(var t)': 'cork', '$(var e)': '', '$(var b)': '[1'}
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
 
-from texture_bringup.launcher import template
-from texture_bringup.launcher.description import NodeDescription
-from texture_bringup.launcher.elements import NODE_TEXTS, attribute, check_form, truth
-from texture_bringup.launcher.scope import Scope
-from texture_bringup.launcher.values import parameter_value
 from texture_core.errors import InvalidLaunch
+from texture_launch import template
+from texture_launch.description import NodeDescription
+from texture_launch.elements import NODE_TEXTS, attribute, check_form, truth
+from texture_launch.scope import Scope
+from texture_launch.values import parameter_value
 
 ON_SCREEN = {'': False, 'log': False, 'screen': True, 'both': True}
 SHUTDOWN_ON_EXIT = {'': False, 'shutdown': True}

@@ -14,9 +14,9 @@ from typing import IO, Any
 
 import yaml
 
-from texture_bringup.launcher import packages
-from texture_bringup.launcher.description import NodeDescription
 from texture_core.errors import LaunchFailed
+from texture_launch import packages
+from texture_launch.description import NodeDescription
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 LIBC = ctypes.CDLL(None)

@@ -13,13 +13,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from texture_bringup.launcher.description import Argument, NodeDescription
-from texture_bringup.launcher.elements import CONDITIONS, attribute, check_form, is_declaration, truth
-from texture_bringup.launcher.node_element import joined_namespace, read_node
-from texture_bringup.launcher.scope import Scope
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidLaunch, TextureError
 from texture_core.files import FileRefused, read_bounded
+from texture_launch.description import Argument, NodeDescription
+from texture_launch.elements import CONDITIONS, attribute, check_form, is_declaration, truth
+from texture_launch.node_element import joined_namespace, read_node
+from texture_launch.scope import Scope
 
 MOST_INCLUDES = 20  # of files within each other
 MOST_BYTES = 200_000  # of one file; the longest in use has 5 kB

@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from texture_bringup.launcher import packages, template
 from texture_core.catalogue import find, unknown
 from texture_core.errors import InvalidLaunch
+from texture_launch import packages, template
 
 
 @dataclass

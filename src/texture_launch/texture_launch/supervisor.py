@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from subprocess import Popen
 
-from texture_bringup.launcher import process
-from texture_bringup.launcher.description import NodeDescription
-from texture_bringup.launcher.output import Output
 from texture_core import resources
+from texture_launch import process
+from texture_launch.description import NodeDescription
+from texture_launch.output import Output
 
 # How nodes are asked to end: so many seconds after the wish, this signal.
 STOP = ((0.0, signal.SIGINT), (5.0, signal.SIGTERM), (8.0, signal.SIGKILL))

@@ -7,10 +7,10 @@ from typing import Any
 
 import yaml
 
-from texture_bringup.launcher import template
 from texture_core.catalogue import find
 from texture_core.errors import InvalidLaunch
 from texture_core.plain_data import BROKEN, parse_yaml
+from texture_launch import template
 
 SCALARS = (bool, int, float, str)
 # The `type` attribute of a param; (type, whether a list of it); None lets YAML decide.

@@ -17,9 +17,9 @@ from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.features import FeatureVector
 from texture_core.signal import TactileSignal
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.bags import find_bags, read_bag, read_raw
-from texture_evaluation.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import find_bags, read_bag, read_raw
+from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode
 
 if sys.version_info >= (3, 14):
     from compression.zstd import compress as zstd_compress

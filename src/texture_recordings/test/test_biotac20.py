@@ -7,9 +7,9 @@ import pytest
 from texture_core.errors import InvalidData, UnknownName
 from texture_core.exploration import Phase
 from texture_core.signal import NANOSECONDS, TactileSignal, lost_samples
-from texture_evaluation.bags import read_bag
-from texture_evaluation.datasets.biotac20 import frame_indices, import_biotac20, restore_sign
-from texture_evaluation.slides import find_slides
+from texture_recordings.bags import read_bag
+from texture_recordings.importers.biotac20 import frame_indices, import_biotac20, restore_sign
+from texture_recordings.slides import find_slides
 
 N_FRAMES = 610
 

@@ -2,7 +2,7 @@ import pytest
 
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
-from texture_evaluation.cdr import TYPES, decode, encode
+from texture_recordings.cdr import TYPES, decode, encode
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import pytest
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.bags import read_bag
-from texture_evaluation.processes import NodeProcess
+from texture_launch.node_process import NodeProcess
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import read_bag
 
 pytestmark = pytest.mark.ros
 
@@ -35,7 +35,7 @@ def write(path: Path, lost: int = 0) -> Path:
 
 
 def node(name: str, domain_id: int, **parameters: object) -> NodeProcess:
-    return NodeProcess('texture_evaluation', name, parameters, namespace='/left', domain_id=domain_id)
+    return NodeProcess('texture_recordings', name, parameters, namespace='/left', domain_id=domain_id)
 
 
 def wait_for(path: Path, deadline_s: float = 30.0) -> None:

@@ -6,8 +6,8 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.slides import find_slides, parse_selection, read_slides
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.slides import find_slides, parse_selection, read_slides
 
 
 def write(path: Path, surfaces: list[str], start_s: int) -> Path:

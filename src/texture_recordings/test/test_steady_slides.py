@@ -7,13 +7,13 @@ import pytest
 from texture_core.errors import InvalidData, UnknownName
 from texture_core.exploration import Phase
 from texture_core.signal import NANOSECONDS, lost_samples
-from texture_evaluation.bags import read_bag
-from texture_evaluation.datasets.catalogue import IMPORTS
-from texture_evaluation.datasets.fabricslide import import_fabricslide
-from texture_evaluation.datasets.ntp21 import evenly, import_ntp21
-from texture_evaluation.slides import find_slides
-from texture_evaluation.whole_slides import whole_slides
 from texture_features.features.spatial_bands import SpatialBands
+from texture_recordings.bags import read_bag
+from texture_recordings.importers.catalogue import IMPORTS
+from texture_recordings.importers.fabricslide import import_fabricslide
+from texture_recordings.importers.ntp21 import evenly, import_ntp21
+from texture_recordings.slides import find_slides
+from texture_recordings.whole_slides import whole_slides
 
 PITCH_M = 10e-3
 

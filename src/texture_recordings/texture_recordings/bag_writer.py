@@ -18,8 +18,8 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from texture_core.errors import InvalidData
-from texture_evaluation.bags import RawMessage, short_name
-from texture_evaluation.cdr import TYPES, encode, typestore
+from texture_recordings.bags import RawMessage, short_name
+from texture_recordings.cdr import TYPES, encode, typestore
 
 FOREVER = QosTime(2147483647, 4294967295)
 

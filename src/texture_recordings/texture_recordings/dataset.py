@@ -9,10 +9,10 @@ from pathlib import Path
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.exploration import ExplorationState
 from texture_core.features import FeatureVector
-from texture_estimation.labelled_features import LabelledFeatures
-from texture_evaluation.slides import Message, Slide, find_slides, read_slides
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import Piece, WindowCutter
+from texture_features.labelled_features import LabelledFeatures
+from texture_features.windowing.windows import Piece, WindowCutter
+from texture_recordings.slides import Message, Slide, find_slides, read_slides
 
 
 def describe(

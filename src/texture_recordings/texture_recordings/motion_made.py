@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from statistics import median
 
 from texture_core.exploration import ExplorationState, Phase
+from texture_core.motion import TURNED_RAD, Motion
 from texture_core.signal import NANOSECONDS
-from texture_estimation.motion import TURNED_RAD, Motion
 
 STRAIGHT = 'linear_slide'  # of other motions, states do not tell all that is needed to make them again
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.bags import RawMessage, find_bags, read_bag, read_raw, short_name
-from texture_features.segmentation import SegmentParams
-from texture_features.slide_segmenter import segment_recording
+from texture_features.segmentation.segments import SegmentParams
+from texture_features.segmentation.slide_segmenter import segment_recording
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import RawMessage, find_bags, read_bag, read_raw, short_name
 
 FAST_TOPIC, SLOW_TOPIC, STATE_TOPIC = 'signal', 'signal_static', 'exploration'
 

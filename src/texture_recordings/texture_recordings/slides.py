@@ -12,9 +12,9 @@ from typing import Any
 
 from texture_core.errors import InvalidData
 from texture_core.exploration import Phase
-from texture_estimation.motion import Motion
-from texture_evaluation.bags import find_bags, read_bag
-from texture_evaluation.motion_made import motion_made
+from texture_core.motion import Motion
+from texture_recordings.bags import find_bags, read_bag
+from texture_recordings.motion_made import motion_made
 
 RANGE = re.compile(r'(\d+)(?:-(\d+))?')
 Message = tuple[str, int, Any]

@@ -14,8 +14,8 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS
-from texture_evaluation.slides import Message, Slide, find_slides, read_slides
 from texture_features.feature import Windows
+from texture_recordings.slides import Message, Slide, find_slides, read_slides
 
 
 @dataclass(frozen=True, eq=False)

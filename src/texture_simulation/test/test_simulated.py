@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 
 from texture_core.signal import lost_samples
-from texture_evaluation.bags import read_bag
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
-from texture_evaluation.slides import find_slides
+from texture_recordings.bags import read_bag
+from texture_recordings.slides import find_slides
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 
 def test_each_surface_has_its_slides_without_a_loss(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_evaluation.bag_writer import BagWriter
+from texture_recordings.bag_writer import BagWriter
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import Scene, load_scene
 

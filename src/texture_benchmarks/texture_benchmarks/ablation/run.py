@@ -9,12 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.errors import InvalidData
-from texture_estimation.labelled_features import LabelledFeatures
-from texture_estimation.model import Model
-from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.training import DEFAULT_GROWTH
-from texture_evaluation.benches.recipes import (
+from texture_benchmarks.recipes.run import (
     ALL_CHANNELS,
     DATA,
     LAST_LEARNT,
@@ -23,10 +18,15 @@ from texture_evaluation.benches.recipes import (
     VIBRATION,
     biotac20_settings,
 )
-from texture_evaluation.benches.result import Bench, BenchResult
+from texture_benchmarks.recipes.trial import Recorded, comparable, describe_all, examples_of, latency_us
+from texture_benchmarks.result import Bench, BenchResult
+from texture_core.errors import InvalidData
+from texture_estimation.classification.training import DEFAULT_GROWTH
+from texture_estimation.model import Model
+from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.recipe_trials import Recorded, comparable, describe_all, examples_of, latency_us
 from texture_evaluation.train import with_channels
+from texture_features.labelled_features import LabelledFeatures
 
 Changes = Mapping[str, Mapping[str, Any] | None]  # feature or learner → parameters that differ; None leaves it out
 

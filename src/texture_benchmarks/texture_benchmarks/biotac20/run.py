@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from texture_benchmarks.imported_data import imported
+from texture_benchmarks.result import Bench, BenchResult
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.benches.imports import imported
-from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import confusion_chart, evidence_chart
 from texture_evaluation.evaluate import Report, evaluate
 from texture_evaluation.metrics import curve

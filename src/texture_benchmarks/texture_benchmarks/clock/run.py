@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from texture_benchmarks.clock.trial import ClockTrial, try_clock
+from texture_benchmarks.result import Bench, BenchResult
 from texture_core.arrays import Array
-from texture_drivers.clock_trial import ClockTrial, try_clock
-from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import error_chart
 
 DURATION_S, QUICK_S = 600.0, 20.0

@@ -8,12 +8,12 @@ import time
 from functools import partial
 from pathlib import Path
 
-from texture_bringup.commands.options import add_seed
+from texture_benchmarks.catalogue import BENCHES, run_bench
+from texture_benchmarks.imported_data import importing_once
+from texture_benchmarks.result import Bench
+from texture_benchmarks.run_all import IMPORTED, LONG, run_all
+from texture_core.command_options import add_seed
 from texture_core.errors import InvalidData
-from texture_evaluation.bench import BENCHES, run_bench
-from texture_evaluation.bench_all import IMPORTED, LONG, run_all
-from texture_evaluation.benches.imports import importing_once
-from texture_evaluation.benches.result import Bench
 
 ALL = 'all'
 NO_DATA = 3  # exit code of a process

@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_bringup.commands.options import add_seed
-from texture_bringup.endurance.report import write
-from texture_bringup.endurance.run import Plan, endure
-from texture_bringup.endurance.verdict import judge
+from texture_benchmarks.endurance.report import write
+from texture_benchmarks.endurance.run import Plan, endure
+from texture_benchmarks.endurance.verdict import judge
+from texture_core.command_options import add_seed
 from texture_core.errors import InvalidData
 
 

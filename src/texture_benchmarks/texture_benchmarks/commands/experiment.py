@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_bringup.commands.options import add_seed
-from texture_evaluation.experiments import EXPERIMENTS, Experiment, run_experiment
+from texture_benchmarks.papers import EXPERIMENTS, Experiment, run_experiment
+from texture_core.command_options import add_seed
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.imported_data import imported
+from texture_benchmarks.result import Bench, BenchResult
 from texture_core.arrays import AnyArray, Array
-from texture_estimation.familiarity import WORTHS, Familiarity
-from texture_estimation.labelled_features import LabelledFeatures
+from texture_estimation.classification.training import train
 from texture_estimation.model import Model
+from texture_estimation.open_set.novelty import WORTHS, Familiarity
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.training import train
-from texture_evaluation.benches.imports import imported
-from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import line_chart
-from texture_evaluation.dataset import describe
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.metrics import SlideResult, decided_at
+from texture_features.labelled_features import LabelledFeatures
+from texture_recordings.dataset import describe
 
 RECIPES = ('default', 'vibration-and-taxels')
 TAUGHT, TESTED = '1-30', '31-40'

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from texture_bringup.endurance.record import ABORTED, LOST, REFUSED, SUCCESS, Record
-from texture_bringup.endurance.verdict import by_process, cpu_shares
+from texture_benchmarks.endurance.record import ABORTED, LOST, REFUSED, SUCCESS, Record
+from texture_benchmarks.endurance.verdict import by_process, cpu_shares
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from texture_bringup.endurance.books import SignalBook
-from texture_bringup.endurance.pace import Pace
-from texture_bringup.endurance.usage import Use
+from texture_benchmarks.endurance.books import SignalBook
+from texture_benchmarks.endurance.pace import Pace
+from texture_benchmarks.endurance.usage import Use
 
 SUCCESS, ABORTED, REFUSED, LOST = 'success', 'aborted', 'refused', 'lost'
 # A fault may still be felt for so long: connections are made anew, queues are emptied.

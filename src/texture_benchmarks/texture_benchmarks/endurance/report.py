@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from texture_bringup.endurance.chart import draw
-from texture_bringup.endurance.record import Record
-from texture_bringup.endurance.verdict import Verdict, cpu_change, judge, lives, work_change
-from texture_evaluation.benches.result import machine
+from texture_benchmarks.endurance.chart import draw
+from texture_benchmarks.endurance.record import Record
+from texture_benchmarks.endurance.verdict import Verdict, cpu_change, judge, lives, work_change
+from texture_benchmarks.result import machine
 
 MIB = 2**20
 NUMBERS = re.compile(r'\d[\w.:-]*')

@@ -14,12 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_bringup.demo.isolation import Isolation, isolate
-from texture_bringup.endurance.faults import Strike, strikes
-from texture_bringup.endurance.orders import Order, orders
-from texture_bringup.endurance.pace import Pace, measure_pace
-from texture_bringup.endurance.processes import Processes
-from texture_bringup.endurance.record import (
+from texture_benchmarks.endurance.faults import Strike, strikes
+from texture_benchmarks.endurance.orders import Order, orders
+from texture_benchmarks.endurance.pace import Pace, measure_pace
+from texture_benchmarks.endurance.processes import Processes
+from texture_benchmarks.endurance.record import (
     ABORTED,
     AFTERMATH_S,
     LOST,
@@ -29,16 +28,17 @@ from texture_bringup.endurance.record import (
     Record,
     in_force,
 )
-from texture_bringup.endurance.usage import Use, read_use
-from texture_bringup.launcher.child import ChildLauncher
+from texture_benchmarks.endurance.ros.fault_injector import Striker
+from texture_benchmarks.endurance.ros.watcher import Watcher
+from texture_benchmarks.endurance.usage import Use, read_use
+from texture_bringup.demo.isolation import Isolation, isolate
 from texture_bringup.ros.operator import Operator
-from texture_bringup.ros.striker import Striker
-from texture_bringup.ros.watcher import Watcher
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionAborted, TextureError
 from texture_core.exploration import ExplorationRequest
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
 from texture_evaluation.train import train_from_bags
+from texture_launch.child import ChildLauncher
 from texture_simulation.scene import load_scene
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 SCENE, SURFACE = 'bench', 'glass'
 LOOK_S = 10.0  # between two looks at the processes

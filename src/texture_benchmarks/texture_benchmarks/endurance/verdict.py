@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from texture_bringup.endurance.record import Record
-from texture_bringup.endurance.usage import Use
+from texture_benchmarks.endurance.record import Record
+from texture_benchmarks.endurance.usage import Use
 from texture_core.arrays import Array
 
 WARM_UP_S = 300.0  # of a process, before its memory is judged

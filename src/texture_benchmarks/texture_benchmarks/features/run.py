@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_evaluation.benches.result import Bench, BenchResult
+from texture_benchmarks.result import Bench, BenchResult
 from texture_evaluation.charts import COLOURS, chart
 from texture_features.catalogue import FEATURES
 from texture_features.feature import Feature, Windows

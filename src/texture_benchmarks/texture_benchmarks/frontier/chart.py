@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 
+from texture_benchmarks.frontier.training_costs import Cost, Size
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.training_costs import Cost, Size
 
 AXES = {'windows': 'windows learnt from', 'labels': 'surfaces'}
 COSTS = {'seconds': 'computing time of a training (s)', 'mebibytes': 'memory beyond the examples (MiB)'}

@@ -9,13 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from texture_core.arrays import Array
-from texture_estimation.genetic.spread import one_thread_each
-from texture_estimation.model import Model
-from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation import metrics, minirocket
-from texture_evaluation.benches.imports import imported
-from texture_evaluation.benches.recipes import (
+from texture_benchmarks.forked import each_on_a_core
+from texture_benchmarks.frontier.chart import early_chart, size_chart
+from texture_benchmarks.frontier.training_costs import Cost, Size, costs
+from texture_benchmarks.imported_data import imported
+from texture_benchmarks.recipes import minirocket
+from texture_benchmarks.recipes.run import (
     DATA,
     LAST_LEARNT,
     QUICK_LAST_LEARNT,
@@ -23,11 +22,7 @@ from texture_evaluation.benches.recipes import (
     QUICK_SLIDES,
     RATE_HZ,
 )
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.charts import evidence_chart, line_chart
-from texture_evaluation.forked import each_on_a_core
-from texture_evaluation.frontier_charts import early_chart, size_chart
-from texture_evaluation.recipe_trials import (
+from texture_benchmarks.recipes.trial import (
     LENGTH_S,
     Division,
     Recorded,
@@ -38,8 +33,14 @@ from texture_evaluation.recipe_trials import (
     read_recorded,
     try_recipe,
 )
+from texture_benchmarks.result import Bench, BenchResult
+from texture_core.arrays import Array
+from texture_estimation.model import Model
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.search.spread import one_thread_each
+from texture_evaluation import metrics
+from texture_evaluation.charts import evidence_chart, line_chart
 from texture_evaluation.train import with_channels
-from texture_evaluation.training_costs import Cost, Size, costs
 
 # Ours with windows of all lengths, and of each paper the recipe that recognises most, of those that train in seconds.
 LENGTHS_S, FEW_LENGTHS_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0), (0.1, 0.5, 2.0)

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from texture_benchmarks.result import Bench, BenchResult
 from texture_core.arrays import Array
-from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import histogram_chart
-from texture_evaluation.dataset import cut_slides
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
 from texture_evaluation.evaluate import judge
-from texture_evaluation.slides import find_slides
 from texture_evaluation.train import train_from_bags
+from texture_recordings.dataset import cut_slides
+from texture_recordings.slides import find_slides
 from texture_simulation.scene import load_scene
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 if TYPE_CHECKING:
-    from texture_evaluation.ros.live_latency import Live
+    from texture_benchmarks.ros.live_latency import Live
 
 RECIPES = ('default', 'vibration-and-taxels')
 CLASSES = 10
@@ -33,7 +33,7 @@ TARGETS = {'in_process_median_us': 150.0, 'in_process_p99_us': 400.0, 'dds_p99_m
 
 def run(bench: Bench) -> BenchResult:
     """Train on simulated slides over ten surfaces, then time windows in one process and through the graph."""
-    from texture_evaluation.ros.live_latency import driver_cpu  # noqa: PLC0415  # ROS is needed for this alone
+    from texture_benchmarks.ros.live_latency import driver_cpu  # noqa: PLC0415  # ROS is needed for this alone
 
     plan = QUICK_PLAN if bench.quick else PLAN
     with tempfile.TemporaryDirectory() as folder:
@@ -89,7 +89,7 @@ class _Timing:
 
 
 def _time(recipe: str, bags: list[Path], slides: int, folder: Path, bench: Bench) -> _Timing:
-    from texture_evaluation.ros.live_latency import measure  # noqa: PLC0415
+    from texture_benchmarks.ros.live_latency import measure  # noqa: PLC0415
 
     model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
     cut = [list(pieces) for _, pieces in cut_slides(find_slides(bags, str(slides)), model.recipe.feature_set)]

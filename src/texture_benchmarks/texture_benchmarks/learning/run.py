@@ -10,14 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.imported_data import imported
+from texture_benchmarks.learning.trial import Course, Score, try_course
+from texture_benchmarks.result import Bench, BenchResult
 from texture_core.arrays import Array
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation.benches.imports import imported
-from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import line_chart
-from texture_evaluation.dataset import describe
-from texture_evaluation.learning_trials import Course, Score, try_course
+from texture_recordings.dataset import describe
 
 RECIPE = 'default'
 TAUGHT, STAGES, NEW, DRAWS = 30, (1, 2, 5, 10, 30), 5, 3

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
-from texture_estimation.labelled_features import LabelledFeatures
+from texture_estimation.classification.training import train
+from texture_estimation.incremental.incremental_classifier import Pupil
 from texture_estimation.model import Model
-from texture_estimation.pupil import Pupil
 from texture_estimation.recipe import Recipe
-from texture_estimation.training import train
+from texture_features.labelled_features import LabelledFeatures
 
 Mask = NDArray[np.bool_]
 

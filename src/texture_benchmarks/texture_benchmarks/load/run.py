@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from texture_evaluation.benches.result import Bench, BenchResult
+from texture_benchmarks.load.rig import Rig, fast_daq
+from texture_benchmarks.result import Bench, BenchResult
 from texture_evaluation.charts import line_chart
-from texture_simulation.rig import Rig, fast_daq
 
 if TYPE_CHECKING:
-    from texture_evaluation.ros.sensor_load import Load
+    from texture_benchmarks.ros.sensor_load import Load
 
 ALONE = ('tsf85', 'tsf85_pair', 'biotac', 'daq', 'pvdf')
 TOGETHER = ('tsf85', 'biotac', 'daq', 'pvdf')
@@ -65,7 +65,7 @@ def run(bench: Bench) -> BenchResult:
 
 
 def _loads(names: tuple[str, ...] | list[str], seconds: float) -> Mapping[str, Load]:
-    from texture_evaluation.ros.sensor_load import measure  # noqa: PLC0415  # ROS is needed for this alone
+    from texture_benchmarks.ros.sensor_load import measure  # noqa: PLC0415  # ROS is needed for this alone
 
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         rigs = {name: stack.enter_context(Rig(name, Path(folder) / name)) for name in names}
@@ -75,7 +75,7 @@ def _loads(names: tuple[str, ...] | list[str], seconds: float) -> Mapping[str, L
 
 def _fast(factor: float, seconds: float) -> tuple[float, Load]:
     """Return the rate and the load of a DAQ finger of another rate."""
-    from texture_evaluation.ros.sensor_load import measure  # noqa: PLC0415
+    from texture_benchmarks.ros.sensor_load import measure  # noqa: PLC0415
 
     with tempfile.TemporaryDirectory() as folder, fast_daq(Path(folder) / 'daq', factor) as rig:
         return rig.case.rate_hz, measure({'daq': rig}, {'daq': 'daq'}, seconds)['daq']

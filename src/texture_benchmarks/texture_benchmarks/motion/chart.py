@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.motion.trial import Trial
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
-from texture_exploration.force_trials import Trial
 
 MARKERS = 'o^vsD'
 TICKS = (0.2, 2, 20)

@@ -12,6 +12,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
+from texture_benchmarks.motion.trial import CIRCLE, SLIDE, Trial, judge
 from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
 from texture_core.finger import FingerState
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
@@ -20,7 +21,6 @@ from texture_exploration.arms.rails import RailsArm, RailsParams
 from texture_exploration.arms.ur import UrArm
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.force_trials import CIRCLE, SLIDE, Trial, judge
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 from texture_simulation.devices.dynamixel import EmulatedDynamixelBus

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.motion.chart import border_chart, robot_chart, robot_table, surface_chart, surface_table
+from texture_benchmarks.motion.robot_trials import ROBOTS, typical_trial
+from texture_benchmarks.motion.trial import ARM, CIRCLE, SLIDE, SURFACES, Trial, slide_trial, surface_trials
+from texture_benchmarks.result import Bench, BenchResult
 from texture_core.arrays import Array
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.motion_charts import border_chart, robot_chart, robot_table, surface_chart, surface_table
-from texture_evaluation.robot_trials import ROBOTS, typical_trial
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArmParams
 from texture_exploration.force_control import ForceController, ForceLoopParams
-from texture_exploration.force_trials import ARM, CIRCLE, SLIDE, SURFACES, Trial, slide_trial, surface_trials
 from texture_exploration.stability import Loop, border_gain, stability_chart
 
 STIFFNESSES_N_M = (200.0, 2000.0, 20000.0)

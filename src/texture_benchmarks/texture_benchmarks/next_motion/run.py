@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from texture_benchmarks.next_motion.chart import slides_chart
+from texture_benchmarks.next_motion.trial import CHOICES, Trials, described, explored, learnt
+from texture_benchmarks.result import Bench, BenchResult
 from texture_core.arrays import Array
-from texture_estimation.motion import Motion
-from texture_estimation.next_motion import Explorations
+from texture_core.motion import Motion
+from texture_estimation.next_motion.choice import Explorations
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.motion_choice_charts import slides_chart
-from texture_evaluation.motion_choice_trials import CHOICES, Trials, described, explored, learnt
 from texture_simulation.scene import load_scene
 
 SCENE, RECIPE = 'oriented', 'fast'

@@ -9,12 +9,12 @@ import numpy as np
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.catalogue import find
+from texture_core.motion import Motion
 from texture_core.window import Window
 from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.motion import Motion
-from texture_estimation.next_motion import Explorations
+from texture_estimation.next_motion.choice import Explorations
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import CutWindow
+from texture_features.windowing.windows import CutWindow
 from texture_simulation.scans import scans
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS

@@ -12,21 +12,21 @@ from typing import Any
 import numpy as np
 from scipy.stats import spearmanr
 
+from texture_benchmarks.result import Bench, BenchResult
 from texture_core.catalogue import find
-from texture_estimation.genetic.division import Division
-from texture_estimation.genetic.feature_cache import FeatureCache
-from texture_estimation.genetic.grading import Grading
-from texture_estimation.genetic.optimise import Optimised, optimise
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.scans import Scans, Stream
-from texture_estimation.genetic.search import SearchParams
-from texture_estimation.genetic.spread import over_cores
-from texture_estimation.genetic.task import Task
-from texture_estimation.genetic.telling_apart import TellingApart
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import TRAIN, read_grades
 from texture_estimation.roughness.recipe import load_roughness_recipe
-from texture_evaluation.benches.result import Bench, BenchResult
+from texture_estimation.search.division import Division
+from texture_estimation.search.feature_cache import FeatureCache
+from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.grading import Grading
+from texture_estimation.search.optimise import Optimised, optimise
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.scans import Scans, Stream
+from texture_estimation.search.spread import over_cores
+from texture_estimation.search.task import Task
+from texture_estimation.search.telling_apart import TellingApart
 from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
 from texture_simulation.offline import scans
 from texture_simulation.scene import load_scene

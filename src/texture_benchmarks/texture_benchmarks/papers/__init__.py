@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
+from texture_benchmarks.papers import ets_circular, ets_fine, ets_linear, hu, jamali, kaboli, roughness
+from texture_benchmarks.papers.experiment import Experiment, ExperimentResult, Run
+from texture_benchmarks.papers.report import run
 from texture_core.catalogue import find
-from texture_evaluation.experiments import ets_circular, ets_fine, ets_linear, hu, jamali, kaboli, roughness
-from texture_evaluation.experiments.experiment import Experiment, ExperimentResult, Run
-from texture_evaluation.experiments.report import run
 
 PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fine, jamali, kaboli, hu))
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from texture_benchmarks.papers.interval import Interval, apart, mean, share
+from texture_benchmarks.papers.outcome import Outcome
+from texture_benchmarks.papers.protocol import Finding
 from texture_core.arrays import Array
-from texture_evaluation.experiments.interval import Interval, apart, mean, share
-from texture_evaluation.experiments.outcome import Outcome
-from texture_evaluation.experiments.protocol import Finding
 
 Pair = tuple[str, str]
 

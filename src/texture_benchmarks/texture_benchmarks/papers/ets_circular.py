@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from texture_evaluation.experiments.check import higher_elsewhere, lower_in, most_errors
-from texture_evaluation.experiments.ets_linear import PEAKS
-from texture_evaluation.experiments.interval import apart
-from texture_evaluation.experiments.protocol import (
+from texture_benchmarks.papers.check import higher_elsewhere, lower_in, most_errors
+from texture_benchmarks.papers.ets_linear import PEAKS
+from texture_benchmarks.papers.interval import apart
+from texture_benchmarks.papers.protocol import (
     FEW,
     OURS,
     Anchor,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from texture_evaluation.experiments.check import at_least, most_errors
-from texture_evaluation.experiments.protocol import (
+from texture_benchmarks.papers.check import at_least, most_errors
+from texture_benchmarks.papers.protocol import (
     FEW,
     OURS,
     Anchor,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from texture_evaluation.experiments.check import at_least, higher, most_errors
-from texture_evaluation.experiments.interval import mean
-from texture_evaluation.experiments.protocol import (
+from texture_benchmarks.papers.check import at_least, higher, most_errors
+from texture_benchmarks.papers.interval import mean
+from texture_benchmarks.papers.protocol import (
     OURS,
     Anchor,
     Figures,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from texture_evaluation.benches.result import BenchResult
+from texture_benchmarks.result import BenchResult
 
 
 @dataclass(frozen=True)

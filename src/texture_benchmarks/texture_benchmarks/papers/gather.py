@@ -11,12 +11,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from texture_benchmarks.papers.protocol import Task, View, Visits
 from texture_core.arrays import Array, Samples
 from texture_core.catalogue import find
-from texture_estimation.genetic.feature_cache import FeatureCache
-from texture_estimation.genetic.scans import Scans, Stream
 from texture_estimation.learners.learner import Codes
-from texture_evaluation.experiments.protocol import Task, View, Visits
+from texture_estimation.search.feature_cache import FeatureCache
+from texture_estimation.search.scans import Scans, Stream
 from texture_features.feature_set import FeatureSet
 from texture_simulation.offline import scan_streams
 from texture_simulation.scene import Scene

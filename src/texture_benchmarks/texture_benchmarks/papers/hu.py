@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from texture_evaluation.experiments.check import better_on, higher, most_errors
-from texture_evaluation.experiments.protocol import (
+from texture_benchmarks.papers.check import better_on, higher, most_errors
+from texture_benchmarks.papers.protocol import (
     FEW,
     OURS,
     Anchor,
@@ -20,7 +20,7 @@ from texture_evaluation.experiments.protocol import (
     Visits,
     drawn,
 )
-from texture_features.windows import WindowParams
+from texture_features.windowing.windows import WindowParams
 from texture_simulation.sliding import Sliding
 
 TASK = 'five linens'

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from texture_evaluation.experiments.check import higher, more_spread, most_errors, seldom
-from texture_evaluation.experiments.protocol import (
+from texture_benchmarks.papers.check import higher, more_spread, most_errors, seldom
+from texture_benchmarks.papers.protocol import (
     OURS,
     Anchor,
     Figures,
@@ -15,7 +15,7 @@ from texture_evaluation.experiments.protocol import (
     Visits,
     folds,
 )
-from texture_features.windows import WindowParams
+from texture_features.windowing.windows import WindowParams
 from texture_simulation.sliding import Sliding
 
 TASK = 'eight surfaces'

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from texture_evaluation.experiments.check import at_least, higher, most_errors, no_lower
-from texture_evaluation.experiments.protocol import (
+from texture_benchmarks.papers.check import at_least, higher, most_errors, no_lower
+from texture_benchmarks.papers.protocol import (
     OURS,
     Anchor,
     Figures,
@@ -21,7 +21,7 @@ from texture_evaluation.experiments.protocol import (
     Visits,
     learnt_in,
 )
-from texture_features.windows import WindowParams
+from texture_features.windowing.windows import WindowParams
 from texture_simulation.sliding import Sliding
 
 SLIDE_S = 2.0

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from texture_benchmarks.papers.interval import Interval, share
 from texture_core.arrays import AnyArray, Array
-from texture_estimation.genetic.fitness import UNDECIDED
 from texture_estimation.learners.learner import Codes
-from texture_evaluation.experiments.interval import Interval, share
+from texture_estimation.search.fitness import UNDECIDED
 
 
 @dataclass(frozen=True, eq=False)

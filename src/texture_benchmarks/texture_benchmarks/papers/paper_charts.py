@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.papers.interval import Interval
 from texture_core.arrays import AnyArray
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.experiments.interval import Interval
 
 
 def accuracy_chart(

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_estimation.genetic.halves import random_halves
+from texture_benchmarks.papers.interval import Interval
+from texture_benchmarks.papers.outcome import Outcome
 from texture_estimation.learners.learner import Codes
-from texture_evaluation.experiments.interval import Interval
-from texture_evaluation.experiments.outcome import Outcome
-from texture_features.windows import WindowParams
+from texture_estimation.search.halves import random_halves
+from texture_features.windowing.windows import WindowParams
 from texture_simulation.sliding import Sliding
 
 Mask = NDArray[np.bool_]

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.papers.check import percent
+from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
+from texture_benchmarks.papers.outcome import Outcome
+from texture_benchmarks.papers.paper_charts import accuracy_chart, confusions_chart
+from texture_benchmarks.papers.protocol import Finding, Method, Outcomes, Protocol, Table, Task
+from texture_benchmarks.papers.trial import NONE, TunedRecipes, outcomes, searched
 from texture_core.arrays import AnyArray
-from texture_evaluation.experiments.check import percent
-from texture_evaluation.experiments.experiment import Experiment, ExperimentResult
-from texture_evaluation.experiments.outcome import Outcome
-from texture_evaluation.experiments.paper_charts import accuracy_chart, confusions_chart
-from texture_evaluation.experiments.protocol import Finding, Method, Outcomes, Protocol, Table, Task
-from texture_evaluation.experiments.trial import NONE, TunedRecipes, outcomes, searched
 from texture_simulation.scene import load_scene
 
 TUNED = '-tuned'

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
-from texture_estimation.labelled_features import LabelledFeatures
+from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
+from texture_benchmarks.papers.roughness_answers import Answers
+from texture_benchmarks.papers.roughness_charts import Series, coverage_chart, grades_chart
+from texture_benchmarks.papers.roughness_report import lines
+from texture_benchmarks.papers.roughness_scans import FORCE_N, SPEED_M_S, USED_S, Felt, Setup
+from texture_benchmarks.papers.roughness_tuning import TARGET_S, Tuned, tune
+from texture_benchmarks.roughness.grade_latency import times_us
 from texture_estimation.roughness.grades import TEST, TRAIN, read_grades
 from texture_estimation.roughness.model import RoughnessModel
 from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
-from texture_evaluation.experiments.experiment import Experiment, ExperimentResult
-from texture_evaluation.experiments.roughness_answers import Answers
-from texture_evaluation.experiments.roughness_charts import Series, coverage_chart, grades_chart
-from texture_evaluation.experiments.roughness_report import lines
-from texture_evaluation.experiments.roughness_scans import FORCE_N, SPEED_M_S, USED_S, Felt, Setup
-from texture_evaluation.experiments.roughness_tuning import TARGET_S, Tuned, tune
-from texture_evaluation.grade_latency import times_us
+from texture_features.labelled_features import LabelledFeatures
 from texture_simulation.effects.skids import Skids
 from texture_simulation.scene import load_scene
 

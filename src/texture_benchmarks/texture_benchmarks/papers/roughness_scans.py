@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from texture_benchmarks.papers.roughness_answers import Answers
 from texture_core.arrays import Array
 from texture_core.catalogue import find
 from texture_core.window import Window
-from texture_estimation.genetic.scans import Scans, Stream
-from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.model import RoughnessModel
 from texture_estimation.roughness.recipe import RoughnessRecipe
-from texture_evaluation.experiments.roughness_answers import Answers
+from texture_estimation.search.scans import Scans, Stream
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import CutWindow
+from texture_features.labelled_features import LabelledFeatures
+from texture_features.windowing.windows import CutWindow
 from texture_simulation.offline import scans
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS

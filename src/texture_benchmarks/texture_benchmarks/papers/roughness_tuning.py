@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from texture_estimation.genetic.grading import Grading
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.scans import Scans
+from texture_benchmarks.papers import tuning
+from texture_benchmarks.papers.tuning import Tuned as TunedRecipe
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.recipe import RoughnessRecipe
-from texture_evaluation.experiments import tuning
-from texture_evaluation.experiments.tuning import Tuned as TunedRecipe
+from texture_estimation.search.grading import Grading
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.scans import Scans
 
 TARGET_S = 15 * 60.0
 

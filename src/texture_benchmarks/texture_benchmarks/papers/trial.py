@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.papers.gather import Slides, gather
+from texture_benchmarks.papers.outcome import Outcome
+from texture_benchmarks.papers.protocol import Mask, Method, Outcomes, Protocol, Task
+from texture_benchmarks.papers.tuning import Tuned, tune
 from texture_core.errors import InvalidParameter
-from texture_estimation.genetic.fitness import decided_by_slide
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.telling_apart import TellingApart
 from texture_estimation.learners.learner import Codes
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation.experiments.gather import Slides, gather
-from texture_evaluation.experiments.outcome import Outcome
-from texture_evaluation.experiments.protocol import Mask, Method, Outcomes, Protocol, Task
-from texture_evaluation.experiments.tuning import Tuned, tune
+from texture_estimation.search.fitness import decided_by_slide
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.telling_apart import TellingApart
 from texture_evaluation.optimise import OF_RECIPES
 from texture_features.feature_set import InputFeatures
-from texture_features.stretch import Stretched
+from texture_features.windowing.stretch import Stretched
 from texture_simulation.scene import Scene
 
 FAST, SLOW = 'signal', 'signal_static'

@@ -10,13 +10,13 @@ from typing import Any, Generic
 import yaml
 
 from texture_core.errors import InvalidParameter
-from texture_estimation.genetic.division import Division
-from texture_estimation.genetic.optimise import Optimised, optimise
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.scans import Scans
-from texture_estimation.genetic.search import SearchParams
-from texture_estimation.genetic.spread import over_cores
-from texture_estimation.genetic.task import R, Task
+from texture_estimation.search.division import Division
+from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.optimise import Optimised, optimise
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.scans import Scans
+from texture_estimation.search.spread import over_cores
+from texture_estimation.search.task import R, Task
 
 FULL = SearchParams()  # 20 individuals, 30 generations, 20 halves: the paper's
 QUICK = SearchParams(population=4, generations=2, halves=2, finalists=1)

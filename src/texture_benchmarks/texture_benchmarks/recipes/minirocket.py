@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from texture_benchmarks.recipes.trial import LENGTH_S, Division, Recorded
 from texture_core.arrays import AnyArray, Array
-from texture_evaluation.recipe_trials import LENGTH_S, Division, Recorded
-from texture_features.windows import CutWindow, WindowParams, cut_recording
+from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
 
 ABSENT = 'not measured: aeon is not installed (pip install aeon)'
 # Of the ridge, tried on a fifth of the slides to learn from; the transform's values have unit variance.

@@ -12,17 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from texture_core.errors import InvalidData
-from texture_core.resources import folder
-from texture_estimation.model import Model
-from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation import minirocket
-from texture_evaluation.benches.imports import imported
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.charts import front_chart
-from texture_evaluation.forked import each_on_a_core
-from texture_evaluation.recipe_table import recipe_table
-from texture_evaluation.recipe_trials import (
+from texture_benchmarks.forked import each_on_a_core
+from texture_benchmarks.imported_data import imported
+from texture_benchmarks.recipes import minirocket
+from texture_benchmarks.recipes.table import recipe_table
+from texture_benchmarks.recipes.trial import (
     LENGTH_S,
     Division,
     Recorded,
@@ -36,6 +30,12 @@ from texture_evaluation.recipe_trials import (
     read_recorded,
     try_described,
 )
+from texture_benchmarks.result import Bench, BenchResult
+from texture_core.errors import InvalidData
+from texture_core.resources import folder
+from texture_estimation.model import Model
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_evaluation.charts import front_chart
 from texture_evaluation.train import with_channels
 from texture_features.feature_set import FeatureSet
 

@@ -18,22 +18,22 @@ from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_estimation.classification.training import train
 from texture_estimation.evidence import Evidence
-from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.model import Model
 from texture_estimation.recipe import Recipe
-from texture_estimation.training import train
 from texture_evaluation import metrics
 from texture_evaluation.evaluate import judge
 from texture_evaluation.metrics import SlideResult
-from texture_evaluation.slides import STREAMS, Slide, find_slides, read_slides
 from texture_features.feature import Feature
 from texture_features.feature_set import InputFeatures
 from texture_features.features.force import Force
 from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.speed import Speed
-from texture_features.stretch import Stretched
-from texture_features.windows import Piece, WindowParams, cut_recording
+from texture_features.labelled_features import LabelledFeatures
+from texture_features.windowing.stretch import Stretched
+from texture_features.windowing.windows import Piece, WindowParams, cut_recording
+from texture_recordings.slides import STREAMS, Slide, find_slides, read_slides
 
 # Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and learns from
 # windows this far apart.

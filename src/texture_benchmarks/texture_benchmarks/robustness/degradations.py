@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter, lfilter_zi
 
+from texture_benchmarks.robustness.retime import retimed
 from texture_core.arrays import Array
-from texture_evaluation.retime import retimed
 
 BURST_S = 0.01  # samples are lost by the packet
 

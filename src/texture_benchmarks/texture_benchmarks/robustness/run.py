@@ -9,10 +9,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from texture_core.resources import folder
-from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation.benches.imports import imported
-from texture_evaluation.benches.recipes import (
+from texture_benchmarks.imported_data import imported
+from texture_benchmarks.recipes.run import (
     DATA,
     LAST_LEARNT,
     NEEDS_ARRAY,
@@ -21,11 +19,11 @@ from texture_evaluation.benches.recipes import (
     QUICK_SLIDES,
     RATE_HZ,
 )
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.degradations import DEGRADATIONS, Degradation, breakdown
-from texture_evaluation.recipe_trials import Recorded, comparable, read_recorded
-from texture_evaluation.robustness_charts import KEPT, Curve, Panel, robustness_chart, robustness_tables
-from texture_evaluation.robustness_scenes import (
+from texture_benchmarks.recipes.trial import Recorded, comparable, read_recorded
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.robustness.chart import KEPT, Curve, Panel, robustness_chart, robustness_tables
+from texture_benchmarks.robustness.degradations import DEGRADATIONS, Degradation, breakdown
+from texture_benchmarks.robustness.scenes import (
     CONDITIONS,
     FORCE_N,
     SCENE,
@@ -35,7 +33,9 @@ from texture_evaluation.robustness_scenes import (
     Felt,
     felt_slides,
 )
-from texture_evaluation.robustness_trials import TOPIC, Count, Pupils, degraded
+from texture_benchmarks.robustness.trial import TOPIC, Count, Pupils, degraded
+from texture_core.resources import folder
+from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.train import with_channels
 
 # By how the names of recipes begin; what begins otherwise is in the first.

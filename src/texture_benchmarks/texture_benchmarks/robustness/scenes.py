@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from texture_benchmarks.recipes.trial import Recorded
+from texture_benchmarks.robustness.trial import TOPIC
 from texture_core.arrays import Samples
 from texture_core.catalogue import find
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_evaluation.recipe_trials import Recorded
-from texture_evaluation.robustness_trials import TOPIC
-from texture_evaluation.slides import Slide
+from texture_recordings.slides import Slide
 from texture_simulation.effects.finger_spread import FingerSpread
 from texture_simulation.scans import scans
 from texture_simulation.scene import Scene, load_scene

@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from texture_benchmarks.recipes.trial import Recorded, describe, describe_all, examples_of
+from texture_benchmarks.robustness.degradations import Degradation
 from texture_core.arrays import Array
 from texture_core.signal import TactileSignal
+from texture_estimation.classification.training import train
 from texture_estimation.model import Model
 from texture_estimation.recipe import Recipe
-from texture_estimation.training import train
-from texture_evaluation.degradations import Degradation
-from texture_evaluation.recipe_trials import Recorded, describe, describe_all, examples_of
 from texture_features.feature_set import FeatureSet
 
 TOPIC = 'signal'

@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 from texture_core.errors import DeviceError
 from texture_core.ros.conversions import from_msg
-from texture_evaluation.ros.topics import TOPICS
+from texture_recordings.ros.topics import TOPICS
 
 POLL_S = 0.05
 

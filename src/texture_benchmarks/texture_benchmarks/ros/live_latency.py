@@ -12,15 +12,15 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.ros.graph import Graph
+from texture_benchmarks.ros.stream import Streamer, Timed
 from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.model import load_model
-from texture_evaluation.processes import NodeProcess
-from texture_evaluation.ros.graph import Graph
-from texture_evaluation.ros.stream import Streamer, Timed
-from texture_features.stream import INDEX_TOLERANCE
+from texture_features.windowing.stream import INDEX_TOLERANCE
+from texture_launch.node_process import NodeProcess
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
 

@@ -7,8 +7,8 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+from texture_benchmarks.ros.graph import Graph
 from texture_core.ros.conversions import to_msg
-from texture_evaluation.ros.graph import Graph
 
 Timed = tuple[int, str, Any]  # when it is due, ns since the start; topic; data class
 

@@ -10,7 +10,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_estimation.roughness.evidence import RoughnessEvidence
 from texture_estimation.roughness.model import RoughnessModel
-from texture_features.windows import CutWindow
+from texture_features.windowing.windows import CutWindow
 
 WARM_UP = 200
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from texture_evaluation.ablation import Ablation, Worth
+from texture_benchmarks.scenes.costs import MANY, Load, ScanCost
+from texture_benchmarks.scenes.trial import Ablation, Worth
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.scene_costs import MANY, Load, ScanCost
 
 COLUMNS = 3
 

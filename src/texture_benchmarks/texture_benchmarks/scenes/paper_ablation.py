@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from texture_evaluation.ablation import TOUCHINGS, Ablation, completed, difference, variants
-from texture_evaluation.experiments import ets_linear, jamali
-from texture_evaluation.experiments.protocol import Protocol, folds, halves
-from texture_evaluation.experiments.trial import of_task
+from texture_benchmarks.papers import ets_linear, jamali
+from texture_benchmarks.papers.protocol import Protocol, folds, halves
+from texture_benchmarks.papers.trial import of_task
+from texture_benchmarks.scenes.trial import TOUCHINGS, Ablation, completed, difference, variants
 from texture_simulation.scene import Scene, load_scene
 
 

@@ -9,7 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from texture_evaluation.ablation import (
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.scenes.chart import ablation_chart, cost_chart
+from texture_benchmarks.scenes.costs import MANY, SCAN_S, Load, ScanCost, live_load, scan_cost, stuck_surfaces
+from texture_benchmarks.scenes.paper_ablation import with_paper
+from texture_benchmarks.scenes.tables import added_table, cost_table, term_table
+from texture_benchmarks.scenes.trial import (
     CONFIDENCE,
     HOST,
     TOUCHINGS,
@@ -20,11 +25,6 @@ from texture_evaluation.ablation import (
     timed,
     with_one_more,
 )
-from texture_evaluation.ablation_charts import ablation_chart, cost_chart
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.paper_ablation import with_paper
-from texture_evaluation.scene_costs import MANY, SCAN_S, Load, ScanCost, live_load, scan_cost, stuck_surfaces
-from texture_evaluation.scene_tables import added_table, cost_table, term_table
 from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.scene import Scene, load_scene
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from texture_evaluation.ablation import Ablation, Difference
-from texture_evaluation.scene_costs import Load, ScanCost
+from texture_benchmarks.scenes.costs import Load, ScanCost
+from texture_benchmarks.scenes.trial import Ablation, Difference
 
 
 def cost_table(

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.segmentation.trial import Trial
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.segmentation_trials import Trial
 
 
 @dataclass(frozen=True, eq=False)

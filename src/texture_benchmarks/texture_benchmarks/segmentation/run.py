@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.segmentation.chart import Found, error_strength_chart, found_chart
+from texture_benchmarks.segmentation.trial import Trial, try_slide
 from texture_core.arrays import Samples
-from texture_evaluation.bags import read_bag
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.datasets.biotac20 import import_biotac20
-from texture_evaluation.segmentation_charts import Found, error_strength_chart, found_chart
-from texture_evaluation.segmentation_trials import Trial, try_slide
-from texture_features.cell_power import cell_power, rest_power
-from texture_features.segmentation import SegmentParams, find_sliding
+from texture_features.segmentation.cell_power import cell_power, rest_power
+from texture_features.segmentation.segments import SegmentParams, find_sliding
+from texture_recordings.bags import read_bag
+from texture_recordings.importers.biotac20 import import_biotac20
 from texture_simulation.scene import load_scene
 
 SCENES = ('ets_linear', 'ets_circular', 'ets_fine', 'jamali', 'kaboli', 'hu', 'roughness')

@@ -9,14 +9,14 @@ import numpy as np
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_features.cell_power import cell_power, rest_power
-from texture_features.segmentation import SegmentParams
-from texture_features.slide_segmenter import segment_recording
+from texture_features.segmentation.cell_power import cell_power, rest_power
+from texture_features.segmentation.segments import SegmentParams
+from texture_features.segmentation.slide_segmenter import segment_recording
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import Scene
 
 FORCE_N = 2.0
-# What the vibration channel of a sensor model feels; see `texture_features.cell_power.SENSES`.
+# What the vibration channel of a sensor model feels; see `texture_features.segmentation.cell_power.SENSES`.
 SENSES = {'tsf85': 'change', 'tsf85_3x4': 'change', 'biotac': 'force', 'daq': 'force', 'pvdf': 'force'}
 
 

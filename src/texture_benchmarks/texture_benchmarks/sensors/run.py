@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.sensors.trial import CHECKED, LINES, LineFigures, line_figures
 from texture_core.arrays import Array
-from texture_evaluation.benches.result import Bench, BenchResult
 from texture_evaluation.charts import fault_chart
 from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.robustness import CHECKED, LINES, LineFigures, line_figures
 
 PACKETS, QUICK_PACKETS = 20_000, 1_000
 RATES = (1e-5, 1e-4, 1e-3, 1e-2)

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.speed_force.held_out import Outcome
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.held_out import Outcome
-from texture_evaluation.whole_slides import WholeSlide
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
+from texture_recordings.whole_slides import WholeSlide
 
 BEHIND = {'facecolor': 'white', 'edgecolor': 'none', 'pad': 0.5}
 MARKERS = 'osD^v'

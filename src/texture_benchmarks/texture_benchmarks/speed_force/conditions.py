@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from texture_benchmarks.speed_force.held_out import Mask, Trial, recognised
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.learners.learner import Learner
-from texture_evaluation.held_out import Mask, Trial, recognised
-from texture_evaluation.whole_slides import WholeSlide
 from texture_features.feature import Feature, Windows
+from texture_recordings.whole_slides import WholeSlide
 
 
 @dataclass(frozen=True, eq=False)

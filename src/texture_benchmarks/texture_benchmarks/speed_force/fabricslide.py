@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from texture_benchmarks.speed_force.conditions import Conditions, described
+from texture_benchmarks.speed_force.held_out import Mask, Outcome, Trial, one_out, recognised, run, run_chosen
+from texture_benchmarks.speed_force.turns import TurnFree
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.learners.learner import Learner
 from texture_estimation.learners.svm_rbf import SvmRbf
-from texture_evaluation.held_out import Mask, Outcome, Trial, one_out, recognised, run, run_chosen
-from texture_evaluation.protocols.conditions import Conditions, described
-from texture_evaluation.turns import TurnFree
 from texture_features.feature import Feature, Windows
 from texture_features.features.level_share import LevelShare
 from texture_features.features.mean_spatial_bands import MeanSpatialBands

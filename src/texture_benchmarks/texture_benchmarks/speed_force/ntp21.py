@@ -14,18 +14,18 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
+from texture_benchmarks.speed_force.conditions import Conditions, described
+from texture_benchmarks.speed_force.held_out import Mask, Outcome, Trial, one_out, recognised, run, run_chosen
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.learners.learner import Learner
 from texture_estimation.learners.svm_rbf import SvmRbf
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.held_out import Mask, Outcome, Trial, one_out, recognised, run, run_chosen
-from texture_evaluation.protocols.conditions import Conditions, described
-from texture_evaluation.whole_slides import WholeSlide
 from texture_features.array_speed import ArraySpeed
 from texture_features.feature import Feature, Windows
 from texture_features.features.level_share import LevelShare
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
 from texture_features.features.spatial_bands import SpatialBands
+from texture_recordings.whole_slides import WholeSlide
 
 SLOW_MM_S = 60.0  # "slow" is taught, faster is tested
 CANDIDATES = tuple((bands, floor) for bands in (16, 32, 64) for floor in (1e-7, 1e-9))

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from texture_benchmarks.imported_data import imported
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.speed_force.chart import held_out_chart, spectra_chart, window_chart
+from texture_benchmarks.speed_force.conditions import Conditions
+from texture_benchmarks.speed_force.fabricslide import COMPLETE, Fabricslide
+from texture_benchmarks.speed_force.held_out import Outcome
+from texture_benchmarks.speed_force.ntp21 import TAUGHT, Ntp21
 from texture_estimation.learners.svm_rbf import SvmRbf
-from texture_evaluation.benches.imports import imported
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.held_out import Outcome
-from texture_evaluation.protocols.conditions import Conditions
-from texture_evaluation.protocols.fabricslide import COMPLETE, Fabricslide
-from texture_evaluation.protocols.ntp21 import TAUGHT, Ntp21
-from texture_evaluation.speed_force_charts import held_out_chart, spectra_chart, window_chart
-from texture_evaluation.whole_slides import whole_slides
+from texture_recordings.whole_slides import whole_slides
 
 GOALS = {
     'ntp21': {'one speed out': 0.96, 'one force out': 0.98, 'slow to fast': 0.85},

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.stick_slip.chart import Borders, Costs, Vibration, border_chart, cost_chart, vibration_chart
 from texture_core.arrays import Array
-from texture_evaluation.benches.result import Bench, BenchResult
-from texture_evaluation.stick_slip_charts import Borders, Costs, Vibration, border_chart, cost_chart, vibration_chart
 from texture_simulation.path import Path
 from texture_simulation.stick_slip.border import BORDERS, MARGIN, Phase, border_s
 from texture_simulation.stick_slip.friction import StickSlip

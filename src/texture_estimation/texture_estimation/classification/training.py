@@ -11,16 +11,16 @@ from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
-from texture_estimation import prediction_sets, stopping
-from texture_estimation.evidence_rules import EvidenceRule
-from texture_estimation.examples import Examples
-from texture_estimation.familiarity import Familiarity
-from texture_estimation.labelled_features import LabelledFeatures
+from texture_estimation.classification.evidence_rules import EvidenceRule
+from texture_estimation.incremental.examples import Examples
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.log_probabilities import log_loss, undecided
 from texture_estimation.model import Model
-from texture_estimation.next_motion import Explorations
+from texture_estimation.next_motion.choice import Explorations
+from texture_estimation.open_set import prediction_sets, stopping
+from texture_estimation.open_set.novelty import Familiarity
 from texture_estimation.recipe import Recipe
+from texture_features.labelled_features import LabelledFeatures
 
 # Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
 DEFAULT_GROWTH = 0.5

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import AnyArray, Array
+from texture_estimation.incremental.ridge_classifier import spread
 from texture_estimation.learners.learner import Codes
-from texture_estimation.taught_head import spread
 
 
 @dataclass(frozen=True, eq=False)

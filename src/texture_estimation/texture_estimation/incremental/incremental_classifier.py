@@ -12,7 +12,7 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_core.features import FeatureVector
 from texture_core.labels import checked_label
-from texture_estimation.lessons import Lesson, remove_lesson, write_lesson
+from texture_estimation.incremental.added_examples import Lesson, remove_lesson, write_lesson
 from texture_estimation.model import Model
 
 # Explorations that can still be taught, and windows of each: the latest.

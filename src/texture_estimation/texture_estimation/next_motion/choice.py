@@ -15,9 +15,9 @@ from scipy.optimize import minimize_scalar
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.features import FeatureVector
+from texture_core.motion import Motion, kinds
 from texture_estimation.fingerprint import difference
 from texture_estimation.log_probabilities import log_loss, log_softmax
-from texture_estimation.motion import Motion, kinds
 
 SMALLEST = 1e-6  # variance of a feature within textures, in that of all slides: equal to the last bit is luck
 SAME_NATS = 1e-9  # informations that differ by less are the same

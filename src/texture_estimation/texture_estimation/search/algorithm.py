@@ -16,7 +16,7 @@ from pymoo.operators.crossover.sbx import SBX  # type: ignore[import-untyped]
 from pymoo.operators.mutation.pm import PM  # type: ignore[import-untyped]
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.variables import Individual, SearchSpace
+from texture_estimation.search.variables import Individual, SearchSpace
 
 # Crossover and mutation reach this far: low indices make wide steps, which variables of few values need.
 WIDTH_INDEX = 3.0

@@ -17,7 +17,7 @@ from texture_features.features.force import Force
 from texture_features.features.integral import Integral
 from texture_features.features.spectral_peaks import SpectralPeaks
 from texture_features.features.speed import Speed
-from texture_features.stretch import Stretched
+from texture_features.windowing.stretch import Stretched
 
 # Operations of one exponential or hyperbolic tangent.
 EXPONENTIAL = 10.0

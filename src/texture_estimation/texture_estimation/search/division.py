@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from texture_estimation.genetic.examples import Cut, Examples
-from texture_estimation.genetic.halves import Mask, random_halves
-from texture_features.windows import WindowParams
+from texture_estimation.search.examples import Cut, Examples
+from texture_estimation.search.halves import Mask, random_halves
+from texture_features.windowing.windows import WindowParams
 
 
 @dataclass(frozen=True, eq=False)

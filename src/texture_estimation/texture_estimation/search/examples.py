@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from texture_core.errors import InvalidData
 from texture_estimation.learners.learner import Codes
 from texture_features.feature import Windows
-from texture_features.windows import CutWindow, Piece, WindowParams
+from texture_features.windowing.windows import CutWindow, Piece, WindowParams
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,13 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
-from texture_estimation.genetic.examples import Cut
-from texture_estimation.genetic.spread import Spread, in_turn
+from texture_estimation.search.examples import Cut
+from texture_estimation.search.spread import Spread, in_turn
 from texture_features.feature import Feature, Windows
 from texture_features.feature_set import FeatureSet, InputFeatures
 from texture_features.features.spectral_peaks import SpectralPeaks, by_frequency
-from texture_features.stretch import Stretched
-from texture_features.windows import WindowParams
+from texture_features.windowing.stretch import Stretched
+from texture_features.windowing.windows import WindowParams
 
 # Windows described in one go: what they and their spectra take should fit the processor's cache.
 CHUNK = 64

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.evidence_rules import EvidenceRule
-from texture_estimation.genetic.halves import Mask
+from texture_estimation.classification.evidence_rules import EvidenceRule
 from texture_estimation.learners.learner import Codes
 from texture_estimation.log_probabilities import log_softmax
+from texture_estimation.search.halves import Mask
 
 UNDECIDED = -1
 

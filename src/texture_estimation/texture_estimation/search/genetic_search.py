@@ -9,11 +9,11 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_estimation.genetic.algorithm import algorithm_for
-from texture_estimation.genetic.memory import Memory
-from texture_estimation.genetic.spread import Spread, in_turn
-from texture_estimation.genetic.trial import EMPTY, Record, Trial, judge, verdict
-from texture_estimation.genetic.variables import Individual, SearchSpace
+from texture_estimation.search.algorithm import algorithm_for
+from texture_estimation.search.memory import Memory
+from texture_estimation.search.spread import Spread, in_turn
+from texture_estimation.search.trial import EMPTY, Record, Trial, judge, verdict
+from texture_estimation.search.variables import Individual, SearchSpace
 
 OBJECTIVES = ('accuracy', 'front')
 # Halves on which the first generation finds its leader.

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.grade_judge import GradeJudge
-from texture_estimation.genetic.trial import Half
 from texture_estimation.learners.learner import Codes
 from texture_estimation.roughness.head import ROUGH, SMOOTH, Head
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.grade_judge import GradeJudge
+from texture_estimation.search.trial import Half
 
 WORST = ROUGH - SMOOTH
 
 
 @dataclass(frozen=True, eq=False)
 class GradeTrial:
-    """What it takes to judge one recipe; see `texture_estimation.genetic.trial.Trial`.
+    """What it takes to judge one recipe; see `texture_estimation.search.trial.Trial`.
 
     The score is 1 for the grade that people gave, and falls by a quarter for each grade off; 0 where there is no grade.
     So it is 1 - (mean absolute error) / 4. The paper says that its search takes "the results of learning and testing",

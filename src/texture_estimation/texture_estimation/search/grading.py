@@ -8,21 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.cost import operations
-from texture_estimation.genetic.examples import Examples
-from texture_estimation.genetic.grade_trial import GradeTrial
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.catalogue import grade_judge_of
 from texture_estimation.roughness.checks import LEVEL, SKID
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.head import GRADES
 from texture_estimation.roughness.recipe import RoughnessRecipe
+from texture_estimation.search.cost import operations
+from texture_estimation.search.examples import Examples
+from texture_estimation.search.grade_trial import GradeTrial
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.catalogue import grade_judge_of
 from texture_features.feature_set import FeatureSet
 
 
 @dataclass(frozen=True)
 class Grading:
-    """What is counted is how near the grades come; see `texture_estimation.genetic.task.Task`.
+    """What is counted is how near the grades come; see `texture_estimation.search.task.Task`.
 
     Parameters
     ----------

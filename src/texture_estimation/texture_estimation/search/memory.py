@@ -14,8 +14,8 @@ import numpy as np
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.files import MB
 from texture_core.plain_data import load_json
-from texture_estimation.genetic.trial import EMPTY, Record
-from texture_estimation.genetic.variables import Individual
+from texture_estimation.search.trial import EMPTY, Record
+from texture_estimation.search.variables import Individual
 
 FORMAT = 1
 MOST_BYTES = 50 * MB  # of a checkpoint; a search of 10 000 individuals writes 10

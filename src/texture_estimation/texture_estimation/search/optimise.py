@@ -12,16 +12,16 @@ from typing import Any, Generic
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
-from texture_estimation.genetic.division import Division
-from texture_estimation.genetic.feature_cache import FeatureCache
-from texture_estimation.genetic.fitness import fitness
-from texture_estimation.genetic.memory import Memory
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.search import Found, Generation, Scored, SearchParams, search
-from texture_estimation.genetic.spread import Spread, in_turn
-from texture_estimation.genetic.task import R, Task
-from texture_estimation.genetic.trial import Record, Trial
-from texture_estimation.genetic.variables import Individual
+from texture_estimation.search.division import Division
+from texture_estimation.search.feature_cache import FeatureCache
+from texture_estimation.search.fitness import fitness
+from texture_estimation.search.genetic_search import Found, Generation, Scored, SearchParams, search
+from texture_estimation.search.memory import Memory
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.spread import Spread, in_turn
+from texture_estimation.search.task import R, Task
+from texture_estimation.search.trial import Record, Trial
+from texture_estimation.search.variables import Individual
 
 
 @dataclass(frozen=True, eq=False)

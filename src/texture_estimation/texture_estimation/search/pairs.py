@@ -10,19 +10,19 @@ from pathlib import Path
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.evidence_rules import EvidenceRule
-from texture_estimation.genetic.division import Division
-from texture_estimation.genetic.feature_cache import FeatureCache
-from texture_estimation.genetic.fitness import UNDECIDED, decided_by_slide, decisions, fitness, shares_right
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.optimise import Optimised, optimise
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.search import Generation, SearchParams
-from texture_estimation.genetic.spread import Spread, in_turn
-from texture_estimation.genetic.telling_apart import TellingApart
-from texture_estimation.genetic.trial import Record
+from texture_estimation.classification.evidence_rules import EvidenceRule
 from texture_estimation.learners.learner import Codes, Learner
 from texture_estimation.recipe import Recipe
+from texture_estimation.search.division import Division
+from texture_estimation.search.feature_cache import FeatureCache
+from texture_estimation.search.fitness import UNDECIDED, decided_by_slide, decisions, fitness, shares_right
+from texture_estimation.search.genetic_search import Generation, SearchParams
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.optimise import Optimised, optimise
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.spread import Spread, in_turn
+from texture_estimation.search.telling_apart import TellingApart
+from texture_estimation.search.trial import Record
 
 Pair = tuple[str, str]
 

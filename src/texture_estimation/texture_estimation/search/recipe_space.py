@@ -12,8 +12,8 @@ from texture_core.catalogue import find, unknown
 from texture_core.errors import InvalidParameter
 from texture_core.plain_data import load_yaml, shown
 from texture_core.resources import find_file
-from texture_estimation.genetic.task import R
-from texture_estimation.genetic.variables import Choice, Individual, Integer, LogReal, SearchSpace, Value, Variable
+from texture_estimation.search.task import R
+from texture_estimation.search.variables import Choice, Individual, Integer, LogReal, SearchSpace, Value, Variable
 
 MOST_INCLUDES = 10
 KEYS = ('description', 'include', 'variables')

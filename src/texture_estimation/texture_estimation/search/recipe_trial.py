@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from texture_core.arrays import Array
-from texture_estimation.evidence_rules import EvidenceRule, MajorityVote
-from texture_estimation.genetic.fitness import decided_by_slide, decisions, shares_right
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.judge import Judge, ScoresOfHalf
-from texture_estimation.genetic.trial import Half
+from texture_estimation.classification.evidence_rules import EvidenceRule, MajorityVote
 from texture_estimation.learners.learner import Codes, Learner
+from texture_estimation.search.fitness import decided_by_slide, decisions, shares_right
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.judge import Judge, ScoresOfHalf
+from texture_estimation.search.trial import Half
 
 
 @dataclass(frozen=True, eq=False)
 class RecipeTrial:
-    """What it takes to judge one recipe; see `texture_estimation.genetic.trial.Trial`.
+    """What it takes to judge one recipe; see `texture_estimation.search.trial.Trial`.
 
     What is counted is right windows; with a majority vote, whose windows are parts of a slide, right slides.
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from texture_core.arrays import Array, Samples
 from texture_core.errors import InvalidData
-from texture_estimation.genetic.examples import Examples
+from texture_estimation.search.examples import Examples
 from texture_features.feature import Windows
-from texture_features.windows import WindowParams
+from texture_features.windowing.windows import WindowParams
 
 # Of a sample: lengths in seconds are seldom exact.
 ROUNDING = 1e-6

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Any, Protocol, TypeVar
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.examples import Examples
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.trial import Trial
+from texture_estimation.search.examples import Examples
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.trial import Trial
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import WindowParams
+from texture_features.windowing.windows import WindowParams
 
 
 class Searchable(Protocol):

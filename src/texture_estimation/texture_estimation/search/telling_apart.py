@@ -6,18 +6,18 @@ import dataclasses
 from dataclasses import dataclass
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.cost import operations
-from texture_estimation.genetic.examples import Examples
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.catalogue import judge_of
-from texture_estimation.genetic.recipe_trial import RecipeTrial
 from texture_estimation.recipe import Recipe
+from texture_estimation.search.cost import operations
+from texture_estimation.search.examples import Examples
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.catalogue import judge_of
+from texture_estimation.search.recipe_trial import RecipeTrial
 from texture_features.feature_set import FeatureSet
 
 
 @dataclass(frozen=True)
 class TellingApart:
-    """What is counted is right decisions; see `texture_estimation.genetic.task.Task`."""
+    """What is counted is right decisions; see `texture_estimation.search.task.Task`."""
 
     def described(self, recipe: Recipe) -> FeatureSet:
         """Return the feature set with the windows that `train` learns from."""

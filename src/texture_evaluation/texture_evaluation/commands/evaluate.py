@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from texture_bringup.commands.options import add_channels, add_seed, add_slides
+from texture_core.command_options import add_channels, add_seed, add_slides
 from texture_core.errors import ModelMismatch
 from texture_estimation.model import Model, load_model
 from texture_evaluation.evaluate import Report, evaluate

@@ -7,9 +7,9 @@ import sys
 import time
 from dataclasses import dataclass, field
 
-from texture_bringup.commands.options import add_channels, add_seed, add_slides
+from texture_core.command_options import add_channels, add_seed, add_slides
 from texture_core.parameters import from_mapping
-from texture_estimation.genetic.search import OBJECTIVES, Generation, SearchParams
+from texture_estimation.search.genetic_search import OBJECTIVES, Generation, SearchParams
 from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags, over_machine
 
 BAR = 20  # letters

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_bringup.commands.options import add_channels, add_seed, add_slides
+from texture_core.command_options import add_channels, add_seed, add_slides
 from texture_estimation.model import Model
 from texture_estimation.roughness.model import RoughnessModel
 from texture_evaluation.train import train_from_bags

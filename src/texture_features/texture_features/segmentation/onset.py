@@ -18,7 +18,7 @@ from scipy.ndimage import convolve1d
 from scipy.signal import welch
 
 from texture_core.arrays import AnyArray, Array, Samples
-from texture_features.cell_power import TINY, centred, passed_share, vibration_of
+from texture_features.segmentation.cell_power import TINY, centred, passed_share, vibration_of
 
 # What a vibration channel senses, and the powers of the speed with which the amplitude of one and the same wave of a
 # texture then grows: films that hold their charge and hydrophones feel the force, differentiating channels its change.

@@ -19,9 +19,9 @@ from scipy.ndimage import percentile_filter, uniform_filter1d
 from texture_core.arrays import Array, Samples
 from texture_core.errors import InvalidData
 from texture_core.parameters import param
-from texture_features.cell_power import SMOOTH_S, SMOOTHED_CELLS, TINY, cell_power, rest_power
-from texture_features.contact_load import Touch, find_touches
-from texture_features.onset import SENSES, OnsetModel
+from texture_features.segmentation.cell_power import SMOOTH_S, SMOOTHED_CELLS, TINY, cell_power, rest_power
+from texture_features.segmentation.contact_load import Touch, find_touches
+from texture_features.segmentation.onset import SENSES, OnsetModel
 
 # Rest and sliding are told apart over 50 ms. A touch or a knock lasts a part of that, sliding most.
 SMOOTHED_PERCENTILE = 70

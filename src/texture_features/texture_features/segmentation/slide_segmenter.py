@@ -10,9 +10,9 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_features.cell_power import cell_power, rest_power
-from texture_features.segmentation import SegmentParams, Sliding, find_sliding
-from texture_features.stream import Run, Stream
+from texture_features.segmentation.cell_power import cell_power, rest_power
+from texture_features.segmentation.segments import SegmentParams, Sliding, find_sliding
+from texture_features.windowing.stream import Run, Stream
 
 PERIOD_S = 0.1
 KEEP_S = 20.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_features.feature import Windows
-from texture_features.spectrum import mean_densities
+from texture_features.spectra.spectrum import mean_densities
 
 
 def line_spectrum(windows: Windows, points: int, rate_of_change: bool) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_features.feature import Windows
-from texture_features.spectrum import hann
+from texture_features.spectra.spectrum import hann
 
 PADDING = 4  # lines stand so much closer than the window alone resolves, and bands may be narrower than a line
 

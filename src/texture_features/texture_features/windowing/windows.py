@@ -18,8 +18,8 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_core.window import Window
-from texture_features.slide import Slide, Span
-from texture_features.stream import Run, Stream
+from texture_features.windowing.slide import Slide, Span
+from texture_features.windowing.stream import Run, Stream
 
 SILENCE_S = 0.3
 

@@ -8,10 +8,10 @@ import signal
 import sys
 from pathlib import Path
 
-from texture_bringup.launcher import process
-from texture_bringup.launcher.files import find_launch_file, given_arguments
-from texture_bringup.launcher.reader import all_arguments, read
-from texture_bringup.launcher.supervisor import Supervisor
+from texture_launch import process
+from texture_launch.files import find_launch_file, given_arguments
+from texture_launch.reader import all_arguments, read
+from texture_launch.supervisor import Supervisor
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

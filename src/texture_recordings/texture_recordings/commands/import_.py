@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from texture_bringup.commands.options import add_channels, add_seed, add_slides
 from texture_core.catalogue import find
-from texture_evaluation.datasets.catalogue import IMPORTS
+from texture_core.command_options import add_channels, add_seed, add_slides
+from texture_recordings.importers.catalogue import IMPORTS
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

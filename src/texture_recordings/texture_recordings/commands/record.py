@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from texture_bringup.ros.run_node import run_node
-from texture_evaluation.nodes.record import Record
+from texture_core.ros.run_node import run_node
+from texture_recordings.nodes.record import Record
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from texture_bringup.ros.run_node import run_node
-from texture_evaluation.nodes.replay import Replay
+from texture_core.ros.run_node import run_node
+from texture_recordings.nodes.replay import Replay
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 
 from texture_core.parameters import from_mapping, parameters_of
-from texture_evaluation.segment import segment_bags
-from texture_features.segmentation import SegmentParams
+from texture_features.segmentation.segments import SegmentParams
+from texture_recordings.segment import segment_bags
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

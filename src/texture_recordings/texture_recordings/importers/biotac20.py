@@ -20,8 +20,8 @@ from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.files import Arrays, open_regular
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.slides import parse_selection
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.slides import parse_selection
 
 FRAME_NS = 10_000_000  # a frame every 10 ms; its recorded times jitter by the host's scheduling
 PAC_PER_FRAME = 22

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from texture_evaluation.datasets.biotac20 import import_biotac20
-from texture_evaluation.datasets.fabricslide import import_fabricslide
-from texture_evaluation.datasets.ntp21 import import_ntp21
+from texture_recordings.importers.biotac20 import import_biotac20
+from texture_recordings.importers.fabricslide import import_fabricslide
+from texture_recordings.importers.ntp21 import import_ntp21
 
 IMPORTS: Mapping[str, Callable[..., list[Path]]] = {
     'biotac20': import_biotac20,  # 20 materials × 40 slides, BioTac on a robot arm

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
-from texture_evaluation.datasets.slide_file import SlideFile
-from texture_evaluation.datasets.steady_slides import SteadySlide, Stream
+from texture_recordings.importers.slide_file import SlideFile
+from texture_recordings.importers.steady_slides import SteadySlide, Stream
 
 FABRIC = re.compile(r'([^/]+)/F(\d+)/V(-?\d+)/(\d+)')
 GRATING = re.compile(r'grating/([^/]+?)_F(\d+)_V(-?\d+)mmps_(\d+)')

@@ -17,8 +17,8 @@ from scipy.interpolate import CubicSpline
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData
-from texture_evaluation.datasets.slide_file import SlideFile
-from texture_evaluation.datasets.steady_slides import SteadySlide, Stream
+from texture_recordings.importers.slide_file import SlideFile
+from texture_recordings.importers.steady_slides import SteadySlide, Stream
 
 KEY = re.compile(r'([^/]+)/speed(\d+(?:\.\d+)?)/force(\d+(?:\.\d+)?)')
 TAXELS = 9

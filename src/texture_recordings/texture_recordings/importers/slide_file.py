@@ -12,8 +12,8 @@ from texture_core.arrays import AnyArray
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidData
 from texture_core.files import Arrays, open_regular
-from texture_evaluation.datasets.steady_slides import SteadySlide, Stream, write_steady_slides
-from texture_evaluation.slides import parse_selection
+from texture_recordings.importers.steady_slides import SteadySlide, Stream, write_steady_slides
+from texture_recordings.slides import parse_selection
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from texture_core.arrays import AnyArray
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_evaluation.bag_writer import BagWriter
+from texture_recordings.bag_writer import BagWriter
 
 START_NS = 1_000_000_000 * NANOSECONDS
 PAUSE_NS = NANOSECONDS

@@ -16,11 +16,11 @@ from texture_core.parameters import param
 from texture_core.ros.diagnostics import Diagnostics, Report
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.bags import RawMessage
-from texture_evaluation.cdr import SignalDecoder
-from texture_evaluation.continuity import Continuity
-from texture_evaluation.ros.topics import TOPICS, Topic
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import RawMessage
+from texture_recordings.cdr import SignalDecoder
+from texture_recordings.continuity import Continuity
+from texture_recordings.ros.topics import TOPICS, Topic
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
 POLL_S = 0.2

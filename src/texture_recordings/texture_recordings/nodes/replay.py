@@ -17,10 +17,10 @@ from texture_core.errors import DeviceError, InvalidParameter, TextureError
 from texture_core.parameters import param
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
-from texture_evaluation.bags import RawMessage, find_bags, read_raw, short_name
-from texture_evaluation.ros.topics import TOPICS
-from texture_evaluation.schedule import Schedule
-from texture_evaluation.slides import find_slides
+from texture_recordings.bags import RawMessage, find_bags, read_raw, short_name
+from texture_recordings.ros.topics import TOPICS
+from texture_recordings.schedule import Schedule
+from texture_recordings.slides import find_slides
 
 # What is derived from these is left out: the live graph derives it anew.
 INPUTS = ('signal', 'signal_static', 'exploration')

@@ -9,11 +9,11 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 
-from texture_bringup.endurance.faults import Strike
-from texture_bringup.endurance.processes import Processes
-from texture_bringup.endurance.record import Struck
+from texture_benchmarks.endurance.faults import Strike
+from texture_benchmarks.endurance.processes import Processes
+from texture_benchmarks.endurance.record import Struck
+from texture_benchmarks.endurance.ros.watcher import Watcher
 from texture_bringup.ros.operator import Operator
-from texture_bringup.ros.watcher import Watcher
 from texture_core.errors import LaunchFailed
 
 NODES = ('bench', 'sensor', 'explorer', 'feature_extractor', 'classifier')

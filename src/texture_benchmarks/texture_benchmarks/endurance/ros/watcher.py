@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_msgs import msg
 
-from texture_bringup.endurance.books import COUNTERS, Ledger, SignalBook, Totals
+from texture_benchmarks.endurance.books import COUNTERS, Ledger, SignalBook, Totals
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
 from texture_core.ros.time import to_ns
 

@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.grade_judge import GradesOfHalf
-from texture_estimation.genetic.judges.networks import Networks, drawn
 from texture_estimation.learners.learner import Codes
 from texture_estimation.learners.standardisation import standardisation
 from texture_estimation.roughness.ann1 import Ann1
 from texture_estimation.roughness.ann5 import FIRES_FROM, Ann5
 from texture_estimation.roughness.fired import belongs, mean_of_fired
 from texture_estimation.roughness.head import ROUGH, SMOOTH
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.grade_judge import GradesOfHalf
+from texture_estimation.search.judges.networks import Networks, drawn
 
 # Examples of each texture that a network learns from.
 EXAMPLES = 16

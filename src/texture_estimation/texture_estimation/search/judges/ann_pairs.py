@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.judge import ScoresOfHalf
-from texture_estimation.genetic.judges.networks import Networks, drawn
 from texture_estimation.learners.ann_pairs import ROUNDED_UP, AnnPairs
 from texture_estimation.learners.learner import Codes
 from texture_estimation.learners.pair_votes import PairVotes
 from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.judge import ScoresOfHalf
+from texture_estimation.search.judges.networks import Networks, drawn
 
 # Examples that are learnt from, of all labels: with many labels there are many networks, and time for few each.
 EXAMPLES = 200

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from texture_estimation.genetic.judges.ann_grades import ann1, ann5
-from texture_estimation.genetic.judges.ann_pairs import ann_pairs
-from texture_estimation.genetic.judges.exact import exact
-from texture_estimation.genetic.judges.exact_grades import exact_grades
-from texture_estimation.genetic.judges.grade_judge import GradeJudge
-from texture_estimation.genetic.judges.judge import Judge
-from texture_estimation.genetic.judges.svm_grades import svm5
-from texture_estimation.genetic.judges.svm_pairs import svm_pairs
+from texture_estimation.search.judges.ann_grades import ann1, ann5
+from texture_estimation.search.judges.ann_pairs import ann_pairs
+from texture_estimation.search.judges.exact import exact
+from texture_estimation.search.judges.exact_grades import exact_grades
+from texture_estimation.search.judges.grade_judge import GradeJudge
+from texture_estimation.search.judges.judge import Judge
+from texture_estimation.search.judges.svm_grades import svm5
+from texture_estimation.search.judges.svm_pairs import svm_pairs
 
 JUDGES: Mapping[str, Judge] = {
     'svm_pairs': svm_pairs,

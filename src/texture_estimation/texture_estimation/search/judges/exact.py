@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.judge import ScoresOfHalf
 from texture_estimation.learners.learner import Codes, Learner
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.judge import ScoresOfHalf
 
 
 def exact(learner: Learner, values: Array, codes: Codes, groups: Codes) -> ScoresOfHalf:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.grade_judge import GradesOfHalf
 from texture_estimation.learners.learner import Codes
 from texture_estimation.roughness.head import Head
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.grade_judge import GradesOfHalf
 
 
 def exact_grades(head: Head, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
 from texture_estimation.learners.learner import Codes
+from texture_estimation.search.halves import Mask
 
 # Which examples are learnt from, (n,) → a score of each label for every example, (n, n_labels); equal highest: a tie.
 ScoresOfHalf = Callable[[Mask], Array]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
 from texture_estimation.learners.learner import Codes
+from texture_estimation.search.halves import Mask
 
 STEPS = 10
 FIRST_DAMPING, MORE, LESS = 1e-2, 10.0, 0.2

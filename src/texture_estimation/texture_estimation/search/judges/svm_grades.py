@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.grade_judge import GradesOfHalf
-from texture_estimation.genetic.judges.svm_pairs import CACHE_MB, TOLERANCE, kernel_of
 from texture_estimation.learners.learner import Codes
 from texture_estimation.roughness.fired import belongs, mean_of_fired
 from texture_estimation.roughness.svm5 import Svm5
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.grade_judge import GradesOfHalf
+from texture_estimation.search.judges.svm_pairs import CACHE_MB, TOLERANCE, kernel_of
 
 
 def svm5(head: Svm5, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
-from texture_estimation.genetic.halves import Mask
-from texture_estimation.genetic.judges.judge import ScoresOfHalf
 from texture_estimation.learners.learner import Codes
 from texture_estimation.learners.pair_votes import PairVotes
 from texture_estimation.learners.standardisation import standardisation
 from texture_estimation.learners.svm_pairs import SvmPairs
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.judge import ScoresOfHalf
 
 # A hundred times libsvm's: single decisions near the border differ, individuals rank alike, and a sixth of the time is
 # saved where it takes longest.
