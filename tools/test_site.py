@@ -201,7 +201,7 @@ def commands(start: str) -> list[tuple[str, str]]:
 def test_a_command_of_the_pages_has_the_arguments_that_it_takes(page: str, line: str) -> None:
     _, name, *rest = shlex.split(line)
     parser = argparse.ArgumentParser(exit_on_error=False)
-    module = importlib.import_module(f'texture_bringup.commands.{COMMANDS[name].module}')
+    module = importlib.import_module(COMMANDS[name].module)
     module.configure(parser)
     options = parser.parse_args(rest)
     if name == 'launch':
