@@ -7,14 +7,15 @@ import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from texture_core.catalogue import find
 from texture_core.errors import DeviceError, MotionRefused, TextureError
 from texture_core.exploration import ExplorationRequest, ExplorationState
-from texture_exploration.arms.protocol import Arm, Rebootable, Recoverable, Vector, Warns
+from texture_exploration.arms.protocol import Arm, Counting, Rebootable, Recoverable, Vector, Warns, Zeroing
 from texture_exploration.exploration import Exploration, cannot_move, hear_nothing
 from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -57,6 +58,7 @@ class Explorer:
         self._clock = clock
         self._lock = threading.Lock()
         self._home: Vector | None = None
+        self._lift_first = True  # nobody knows whether the finger presses
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._closed = False
@@ -64,11 +66,14 @@ class Explorer:
     def connect(self) -> Vector:
         """Reach the arm, or reach it again after a fault; return where explorations begin.
 
+        The next exploration lifts first, as nobody knows whether the finger presses.
+
         Raises
         ------
         DeviceError
             If it cannot be reached.
         """
+        self._lift_first = True
         self.arm.close()
         self.arm.connect()
         # After a fault the finger may hang anywhere; the first place is the one that the operator chose.
@@ -85,6 +90,13 @@ class Explorer:
             return (self._clock() - self.arm.state().time_ns) * 1e-9
         except DeviceError:
             return math.nan
+
+    def arm_counts(self) -> Mapping[str, int]:
+        """Return what the arm counts by itself, nothing if it counts nothing or cannot be reached."""
+        if isinstance(self.arm, Counting):
+            with contextlib.suppress(DeviceError):
+                return self.arm.counts
+        return {}
 
     def trouble(self) -> str:
         """Return in a sentence why the arm cannot move now, '' if it can."""
@@ -136,6 +148,8 @@ class Explorer:
     def recover(self) -> None:
         """Free the arm from a fault, as it knows itself or by connecting anew; whoever asks sees that it may move.
 
+        The next exploration lifts first, as the finger may still press.
+
         Raises
         ------
         MotionRefused
@@ -145,6 +159,7 @@ class Explorer:
         """
         with self._lock:
             self._refuse_two()
+            self._lift_first = True
             if isinstance(self.arm, Recoverable) and self.trouble():
                 with contextlib.suppress(DeviceError):  # connecting anew tells it too
                     self.arm.recover()
@@ -183,6 +198,8 @@ class Explorer:
         plan = find(MOTIONS, request.motion, 'motion')
         home = self._ready()
         motion = plan(request, home, self.touch, self.limits)
+        if self._lift_first:
+            motion = LiftFirst(motion, self.touch, self.limits, self._believes_its_force)
         return Exploration(
             exploration_id,
             request,
@@ -193,6 +210,9 @@ class Explorer:
             on_state=self._on_state,
             silence=self._silence,
         )
+
+    def _believes_its_force(self) -> bool:
+        return self.arm.zeroed if isinstance(self.arm, Zeroing) else True
 
     def _refuse_two(self) -> None:
         if self.current is not None:
@@ -213,6 +233,7 @@ class Explorer:
         try:
             exploration.run(Pacer(PERIOD_S, self._clock))
         finally:
+            self._lift_first = not exploration.outcome.success
             self.counts['done' if exploration.outcome.success else 'aborted'] += 1
             self.counts['late_steps'] += exploration.gaps
             exploration.ended.set()

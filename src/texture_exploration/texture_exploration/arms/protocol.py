@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -93,6 +94,24 @@ class Warns(Protocol):
 
     def warning(self) -> str:
         """Return it in a sentence, '' if there is nothing."""
+
+
+@runtime_checkable
+class Zeroing(Protocol):
+    """An arm that zeroes its force sensor itself: at rest in free air, which a rise must have shown it."""
+
+    @property
+    def zeroed(self) -> bool:
+        """Whether it did since it was connected, or recovered; before, its force is no measure of contact."""
+
+
+@runtime_checkable
+class Counting(Protocol):
+    """An arm that counts what its operator should know."""
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals by name; DeviceError if it is not connected."""
 
 
 class ArmClass(Protocol):

@@ -1,0 +1,116 @@
+"""After a fault the finger is lifted until nothing touches it, on every arm, before a motion begins."""
+
+from dataclasses import replace
+
+import pytest
+
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.explorer import Explorer
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.lift_first import LiftFirst
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+TOUCH = TouchParams()
+REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.03)
+DEADLINE_S = 20.0
+
+
+@pytest.fixture
+def lifting_first(monkeypatch):
+    """Let linear slides lift first; return how an arm says whether its force sensor is zeroed."""
+    plan, zeroed = MOTIONS['linear_slide'], [True]
+    monkeypatch.setitem(
+        MOTIONS,
+        'linear_slide',
+        lambda request, home, touch, limits: LiftFirst(
+            plan(request, home, touch, limits), touch, limits, lambda: zeroed[0]
+        ),
+    )
+    return zeroed
+
+
+def test_a_finger_that_presses_is_free_before_it_comes_down_again(table, lifting_first):
+    table.arm.shove((0.0, 0.0, -0.0115))  # pressed by 1.5 mm: 3 N
+    outcome = table.explore(REQUEST)
+    assert outcome.success, outcome.message
+    assert table.phases == [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT, Phase.DONE]
+    heights = [z for state, (_, _, z) in zip(table.states, table.places, strict=True) if state.phase is Phase.APPROACH]
+    assert heights[0] < 0.0
+    assert max(heights) >= TOUCH.clearance_m - 0.001  # above the surface, which is at 0
+
+
+def test_a_force_sensor_that_cannot_be_zeroed_aborts_in_the_air(table, lifting_first):
+    lifting_first[0] = False
+    outcome = table.explore(REQUEST)
+    assert (outcome.success, outcome.slid) == (False, False)
+    assert outcome.message == 'waited 5.0 s for the arm to zero its force sensor'
+    assert table.arm.state().position[2] > 0.01
+    assert table.arm.state().force_n == 0.0
+
+
+def test_a_force_that_never_stops_changing_aborts_after_the_travel_of_an_approach(table, lifting_first, monkeypatch):
+    state = table.arm.state
+
+    def swinging():
+        reading = state()
+        return replace(reading, force_n=2.0 * (reading.time_ns // 50_000_000 % 2))
+
+    monkeypatch.setattr(table.arm, 'state', swinging)
+    outcome = table.explore(REQUEST)
+    assert 'the force changed all the while the finger rose by 0.05' in outcome.message
+
+
+def test_a_stop_during_the_lift_ends_the_exploration(table, lifting_first):
+    table.when[Phase.APPROACH] = lambda: table.exploration.stop('enough')
+    assert table.explore(REQUEST).message == 'enough'
+    assert table.phases[-1] is Phase.ABORTED
+
+
+class Watched:
+    """An explorer with a simulated arm, and how high its finger rose before each contact."""
+
+    def __init__(self):
+        arm = SimulatedArm(SimulatedArmParams(start_height_m=0.002))
+        self.heights = []
+        self.explorer = Explorer(arm, TOUCH, SafetyLimits(stale_s=2.0), self.on_state)
+        self.explorer.connect()
+
+    def on_state(self, state):
+        if state.phase is Phase.APPROACH:
+            self.heights.append(self.explorer.arm.state().position[2])
+
+    def lifts_first(self):
+        """Explore; return whether the finger rose above the height at which explorations begin."""
+        self.heights.clear()
+        exploration = self.explorer.begin('one', REQUEST)
+        assert exploration.ended.wait(DEADLINE_S)
+        assert exploration.outcome.success, exploration.outcome.message
+        return max(self.heights) > 0.002 + 0.8 * TOUCH.clearance_m
+
+
+@pytest.fixture
+def watched():
+    watched = Watched()
+    yield watched
+    watched.explorer.close()
+
+
+def test_after_connecting_the_first_exploration_lifts_first_and_the_second_does_not(watched):
+    assert [watched.lifts_first(), watched.lifts_first()] == [True, False]
+
+
+def test_after_a_fault_and_a_recovery_the_exploration_lifts_first(watched):
+    watched.lifts_first()
+    watched.explorer.arm.fail('protective stop')
+    watched.explorer.recover()
+    assert watched.lifts_first()
+
+
+def test_after_an_exploration_that_was_aborted_the_next_one_lifts_first(watched):
+    watched.lifts_first()
+    exploration = watched.explorer.begin('two', REQUEST)
+    watched.explorer.stop('enough')
+    assert exploration.ended.wait(DEADLINE_S)
+    assert watched.lifts_first()
