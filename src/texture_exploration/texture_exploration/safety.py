@@ -12,9 +12,6 @@ from texture_core.exploration import ExplorationRequest
 from texture_core.parameters import param
 from texture_exploration.arms.protocol import ArmState, Vector
 
-# Several turns are a direction, too; an angle beyond this one is a mistake, and loses its meaning by rounding.
-MAX_DIRECTION_RAD = 100.0
-
 
 @dataclass(frozen=True)
 class SafetyLimits:
@@ -85,10 +82,9 @@ class SafetyLimits:
             if not low <= value <= high:
                 raise MotionRefused(f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}')
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
-        if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
+        if not math.isfinite(request.direction_rad):
             raise MotionRefused(
-                f'{request.motion}: direction_rad is {request.direction_rad:g}; '
-                f'allowed is -{MAX_DIRECTION_RAD:g} to {MAX_DIRECTION_RAD:g} rad'
+                f'{request.motion}: direction_rad is {request.direction_rad}; a finite number is needed'
             )
         return request
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.util
 import time
 from collections.abc import Mapping
@@ -18,6 +19,10 @@ from texture_exploration.arms.ur_tables import SAFETY_FAULTS
 STANDSTILL = ArmCommand()
 RECOVERY_S = 6.0
 POLL_S = 0.01
+UNSTEADY = (
+    'its force sensor could not be zeroed: the force changed all the while the finger rose; see that nothing touches '
+    "the finger, and raise 'zero_steady_n' above the noise of the sensor"
+)
 
 
 class UrArm:
@@ -73,18 +78,25 @@ class UrArm:
         )
 
     def command(self, command: ArmCommand) -> None:
-        """Hand a command to the worker."""
+        """Hand a command to the worker.
+
+        The force sensor is zeroed in free air only, which a rise of `zero_rise_m` without a change of the force proves.
+        As long as it has not been zeroed since the arm was connected or recovered, a command with a force lifts first.
+
+        Raises
+        ------
+        CommandRefused
+            If a number is not finite or out of its range; the arm stops.
+        DeviceError
+            If the arm cannot be reached.
+        """
+        self._params.check(command, self.stop)
         if command == STANDSTILL:
             self.stop()
             return
         normal_m_s = command.normal_m_s if command.force_n is None else 0.0
-        height_m = self._frame.place(self._report().position_m)[2]
-        wish = Wish(
-            velocity_m_s=self._frame.to_base((*command.tangential_m_s, normal_m_s)),
-            force_n=command.force_n,
-            zero_first=height_m > self._params.zero_above_m,
-        )
-        self._connected().send(wish.to_bytes())
+        velocity = self._frame.to_base((*command.tangential_m_s, normal_m_s))
+        self._connected().send(Wish(time.monotonic_ns(), velocity, command.force_n).to_bytes())
 
     def stop(self) -> None:
         """Let the worker stop the arm."""
@@ -116,10 +128,14 @@ class UrArm:
         return self._connected().pid
 
     @property
+    def zeroed(self) -> bool:
+        """Whether the force sensor was zeroed since the arm was connected or recovered."""
+        return self._report().zeroed
+
+    @property
     def counts(self) -> Mapping[str, int]:
-        """Of this connection: gaps of more than 20 ms in what the controller sends, and commands it did not take."""
-        report = self._report()
-        return {'late': report.late, 'refused': report.refused}
+        """Totals of this connection; see `texture_exploration.arms.ur_messages.Counts`."""
+        return dataclasses.asdict(self._report().counts)
 
     def _connected(self) -> WorkerLink:
         if self._link is None:
@@ -137,4 +153,6 @@ class UrArm:
             return f'the controller is silent for more than {self._params.silence_s * 1e3:.0f} ms'
         if report.safety_mode in SAFETY_FAULTS:
             return SAFETY_FAULTS[report.safety_mode]
-        return '' if report.playing else 'its control program was stopped, by hand or by its watchdog'
+        if not report.playing:
+            return 'its control program was stopped, by hand or by its watchdog'
+        return UNSTEADY if report.unsteady else ''

@@ -15,7 +15,8 @@ from texture_exploration.arms.ur_messages import LARGEST, REPORT, TROUBLE, Repor
 from texture_exploration.arms.ur_params import UrArmParams
 
 MODULE = 'texture_exploration.arms.ur_worker'
-STOPPING_S = 1.5  # time to brake; then it is killed, and the watchdog of the controller stops the arm
+STOPPING_S = 1.5  # time to brake, beside what the controller takes to acknowledge it
+ACKNOWLEDGEMENTS = 2  # of a stop and of the end of force control
 LAST_WORD_S = 0.05
 
 
@@ -26,6 +27,7 @@ class WorkerLink:
         self.report: Report | None = None
         self._trouble = ''
         self._timeout_s = params.connect_timeout_s
+        self._stopping_s = STOPPING_S + ACKNOWLEDGEMENTS * params.acknowledge_s
         self._news = threading.Event()
         self._channel, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         command = [sys.executable, '-m', MODULE, str(end.fileno()), json.dumps(dataclasses.asdict(params))]
@@ -83,10 +85,10 @@ class WorkerLink:
             raise DeviceError(self._why_ended()) from error
 
     def end(self) -> None:
-        """Let the arm come to rest and the worker end; kill it if it does not."""
+        """Let the arm come to rest and the worker end; kill it if it does not: then the watchdog stops the arm."""
         self._channel.shutdown(socket.SHUT_RDWR)
         try:
-            self._process.wait(STOPPING_S)
+            self._process.wait(self._stopping_s)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

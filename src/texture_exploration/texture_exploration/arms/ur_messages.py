@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import struct
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+
+from texture_exploration.arms.protocol import Vector
 
 WISH, STOP, RECOVER, REPORT, TROUBLE = (bytes([number]) for number in range(1, 6))
-WISH_FORMAT = struct.Struct('<4d?')
-REPORT_FORMAT = struct.Struct('<q9di2?2I')
+WISH_FORMAT = struct.Struct('<q4d')
+REPORT_FORMAT = struct.Struct('<q9di4?5I')
 LARGEST = 4096
 
 
@@ -16,54 +18,75 @@ LARGEST = 4096
 class Wish:
     """What the arm shall do, in the base frame: a velocity, (3,), and perhaps a force that presses on the surface.
 
-    `zero_first` allows to zero the force sensor if the arm is at rest.
+    `time_ns` is when it was commanded, of CLOCK_MONOTONIC: a wish that waited for the worker is old.
     """
 
-    velocity_m_s: tuple[float, float, float]
+    time_ns: int
+    velocity_m_s: Vector
     force_n: float | None
-    zero_first: bool
 
     def to_bytes(self) -> bytes:
         """Return the message."""
         force = math.nan if self.force_n is None else self.force_n
-        return WISH + WISH_FORMAT.pack(*self.velocity_m_s, force, self.zero_first)
+        return WISH + WISH_FORMAT.pack(self.time_ns, *self.velocity_m_s, force)
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Wish:
         """Return what a message says."""
-        vx, vy, vz, force, zero_first = WISH_FORMAT.unpack(data[1:])
-        return cls((vx, vy, vz), None if math.isnan(force) else force, zero_first)
+        time_ns, vx, vy, vz, force = WISH_FORMAT.unpack(data[1:])
+        return cls(time_ns, (vx, vy, vz), None if math.isnan(force) else force)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What was counted since the arm was connected.
+
+    `late`: gaps of more than 20 ms in what the controller sends. `refused`: commands that it did not take. `zeroed`:
+    how often the force sensor was zeroed. `slow_acknowledgements`: commands that took longer than the watchdog waits
+    while the arm moves; `slowest_acknowledgement_ms`: the longest that any took.
+    """
+
+    late: int = 0
+    refused: int = 0
+    zeroed: int = 0
+    slow_acknowledgements: int = 0
+    slowest_acknowledgement_ms: int = 0
 
 
 @dataclass(frozen=True)
 class Report:
     """What the controller measured last, in the base frame, and how it is.
 
-    `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `late`
-    counts gaps of more than 20 ms in what it sends, `refused` the commands that it did not take.
+    `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
+    says that the force sensor could not be zeroed, because the force changed all the while the finger rose; `zeroed`,
+    that it was, since the arm was connected or recovered.
     """
 
     time_ns: int
-    position_m: tuple[float, ...]
-    velocity_m_s: tuple[float, ...]
-    force_n: tuple[float, ...]
+    position_m: Vector
+    velocity_m_s: Vector
+    force_n: Vector
     safety_mode: int
     playing: bool
     silent: bool
-    late: int
-    refused: int
+    unsteady: bool
+    zeroed: bool
+    counts: Counts
 
     def to_bytes(self) -> bytes:
         """Return the message."""
         vectors = (*self.position_m, *self.velocity_m_s, *self.force_n)
-        status = (self.safety_mode, self.playing, self.silent, self.late, self.refused)
+        status = (self.safety_mode, self.playing, self.silent, self.unsteady, self.zeroed, *astuple(self.counts))
         return REPORT + REPORT_FORMAT.pack(self.time_ns, *vectors, *status)
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Report:
         """Return what a message says."""
-        time_ns, *numbers = REPORT_FORMAT.unpack(data[1:])
-        return cls(time_ns, tuple(numbers[0:3]), tuple(numbers[3:6]), tuple(numbers[6:9]), *numbers[9:])
+        numbers = REPORT_FORMAT.unpack(data[1:])
+        position, velocity, force = numbers[1:4], numbers[4:7], numbers[7:10]
+        safety_mode, playing, silent, unsteady, zeroed = numbers[10:15]
+        counts = Counts(*numbers[15:])
+        return cls(numbers[0], position, velocity, force, safety_mode, playing, silent, unsteady, zeroed, counts)
 
 
 def trouble(text: str) -> bytes:

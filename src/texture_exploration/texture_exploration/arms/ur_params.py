@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from texture_core.parameters import param
+from texture_exploration.arms.command_limits import CommandLimits
 
 
 @dataclass(frozen=True)
-class UrArmParams:
+class UrArmParams(CommandLimits):
     """Where the controller is, where the surface is, and how the arm is supervised."""
 
     ip: str = param('127.0.0.2', 'Address of the controller; the default is that of the emulated one.')
@@ -32,12 +33,27 @@ class UrArmParams:
         10.0, 'The controller stops the arm when it hears less often from here.', unit='Hz', low=1.0, high=50.0
     )
     silence_s: float = param(0.1, 'A controller that is silent for longer is a fault.', unit='s', low=0.02, high=2.0)
-    zero_above_m: float = param(
-        0.005,
-        'The force sensor is zeroed whenever the arm moves off from higher than this.',
+    acknowledge_s: float = param(
+        1.0,
+        'The controller may take so long to stop, to end its force control and to zero the force sensor; the watchdog '
+        'waits as long.',
+        unit='s',
+        low=0.2,
+        high=5.0,
+    )
+    zero_rise_m: float = param(
+        0.003,
+        'The force sensor is zeroed only after a rise by this in which the force did not change.',
         unit='m',
-        low=0.0,
-        high=1.0,
+        low=0.001,
+        high=0.05,
+    )
+    zero_steady_n: float = param(
+        0.5,
+        'The force changes when it changes by more than this, smoothed over 20 ms; above the noise of the sensor.',
+        unit='N',
+        low=0.05,
+        high=5.0,
     )
     unlock_protective_stop: bool = param(
         False, 'Release a protective stop when connecting; if not, a person does it on the pendant.'

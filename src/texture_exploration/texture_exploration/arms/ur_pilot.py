@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
+from texture_exploration.arms.protocol import Vector
+from texture_exploration.arms.surface_frame import SurfaceFrame
 from texture_exploration.arms.ur_messages import Wish
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.arms.ur_tables import (
@@ -19,6 +22,12 @@ from texture_exploration.arms.ur_tables import (
     FORCE_FRAME_FIXED,
     STOP_DECELERATION_M_S2,
 )
+from texture_exploration.arms.ur_watchdog import Watchdog
+from texture_exploration.free_air import FreeAir
+
+RISE_M_S = 0.02
+CALM_NS = 100_000_000  # at rest, before the force sensor is zeroed
+MOST_RISES = 5.0  # a finger that is lifted to zero its sensor rises at most by so many times what proves free air
 
 
 class Mode(enum.Enum):
@@ -38,38 +47,130 @@ class Pilot:
         The RTDEControlInterface of ur-rtde. Only one thread may use it.
     params
         The arm.
+    watchdog
+        The same controller's.
+
+    Attributes
+    ----------
+    refused, zeroings
+        How many commands the controller did not take, and how often the force sensor was zeroed.
+    trusted
+        The force sensor was zeroed since the arm was connected or recovered.
+    unsteady
+        It could not be zeroed: the force changed all the while the finger rose.
     """
 
-    def __init__(self, control: Any, params: UrArmParams) -> None:
+    def __init__(self, control: Any, params: UrArmParams, watchdog: Watchdog) -> None:
         self.refused = 0
+        self.zeroings = 0
+        self.trusted = self.unsteady = False
         self._control = control
         self._params = params
+        self._watchdog = watchdog
+        self._frame = SurfaceFrame(params.surface_pose)
+        self._up = self._frame.to_base((0.0, 0.0, RISE_M_S))
+        self._air = FreeAir(params.zero_rise_m, params.zero_steady_n)
+        self._felt_ns = self._rest_ns = 0
+        self._rise_from_m: float | None = None
+        self._height_m = 0.0
         self._mode = Mode.REST
+        self._braking = False
         self._speed_is_next = False
+
+    def feel(self, time_ns: int, position_m: Vector, force_n: Vector) -> None:
+        """Take note of what the controller measured last, in the base frame."""
+        place = self._frame.place(position_m)
+        self._height_m, self._felt_ns = place[2], time_ns
+        self._air.update(time_ns, place, self._frame.direction(force_n)[2])
 
     def cycle(self, wish: Wish | None) -> None:
         """Send what is due; no wish is the wish to stand still."""
+        wish = self._lifted_first(wish)
         mode = _mode(wish)
-        if mode is not self._mode:
-            self._change(mode, wish)
+        self._braking &= mode is Mode.REST
+        if mode is not self._mode and not self._change(mode):
+            return
+        if mode is Mode.FORCE:
+            self._air.presume_contact()
         self._count(STREAM[mode](self, wish))
 
+    def rest(self) -> None:
+        """Stop at once, and return when the arm stands still."""
+        with self._watchdog.patient():
+            self._stop()
+
     def forget(self) -> None:
-        """The program on the controller was started anew: the arm is at rest."""
+        """The program on the controller was started anew: the arm is at rest, in contact or not."""
+        self._mode = Mode.REST
+        self._braking = False
+        self.trusted = self.unsteady = False
+        self._rise_from_m = None
+        self._air.presume_contact()
+
+    def _lifted_first(self, wish: Wish | None) -> Wish | None:
+        """Return the wish, or to rise and to stand still before it if it needs a force sensor that is not zeroed."""
+        if wish is None or wish.force_n is None or self.trusted:
+            self._rise_from_m = None
+            return wish
+        if self.unsteady:
+            return None
+        if self._air.proven:
+            return wish if self._mode is Mode.REST else None
+        if self._rise_from_m is None:
+            self._rise_from_m = self._height_m
+        self.unsteady = self._height_m - self._rise_from_m > MOST_RISES * self._params.zero_rise_m
+        return replace(wish, velocity_m_s=self._up, force_n=None)
+
+    def _change(self, mode: Mode) -> bool:
+        """Leave the present mode; return whether the new one has begun."""
+        if mode is Mode.REST and not self._braking:
+            # A command that streams takes effect at once; those that follow wait for each other.
+            self._braking = True
+            self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / self._params.rate_hz)))
+            return False
+        if not self._leave(mode):
+            return False
+        if mode is not Mode.REST and not self._watchdog.armed and not self._watchdog.arm():
+            self._count(False)
+            return False
+        self._mode = mode
+        self._rest_ns = self._felt_ns
+        self._braking = self._speed_is_next = False
+        return True
+
+    def _leave(self, mode: Mode) -> bool:
+        """Do what ends the present mode; return whether that is enough for the new one."""
+        if mode is Mode.REST:
+            self.rest()
+        elif self._mode is Mode.FORCE:
+            with self._watchdog.patient():
+                self._count(self._watchdog.call(self._control.forceModeStop))
+        elif self._mode is Mode.REST and self._air.proven:
+            with self._watchdog.patient():
+                return self._zero()
+        return True
+
+    def _stop(self) -> None:
+        """Come to rest; these commands are acknowledged, so nothing overwrites them."""
+        self._count(self._watchdog.call(self._control.speedStop, STOP_DECELERATION_M_S2))
+        if self._mode is Mode.FORCE:
+            self._count(self._watchdog.call(self._control.forceModeStop))
         self._mode = Mode.REST
 
-    def _change(self, mode: Mode, wish: Wish | None) -> None:
-        """Leave the present mode. These commands are acknowledged, so nothing overwrites them."""
-        if mode is Mode.REST:
-            self._count(self._control.speedStop(STOP_DECELERATION_M_S2))
-        if self._mode is Mode.FORCE:
-            self._count(self._control.forceModeStop())
-        if self._mode is Mode.REST and wish is not None and wish.zero_first:
-            self._count(self._control.zeroFtSensor())
-        self._mode = mode
-        self._speed_is_next = False
+    def _zero(self) -> bool:
+        """Zero the force sensor, at rest and in free air; return whether the controller did."""
+        taken = self._watchdog.call(self._control.zeroFtSensor)
+        self._count(taken)
+        self.trusted |= taken
+        self.zeroings += taken
+        self._air.presume_contact()  # the force is another one now; the next zeroing needs a proof of its own
+        return taken
 
     def _rest(self, _wish: Wish | None) -> bool:
+        """Zero the force sensor as soon as the arm has calmed down in free air."""
+        if self._air.proven and self._felt_ns - self._rest_ns > CALM_NS:
+            with self._watchdog.patient():
+                self._zero()
         return bool(self._control.kickWatchdog())
 
     def _speed(self, wish: Wish) -> bool:

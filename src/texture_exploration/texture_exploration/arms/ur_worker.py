@@ -7,6 +7,7 @@ ends by itself, with the arm at rest, when its parent is gone.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
 import os
@@ -15,31 +16,43 @@ import socket
 import sys
 import threading
 import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from texture_core.parameters import from_mapping
-from texture_exploration.arms.ur_messages import LARGEST, RECOVER, STOP, WISH, Report, Wish, trouble
+from texture_exploration.arms.protocol import Vector
+from texture_exploration.arms.ur_messages import LARGEST, RECOVER, STOP, WISH, Counts, Report, Wish, trouble
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.arms.ur_pilot import Pilot
 from texture_exploration.arms.ur_tables import PROGRAM_PLAYING
+from texture_exploration.arms.ur_watchdog import Watchdog
 
 VARIABLES = ['timestamp', 'actual_TCP_pose', 'actual_TCP_speed', 'actual_TCP_force', 'safety_mode', 'runtime_state']
 HANGING_S = 2.0  # no command takes so long
 RESTART_S = 5.0  # of the program on the controller
 LATE_S = 0.02
+STRANGE = (
+    'the program on the controller was stopped, and somebody else started one; see who uses the arm, and connect again'
+)
 LOST = 'the connection to the controller was lost; is it still on, and the cable in place?'
 
 
 class Observer:
     """Reports what the controller measures, in a thread of its own: commands may take a while.
 
+    `newest` is the last report, None before the first; `unsteady`, `zeroed` and `counts` come from the other thread.
+
     Silence counts only while this thread is awake, so that a machine that stalls is not taken for a dead controller.
     """
 
     def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
         self.silent = False
-        self.refused = 0
         self.connected = True
+        self.unsteady = self.zeroed = False
+        self.counts = Counts()
+        self.newest: Report | None = None
         self._receive = receive
         self._channel = channel
         self._silence_s = params.silence_s
@@ -78,15 +91,17 @@ class Observer:
         receive = self._receive
         report = Report(
             time_ns=self._time_ns,
-            position_m=tuple(receive.getActualTCPPose()[:3]),
-            velocity_m_s=tuple(receive.getActualTCPSpeed()[:3]),
-            force_n=tuple(receive.getActualTCPForce()[:3]),
+            position_m=_vector(receive.getActualTCPPose()),
+            velocity_m_s=_vector(receive.getActualTCPSpeed()),
+            force_n=_vector(receive.getActualTCPForce()),
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             silent=self.silent,
-            late=self._late,
-            refused=self.refused,
+            unsteady=self.unsteady,
+            zeroed=self.zeroed,
+            counts=replace(self.counts, late=self._late),
         )
+        self.newest = report
         try:
             self._channel.send(report.to_bytes(), socket.MSG_DONTWAIT)
         except BlockingIOError:
@@ -108,9 +123,13 @@ class Worker:
         receive = receive_class(params.ip, params.rate_hz, VARIABLES)
         self._control = control_class(params.ip, params.rate_hz, flags)
         self._observer = Observer(receive, channel, params)
-        self._pilot = Pilot(self._control, params)
+        self._watchdog = Watchdog(self._control, params, lambda seconds: set_alarm(seconds + HANGING_S))
+        self._pilot = Pilot(self._control, params, self._watchdog)
         self._wish: Wish | None = None
-        self._heard_s = 0.0
+        self._felt_ns = 0
+        self._was_playing = False
+        self._stopped = False  # the program was stopped, and not by us
+        self._strange = False  # and another one was started since
 
     def lead(self) -> str:
         """Lead the arm until the parent or the controller is gone; return what to say about it."""
@@ -120,22 +139,63 @@ class Worker:
             while self._listen():
                 if not (self._observer.connected and self._control.isConnected()):
                     return LOST
+                self._watch_program()
+                if self._strange:
+                    return STRANGE
                 self._cycle()
-            if not self._observer.silent:
-                self._pilot.cycle(None)
-                self._control.stopScript()
         except RuntimeError as error:
             return f'{LOST} ({error})'
+        finally:
+            self._let_go()
         return ''
 
     def _cycle(self) -> None:
         begin = self._control.initPeriod()
         set_alarm(HANGING_S)
+        self._feel()
         # What is sent to a controller that does not answer would be obeyed late, when nobody means it any more.
-        if not self._observer.silent:
+        if not self._observer.silent and not self._stopped:
             self._pilot.cycle(self._wish)
-        self._observer.refused = self._pilot.refused
+        self._tell()
         self._control.waitPeriod(begin)
+
+    def _feel(self) -> None:
+        """Let the pilot know what was measured last."""
+        newest = self._observer.newest
+        if newest is not None and newest.time_ns != self._felt_ns:
+            self._felt_ns = newest.time_ns
+            self._pilot.feel(newest.time_ns, newest.position_m, newest.force_n)
+
+    def _tell(self) -> None:
+        """Let the observer know what to report beside."""
+        pilot, watchdog = self._pilot, self._watchdog
+        self._observer.unsteady, self._observer.zeroed = pilot.unsteady, pilot.trusted
+        self._observer.counts = Counts(
+            refused=pilot.refused,
+            zeroed=pilot.zeroings,
+            slow_acknowledgements=watchdog.slow,
+            slowest_acknowledgement_ms=round(watchdog.slowest_s * 1e3),
+        )
+
+    def _watch_program(self) -> None:
+        """Notice whether another program runs than ours: one that plays again after a stop was started by others.
+
+        It may be one of theirs that reads the same registers, or ours that ur-rtde started, without its watchdog.
+        """
+        playing = self._plays()
+        self._was_playing |= playing
+        self._strange |= self._stopped and playing
+        self._stopped = self._was_playing and not playing
+
+    def _let_go(self) -> None:
+        """Bring the arm to rest and end its program, whatever ends this process."""
+        # Commands to a program that is not ours, or on a lost connection, would make ur-rtde start its own again.
+        ours = not self._stopped and not self._strange
+        if ours and self._observer.connected and not self._observer.silent and self._control.isConnected():
+            with contextlib.suppress(RuntimeError):
+                self._pilot.rest()
+                set_alarm(HANGING_S)
+                self._control.stopScript()
 
     def _listen(self) -> bool:
         """Take over what the parent said last; return whether it is still there."""
@@ -143,15 +203,18 @@ class Worker:
             while data := self._channel.recv(LARGEST, socket.MSG_DONTWAIT):
                 self._obey(data)
         except BlockingIOError:
-            if time.monotonic() - self._heard_s > self._params.command_timeout_s:
+            if self._wish is not None and self._age_s(self._wish) > self._params.command_timeout_s:
                 self._wish = None
             return True
         except OSError:
             pass
         return False
 
+    @staticmethod
+    def _age_s(wish: Wish) -> float:
+        return (time.monotonic_ns() - wish.time_ns) * 1e-9
+
     def _obey(self, data: bytes) -> None:
-        self._heard_s = time.monotonic()
         kind = data[:1]
         if kind == WISH:
             self._wish = Wish.from_bytes(data)
@@ -166,14 +229,24 @@ class Worker:
         self._wish = None
         self._control.reuploadScript()
         end_s = time.monotonic() + RESTART_S
-        while not self._control.isProgramRunning() and time.monotonic() < end_s:
+        while not (self._control.isProgramRunning() and self._plays()) and time.monotonic() < end_s:
             time.sleep(0.005)
         self._set_watchdog()
         self._pilot.forget()
+        self._stopped = False
+
+    def _plays(self) -> bool:
+        newest = self._observer.newest
+        return newest is not None and newest.playing
 
     def _set_watchdog(self) -> None:
-        if not self._control.setWatchdog(self._params.watchdog_hz):
+        if not self._watchdog.arm():
             raise RuntimeError('the controller did not take the watchdog, without which the arm does not move')
+
+
+def _vector(values: Sequence[float]) -> Vector:
+    x, y, z, *_ = values
+    return x, y, z
 
 
 def set_alarm(seconds: float) -> None:
@@ -192,10 +265,12 @@ def main() -> None:
     set_alarm(params.connect_timeout_s)
     try:
         worker = Worker(params, channel)
+        reason = worker.lead()
     except RuntimeError as error:  # so ur-rtde tells what it met
         reason = str(error)
-    else:
-        reason = worker.lead()
+    except Exception as error:  # an error of ours: the arm was stopped on the way out, and the parent is told
+        traceback.print_exc()
+        reason = f'the process that talks to the controller failed ({error!r}) and stopped the arm; connect again'
     if reason:
         channel.send(trouble(reason))
     # To end the interfaces of ur-rtde takes seconds of sleep; the end of the process closes their connections too.

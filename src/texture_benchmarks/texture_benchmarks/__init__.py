@@ -1,1 +1,0 @@
-"""Benchmarks, rebuilt experiments of papers and endurance runs."""

@@ -1,1 +1,0 @@
-"""What the benchmarks need of a running ROS graph."""

@@ -1,0 +1,1 @@
+"""What is asked of which recorded data, and how it is split."""

@@ -1,0 +1,1 @@
+"""ROS parts of the evaluation that are not nodes."""

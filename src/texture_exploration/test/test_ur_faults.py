@@ -1,0 +1,206 @@
+"""What would hurt the finger or the sample: the UR arm on the emulated controller, with the true force from outside."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import math
+import socket
+import threading
+import time
+from collections import deque
+
+import pytest
+
+from texture_core.errors import CommandRefused
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.finger import FingerState
+from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.ur import UrArm, UrArmParams
+from texture_exploration.explorer import Explorer
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+from texture_simulation.devices.ur.params import UrControllerParams
+from texture_simulation.devices.ur.process import ControllerProcess
+
+pytestmark = pytest.mark.skipif(
+    importlib.util.find_spec('rtde_control') is None, reason='ur-rtde is not installable here'
+)
+DEADLINE_S = 30.0
+ABOVE_PLANE_M = 0.008  # so much higher than the arm was told is the surface
+PRESSING = ArmCommand(force_n=3.0)
+SLIDING = ArmCommand(tangential_m_s=(0.02, 0.0))
+
+
+class Bench:
+    """The emulated controller, and the true state of its finger."""
+
+    def __init__(self, ip, **values):
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(('127.0.0.1', 0))
+        port = self._socket.getsockname()[1]
+        self.ip = ip
+        self.controller = ControllerProcess(UrControllerParams(ip=ip, finger_port=port, unlock_delay_s=0.2, **values))
+        self.fingers = deque(maxlen=50000)
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self):
+        with contextlib.suppress(OSError):
+            while data := self._socket.recv(256):
+                self.fingers.append(FingerState.from_bytes(data))
+
+    @property
+    def force_n(self):
+        """The true force."""
+        return self.fingers[-1].force_n
+
+    def rests(self):
+        finger = self.fingers[-1]
+        return finger.vx_m_s == finger.vy_m_s == finger.vz_m_s == 0.0
+
+    def close(self):
+        self.controller.stop()
+        self._socket.sendto(b'', self._socket.getsockname())  # a datagram of nothing ends the thread
+
+
+@contextlib.contextmanager
+def bench_at(ip, **values):
+    bench = Bench(ip, **values)
+    try:
+        bench.controller.start()
+        yield bench
+    finally:
+        bench.close()
+
+
+@contextlib.contextmanager
+def connected(ip, **values):
+    arm = UrArm(UrArmParams(ip=ip, **values))
+    try:
+        arm.connect()
+        yield arm
+    finally:
+        arm.close()
+
+
+def wait_for(condition, deadline_s=DEADLINE_S):
+    """Return after how many seconds the condition was true."""
+    begin_s = time.monotonic()
+    while not condition():
+        assert time.monotonic() - begin_s < deadline_s
+        time.sleep(0.002)
+    return time.monotonic() - begin_s
+
+
+def keep(arm, command, condition):
+    """Command until a condition is true."""
+
+    def step():
+        arm.command(command)
+        return condition()
+
+    return wait_for(step)
+
+
+def press(arm, bench):
+    """Press until the arm holds 3 N by its sensor; return the true force."""
+    held = deque(maxlen=50)
+
+    def settled():
+        held.append(arm.state().force_n)
+        return len(held) == 50 and all(abs(force - 3.0) < 0.2 for force in held)
+
+    keep(arm, PRESSING, settled)
+    return bench.force_n
+
+
+def gap(arm, bench):
+    """Command nothing for longer than a command holds."""
+    time.sleep(2 * UrArmParams().command_timeout_s)
+    wait_for(bench.rests)
+
+
+def test_gaps_between_commands_while_pressing_do_not_zero_the_force_away():
+    with bench_at('127.0.0.70', surface_z_m=0.1 + ABOVE_PLANE_M) as bench, connected(bench.ip) as arm:
+        forces = [press(arm, bench)]
+        for _ in range(3):
+            gap(arm, bench)
+            forces.append(press(arm, bench))
+        assert forces == [pytest.approx(3.0, abs=0.3)] * 4
+        assert max(finger.force_n for finger in bench.fingers) < 4.5
+
+
+def test_who_connects_in_contact_lifts_before_the_force_sensor_is_zeroed():
+    with bench_at('127.0.0.71', surface_z_m=0.1 + ABOVE_PLANE_M) as bench:
+        with connected(bench.ip) as arm:
+            press(arm, bench)
+        assert bench.force_n > 2.0
+        with connected(bench.ip) as arm:
+            assert press(arm, bench) == pytest.approx(3.0, abs=0.3)
+            assert min(finger.force_n for finger in list(bench.fingers)) == 0.0
+        assert max(finger.force_n for finger in bench.fingers) < 4.5
+
+
+def test_after_a_protective_stop_in_contact_the_same_force_is_pressed_again():
+    with bench_at('127.0.0.72', surface_z_m=0.1 + ABOVE_PLANE_M) as bench, connected(bench.ip) as arm:
+        press(arm, bench)
+        bench.controller.ask('emulate protective stop')
+        wait_for(lambda: arm.state().fault == 'protective stop')
+        arm.recover()
+        assert press(arm, bench) == pytest.approx(3.0, abs=0.3)
+
+
+def test_after_a_protective_stop_in_a_slide_and_a_recovery_the_same_request_presses_as_asked():
+    request = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=3.0, distance_m=0.04)
+    sliding = threading.Event()
+    slides = []
+
+    def on_state(state):
+        if state.phase is Phase.SLIDE:
+            sliding.set()
+            slides.append(state.stamp_ns)
+
+    with bench_at('127.0.0.73', surface_z_m=0.1 + ABOVE_PLANE_M) as bench:
+        explorer = Explorer(UrArm(UrArmParams(ip=bench.ip)), TouchParams(), SafetyLimits(stale_s=1.0), on_state)
+        explorer.connect()
+        try:
+            stopped = explorer.begin('one', request)
+            assert sliding.wait(DEADLINE_S)
+            bench.controller.ask('emulate protective stop')
+            assert stopped.ended.wait(DEADLINE_S)
+            assert 'protective stop' in stopped.outcome.message
+            explorer.recover()
+            slides.clear()
+            again = explorer.begin('two', request)
+            assert again.ended.wait(DEADLINE_S)
+            assert again.outcome.success, again.outcome.message
+        finally:
+            explorer.close()
+        forces = [finger.force_n for finger in bench.fingers if slides[0] <= finger.time_ns <= slides[-1]]
+        assert sum(forces) / len(forces) == pytest.approx(3.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    'command',
+    [
+        ArmCommand(tangential_m_s=(math.nan, 0.0)),
+        ArmCommand(normal_m_s=math.inf),
+        ArmCommand(tangential_m_s=(5.0, 0.0)),
+        ArmCommand(normal_m_s=-5.0),
+        ArmCommand(force_n=-1.0),
+        ArmCommand(force_n=1000.0),
+    ],
+)
+def test_a_command_out_of_range_is_refused_and_the_arm_stops(command, shared):
+    bench, arm = shared
+    keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
+    with pytest.raises(CommandRefused, match=r'was refused and the arm stopped: the .* allowed is'):
+        arm.command(command)
+    wait_for(bench.rests, UrArmParams().command_timeout_s + 5.0)
+
+
+@pytest.fixture(scope='module')
+def shared():
+    """Return a bench and a connected arm, for faults that leave both whole."""
+    with bench_at('127.0.0.74') as bench, connected(bench.ip) as arm:
+        yield bench, arm

@@ -1,1 +1,0 @@
-"""Bags and labelled slides: recording, reading, replaying, importing and segmenting."""
