@@ -17,7 +17,7 @@ from texture_core.resources import find_file
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.hands.dynamixel import DynamixelHand, Finger
-from texture_exploration.hands.dynamixel_bus import DynamixelBus
+from texture_exploration.hands.dynamixel_bus import DynamixelBus, Motor
 from texture_exploration.hands.profile import load_profile, read_profile
 from texture_exploration.hands.simulated import SimulatedHand
 from texture_exploration.hands.torque_guard import torque_off_packet
@@ -154,6 +154,13 @@ def test_no_more_current_is_asked_for_than_a_motor_takes(bus, hand):
     assert hand.state().fault == ''
 
 
+def test_a_grip_that_is_refused_leaves_no_motor_under_torque(bus):
+    bus.motors.write(THUMB, 38, (100).to_bytes(2, 'little'))
+    with pytest.raises(CommandRefused, match='the force is 2 N, and the Current Limit'):
+        InHandArm(InHandParams(hand='dynamixel', device=str(bus.port.link))).connect()
+    assert torque_is_off(bus)
+
+
 def test_a_goal_that_a_motor_refuses_is_a_named_fault(bus, hand):
     hand.connect()
     bus.motors.tables[1][38:40] = (50).to_bytes(2, 'little')  # lowered behind the program's back
@@ -190,6 +197,36 @@ def test_a_motor_that_was_reset_is_named_and_taken_in_again(bus, hand):
     until(lambda: fault_of(hand) == '')
     assert bus.motors.tables[5][TORQUE]
     assert bus.motors.tables[5][WATCHDOG] == 15
+
+
+def test_a_motor_that_switched_itself_on_after_a_reset_is_not_taken_for_one_that_never_was(bus, hand):
+    hand.connect()
+    bus.motors.tables[5][WATCHDOG] = 0  # drive mode 'torque on by goal update'
+    until(lambda: "motor 5 ('press' of middle) has lost its torque" in fault_of(hand))
+    until(lambda: bus.motors.tables[5][WATCHDOG] == 15)
+
+
+def test_a_motor_that_is_back_begins_where_it_is_and_not_where_it_was_to_go():
+    finger = Finger(LEAP.fingers['index'], LEAP)
+    here = {joint.id: Motor(0.0, 0.0, 0.5) for joint in LEAP.fingers['index'].values()}
+    finger.measure(here)
+    for _ in range(100):
+        goals = finger.goals(ArmCommand(tangential_m_s=(0.0, 0.05)), 0.01)
+    assert goals[2][1] == pytest.approx(0.7)  # 0.2 rad ahead, as the motor does not follow
+    finger.measure({motor: one for motor, one in here.items() if motor != 2})
+    assert 2 not in finger.goals(ArmCommand(), 0.01)
+    finger.measure({**here, 2: Motor(0.0, 0.0, 0.45)})
+    assert finger.goals(ArmCommand(), 0.01)[2][1] == pytest.approx(0.45)
+
+
+def test_a_second_program_on_the_bus_is_refused_and_disturbs_nothing(bus, hand):
+    hand.connect()
+    with pytest.raises(DeviceError, match='no other program has it open'):
+        DynamixelHand('leap', str(bus.port.link)).connect()
+    with pytest.raises(DeviceError, match='no other program has it open'):
+        DynamixelHand('leap', str(bus.port.link)).reboot()
+    assert hand.state().fault == ''
+    assert all(table[TORQUE] for table in bus.motors.tables.values())
 
 
 def test_two_motors_with_one_id_are_told(bus, hand):

@@ -62,13 +62,11 @@ class InHandArm:
         self.close()
         self.hand.connect()
         self._connected = True
-        self.hand.grip(dict.fromkeys(self.fingers.hold, self._params.grip_force_n))
-        end_s = time.monotonic() + self._params.grip_timeout_s
-        while weak := self._weak(HELD_SHARE):
-            if time.monotonic() > end_s:
-                self.close()
-                raise DeviceError(f'there is nothing to hold: {weak}; give the hand an object')
-            time.sleep(LOOK_S)
+        try:
+            self._take_hold()
+        except BaseException:
+            self.close()  # a hand that is not connected holds nothing
+            raise
 
     def close(self) -> None:
         """Let go."""
@@ -113,6 +111,14 @@ class InHandArm:
             raise DeviceError(f"the hand '{self._params.hand}' has no motors that could be rebooted")
         self.close()
         return self.hand.reboot()
+
+    def _take_hold(self) -> None:
+        self.hand.grip(dict.fromkeys(self.fingers.hold, self._params.grip_force_n))
+        end_s = time.monotonic() + self._params.grip_timeout_s
+        while weak := self._weak(HELD_SHARE):
+            if time.monotonic() > end_s:
+                raise DeviceError(f'there is nothing to hold: {weak}; give the hand an object')
+            time.sleep(LOOK_S)
 
     def _weak(self, share: float) -> str:
         """Return which holding finger presses with less than a share of the wanted force, '' if none."""

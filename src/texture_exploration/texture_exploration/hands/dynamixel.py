@@ -270,10 +270,12 @@ class Finger:
         self._pressing = False
 
     def measure(self, motors: Mapping[int, Motor]) -> None:
-        """Take what the motors measure; one that is missing keeps its last."""
+        """Take what the motors measure; one that is missing keeps its last, and begins where it is when it is back."""
         for role, joint in self._joints.items():
             motor = motors.get(joint.id)
-            if motor is not None:
+            if motor is None:
+                self._goal.pop(role, None)  # of before it sagged or was turned: it would snap there
+            else:
                 self._motors[role] = motor
                 self._start.setdefault(role, motor.position_rad)
                 self._goal.setdefault(role, motor.position_rad)
@@ -291,7 +293,7 @@ class Finger:
         speeds = dict(zip(('across', 'along'), command.tangential_m_s, strict=True))
         goals = {}
         for role, joint in self._joints.items():
-            if role not in self._motors:
+            if role not in self._goal:
                 continue
             if role == 'press':
                 goals[joint.id] = self._press(command, joint, dt_s)

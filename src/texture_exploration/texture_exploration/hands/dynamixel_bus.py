@@ -7,6 +7,7 @@ Its reception is a busy loop; a port that waits a little for bytes makes it slee
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import importlib
 import termios
 import time
@@ -72,8 +73,12 @@ class DynamixelBus:
         self._profile = profile
         self._port: Any = self._sdk.PortHandler(device)
         self._packets: Any = self._sdk.PacketHandler(PROTOCOL)
-        with self._line():
+        with self._line(), contextlib.ExitStack() as on_error:
+            on_error.callback(self.close)
             opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
+            if opened:  # two programs on one bus would take each other's answers, and let each other's motors go
+                fcntl.flock(self._port.ser.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+                on_error.pop_all()
         if not opened:
             raise DeviceError(f"device '{device}' refuses {profile.baud} baud; correct the profile '{profile.name}'")
         self._port.ser.timeout = WAIT_S
@@ -269,7 +274,7 @@ class DynamixelBus:
                 f'{owner} heard nothing for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the computer '
                 'or the bus was held up; all motors were let go'
             )
-        if not value('torque_enable'):
+        if not value('torque_enable') or value('bus_watchdog') != self._profile.watchdog:
             self._reasons[motor] = f'{owner} {RESET}'
             self._energised.discard(motor)
             self.missing.add(motor)
