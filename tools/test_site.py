@@ -24,7 +24,6 @@ from texture_core.parameters import parameters_of
 from texture_drivers.catalogue import SENSORS
 from texture_drivers.params import SensorParams
 from texture_estimation.model import load_model
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
@@ -32,6 +31,7 @@ from texture_exploration.exploration import Exploration
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 from texture_features.feature import Windows
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / 'docs'
@@ -201,7 +201,7 @@ def commands(start: str) -> list[tuple[str, str]]:
 def test_a_command_of_the_pages_has_the_arguments_that_it_takes(page: str, line: str) -> None:
     _, name, *rest = shlex.split(line)
     parser = argparse.ArgumentParser(exit_on_error=False)
-    module = importlib.import_module(f'texture_bringup.commands.{COMMANDS[name].module}')
+    module = importlib.import_module(COMMANDS[name].module)
     module.configure(parser)
     options = parser.parse_args(rest)
     if name == 'launch':

@@ -14,14 +14,14 @@ pytestmark = pytest.mark.ros
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
 from texture_bringup.ros.operator import Operator  # noqa: E402
 from texture_core import resources  # noqa: E402
 from texture_core.errors import InvalidParameter, LaunchFailed  # noqa: E402
 from texture_core.exploration import ExplorationRequest  # noqa: E402
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
 from texture_evaluation.train_grades import train_grades_from_bags  # noqa: E402
+from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
 DOMAIN = 61
 DEADLINE_S = 60.0

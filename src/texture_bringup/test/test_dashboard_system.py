@@ -23,9 +23,9 @@ pytestmark = pytest.mark.ros
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
+from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
 DOMAIN = 90
 DEADLINE_S = 90.0

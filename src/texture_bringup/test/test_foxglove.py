@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from texture_evaluation.ros.topics import TOPICS
+from texture_recordings.ros.topics import TOPICS
 
 pytestmark = pytest.mark.ros  # needs the built messages
 

@@ -12,10 +12,10 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.command import main  # noqa: E402
 from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
 from texture_bringup.ros.operator import Operator  # noqa: E402
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
+from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
 DOMAIN = 221
 DEADLINE_S = 60.0

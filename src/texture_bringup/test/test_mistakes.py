@@ -9,9 +9,9 @@ import pytest
 from texture_bringup.command import main
 from texture_core.exploration import ExplorationState
 from texture_core.signal import TactileSignal
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.bags import read_bag
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import read_bag
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 PLAN = SlidePlan(slides=3, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
 

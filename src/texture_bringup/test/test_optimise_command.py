@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from texture_bringup.command import main
-from texture_bringup.commands.optimise import bar
-from texture_estimation.genetic.search import Generation, Scored
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
+from texture_estimation.search.genetic_search import Generation, Scored
+from texture_evaluation.commands.optimise import bar
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 
 def test_the_bar_says_how_far_how_good_and_how_long() -> None:

@@ -25,11 +25,13 @@ KEYS = {
     'serial': 'python3-serial',
     'sklearn': 'python3-sklearn',
     'yaml': 'python3-yaml',
+    'apsw': 'python3-apsw',
+    'lz4': 'python3-lz4',
 }
 # rosdep knows no key for these; docker/requirements.in and tools/requirements.in bring them.
 KEYLESS = {'cobs', 'distributed', 'nltk', 'playwright', 'pymoo', 'pywt', 'skops', 'threadpoolctl'}
 # What comes with Python or another package, and libraries that only tests of robots import.
-OTHERS = {'apsw', 'backports', 'compression', 'dashboard_client', 'lz4', 'rtde_control', 'rtde_receive'}
+OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_receive'}
 
 
 def names(package: Path, *, tests: bool) -> set[str]:

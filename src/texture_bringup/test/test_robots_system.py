@@ -12,17 +12,17 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup import command  # noqa: E402
 from texture_bringup.demo.isolation import free_port  # noqa: E402
-from texture_bringup.launcher.child import ChildLauncher  # noqa: E402
-from texture_bringup.launcher.files import find_launch_file  # noqa: E402
-from texture_bringup.launcher.reader import read  # noqa: E402
 from texture_bringup.ros.operator import Operator  # noqa: E402
 from texture_core import resources  # noqa: E402
 from texture_core.parameters import parameters_of  # noqa: E402
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
 from texture_exploration.arms.ur_params import UrArmParams  # noqa: E402
 from texture_exploration.safety import SafetyLimits  # noqa: E402
 from texture_exploration.signal_watch import SignalWatchParams  # noqa: E402
+from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_launch.files import find_launch_file  # noqa: E402
+from texture_launch.reader import read  # noqa: E402
+from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
 DEADLINE_S = 60.0
 SURFACE = 'ridge_2mm_deep'

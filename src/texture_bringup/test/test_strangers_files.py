@@ -31,24 +31,24 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
 from texture_drivers.daq.sensor import load_daq
 from texture_drivers.file.recording import load_recording
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.labelled_features import LabelledFeatures
-from texture_estimation.lessons import Lesson, write_lesson
+from texture_estimation.classification.training import train
+from texture_estimation.incremental.added_examples import Lesson, write_lesson
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import Grades, read_grades
 from texture_estimation.roughness.model import load_roughness_model
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
-from texture_estimation.training import train
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.cdr import TYPES, decode, encode, typestore
-from texture_evaluation.dataset import cut_slides
+from texture_estimation.search.recipe_space import RecipeSpace
 from texture_evaluation.ratings import read_ratings
-from texture_evaluation.slides import find_slides
 from texture_exploration.hands.profile import load_profile
 from texture_exploration.presets import load_preset
 from texture_features.feature_set import FeatureSet
+from texture_features.labelled_features import LabelledFeatures
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.cdr import TYPES, decode, encode, typestore
+from texture_recordings.dataset import cut_slides
+from texture_recordings.slides import find_slides
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))

@@ -18,7 +18,7 @@ USER_ERROR, INTERRUPTED, CUT_OFF = 2, 130, 141
 
 
 class Module(Protocol):
-    """What a module of `commands` holds."""
+    """What a module of a sub-command holds."""
 
     def configure(self, parser: argparse.ArgumentParser) -> None:
         """Add the arguments of the sub-command."""
@@ -29,31 +29,48 @@ class Module(Protocol):
 
 @dataclass(frozen=True)
 class Command:
-    """A sub-command: its module under `commands`, imported when it is called, and its line in the help."""
+    """A sub-command: its module, imported when it is called, and its line in the help."""
 
     module: str
     summary: str
 
 
 COMMANDS: Mapping[str, Command] = {
-    'demo': Command('demo', 'the whole thing on an emulated bench: explore, learn, recognise, report'),
-    'launch': Command('launch', 'start the nodes of a launch file'),
-    'explore': Command('explore', 'slide the finger over the surface and say what it is'),
-    'identify': Command('identify', 'slide as tells most, again and again, until it is sure what the surface is'),
-    'dashboard': Command('dashboard', 'show a web page of what is felt, with buttons to explore and stop'),
-    'learn': Command('learn', 'teach what was explored last as a texture, at once; or undo it'),
-    'record': Command('record', 'record the running system into a bag'),
-    'replay': Command('replay', 'play a bag to the running system'),
-    'import': Command('import_recordings', "turn other people's recordings into labelled bags"),
-    'segment': Command('segment', 'find the slides in bags that do not tell them'),
-    'train': Command('train', 'learn a model from labelled bags'),
-    'optimise': Command('optimise', 'tune a recipe on labelled bags by a genetic search'),
-    'evaluate': Command('evaluate', 'say how good a model is on labelled bags'),
-    'scene': Command('scene', 'draw a simulated surface, the way over it, the signal and its spectrum'),
-    'panel': Command('panel', 'say what a panel of people grades as rough, and how far they agree'),
-    'experiment': Command('experiment', "rebuild a paper's experiment: its figures beside ours"),
-    'endurance': Command('endurance', 'explore on the emulated bench for hours while faults strike at random'),
-    'bench': Command('bench', 'run a benchmark; writes figures and a chart'),
+    'demo': Command(
+        'texture_bringup.commands.demo', 'the whole thing on an emulated bench: explore, learn, recognise, report'
+    ),
+    'launch': Command('texture_launch.commands.launch', 'start the nodes of a launch file'),
+    'explore': Command('texture_bringup.commands.explore', 'slide the finger over the surface and say what it is'),
+    'identify': Command(
+        'texture_bringup.commands.identify',
+        'slide as tells most, again and again, until it is sure what the surface is',
+    ),
+    'dashboard': Command(
+        'texture_bringup.commands.dashboard', 'show a web page of what is felt, with buttons to explore and stop'
+    ),
+    'learn': Command(
+        'texture_bringup.commands.learn', 'teach what was explored last as a texture, at once; or undo it'
+    ),
+    'record': Command('texture_recordings.commands.record', 'record the running system into a bag'),
+    'replay': Command('texture_recordings.commands.replay', 'play a bag to the running system'),
+    'import': Command('texture_recordings.commands.import_', "turn other people's recordings into labelled bags"),
+    'segment': Command('texture_recordings.commands.segment', 'find the slides in bags that do not tell them'),
+    'train': Command('texture_evaluation.commands.train', 'learn a model from labelled bags'),
+    'optimise': Command('texture_evaluation.commands.optimise', 'tune a recipe on labelled bags by a genetic search'),
+    'evaluate': Command('texture_evaluation.commands.evaluate', 'say how good a model is on labelled bags'),
+    'scene': Command(
+        'texture_bringup.commands.scene', 'draw a simulated surface, the way over it, the signal and its spectrum'
+    ),
+    'panel': Command(
+        'texture_evaluation.commands.panel', 'say what a panel of people grades as rough, and how far they agree'
+    ),
+    'experiment': Command(
+        'texture_benchmarks.commands.experiment', "rebuild a paper's experiment: its figures beside ours"
+    ),
+    'endurance': Command(
+        'texture_benchmarks.commands.endurance', 'explore on the emulated bench for hours while faults strike at random'
+    ),
+    'bench': Command('texture_benchmarks.commands.bench', 'run a benchmark; writes figures and a chart'),
 }
 
 
@@ -86,7 +103,7 @@ def _dispatch(given: Sequence[str]) -> int:
         return 0
     name, *rest = given
     command = find(COMMANDS, name, 'sub-command of texture')
-    module = cast(Module, importlib.import_module(f'texture_bringup.commands.{command.module}'))
+    module = cast(Module, importlib.import_module(command.module))
     parser = argparse.ArgumentParser(prog=f'texture {name}', description=command.summary)
     module.configure(parser)
     return module.run(parser.parse_args(rest))

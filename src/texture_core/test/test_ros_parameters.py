@@ -47,9 +47,18 @@ def test_a_bad_value_is_refused_in_one_sentence(make_node: Any, bad: dict[str, A
         declare(make_node(**bad), Params)
 
 
-def test_a_refused_change_is_not_set(make_node: Any) -> None:
+def test_a_change_that_nobody_follows_is_refused(make_node: Any) -> None:
     node = make_node()
     declare(node, Params)
+    outcome = node.set_parameters([Parameter('name', value='y')])[0]
+    assert not outcome.successful
+    assert 'read-only' in outcome.reason
+    assert read(node, Params) == Params()
+
+
+def test_a_refused_change_is_not_set(make_node: Any) -> None:
+    node = make_node()
+    declare(node, Params, changeable=True)
     seen = []
     on_change(node, Params, seen.append)
     assert not node.set_parameters([Parameter('name', value='z')])[0].successful

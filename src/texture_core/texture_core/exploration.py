@@ -6,6 +6,8 @@ import enum
 import math
 from dataclasses import dataclass
 
+from texture_core.labels import checked_label
+
 
 class Phase(str, enum.Enum):
     """Phase of an exploration; windows are cut from SLIDE alone."""
@@ -44,7 +46,13 @@ class ExplorationState:
 
 @dataclass(frozen=True)
 class ExplorationRequest:
-    """What an operator asks for; a number of 0 means the default of the motion."""
+    """What an operator asks for; a number of 0 means the default of the motion.
+
+    Raises
+    ------
+    InvalidData
+        If `surface` is no label; see `texture_core.labels`.
+    """
 
     motion: str
     speed_m_s: float = 0.0
@@ -56,3 +64,6 @@ class ExplorationRequest:
     direction_rad: float = 0.0
     surface: str = ''
     stop_when_certain: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, 'surface', checked_label(self.surface))

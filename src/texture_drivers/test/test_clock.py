@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from texture_drivers.clock import Arrival, StreamClock, supporting_slope
-from texture_drivers.clock_trial import try_clock
 
 SECOND = 1_000_000_000
 START = 1_700_000_000 * SECOND
@@ -11,15 +10,6 @@ START = 1_700_000_000 * SECOND
 def run(clock, indices, *, delay_ns=0, drift=0.0, offset_ns=START):
     for index in indices:
         clock.observe(index, offset_ns + round(index * 1e6 * (1 + drift)) + delay_ns)
-
-
-@pytest.mark.parametrize('seed', range(3))
-def test_stamps_are_right_to_half_a_millisecond_for_ten_minutes_of_jitter_and_drift(seed):
-    trial = try_clock(np.random.default_rng(seed))
-    warm = trial.time_s > 5.0
-    assert np.abs(trial.clock_error_s[warm]).max() < 0.5e-3
-    assert np.abs(trial.arrival_error_s[warm]).max() > 20e-3
-    assert np.abs(trial.nominal_error_s[warm]).max() > 20e-3  # 50 ppm of 600 s are 30 ms, less the first delay
 
 
 @pytest.mark.parametrize('drift', [-3e-3, 0.0, 200e-6])

@@ -14,7 +14,6 @@ from texture_core.ros.conversions import from_msg, to_msg
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
 from texture_estimation.evidence import Evidence
-from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.model import load_model
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
@@ -22,6 +21,7 @@ from texture_estimation.roughness.evidence import RoughnessEvidence
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.recipe import RoughnessRecipe
 from texture_estimation.roughness.training import train_grades
+from texture_features.labelled_features import LabelledFeatures
 
 pytestmark = pytest.mark.ros
 GRADE_NAMES = ('signal/integral/f', 'signal/bursts/f')
@@ -127,6 +127,15 @@ def test_a_model_may_be_given_later_and_a_bad_one_changes_nothing(graph, case, t
     assert not bench.set_model(tmp_path / 'none.skops').successful
     assert recognised(bench.ask(vectors)[-1])
     assert bench.report()[0] == 'OK'
+
+
+def test_who_joins_late_still_gets_the_final_estimate(graph, case):
+    kind, path, vectors = case
+    bench = Bench(graph, kind, path)
+    final = bench.ask(vectors)[-1]
+    late = graph.listen(*kind.estimate, ESTIMATE_QOS)
+    graph.until(lambda: late and late[-1].final)
+    assert from_msg(late[-1]) == final
 
 
 def test_broken_messages_are_counted_and_survived(graph, case):

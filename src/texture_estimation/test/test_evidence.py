@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from texture_core.features import FeatureVector
+from texture_estimation.classification.evidence_rules import MajorityVote
 from texture_estimation.evidence import Evidence
-from texture_estimation.evidence_rules import MajorityVote
 from texture_estimation.fingerprint import difference
 
 
@@ -41,6 +41,13 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
     assert estimates[-1].confidence == max(estimates[-1].probabilities)
     assert sum(estimates[-1].probabilities) == pytest.approx(1.0)
     assert estimates[-1].labels == model.labels
+
+
+def test_the_final_estimate_says_how_many_windows_are_missing_from_it(model, examples):
+    *windows, last = vectors(examples)
+    final = judge(model, [*windows, dataclasses.replace(last, skipped=6)])[-1]
+    assert final.message == '6 of 14 windows were left out, as samples were lost or not finite'
+    assert judge(model, [*windows, last])[-1].message == ''
 
 
 def test_overlapping_windows_count_the_sliding_time_once(model, examples):

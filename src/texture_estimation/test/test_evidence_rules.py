@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_estimation.evidence_rules import EVIDENCE_RULES, MajorityVote, SoftVote
+from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, MajorityVote, SoftVote
 from texture_estimation.log_probabilities import log_softmax, undecided
 
 

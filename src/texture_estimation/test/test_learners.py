@@ -10,6 +10,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVC
 
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_estimation.classification.training import train
 from texture_estimation.learners.ann_pairs import AnnPairs
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.em_mixture import EmMixture
@@ -23,7 +24,6 @@ from texture_estimation.learners.svm_pairs import SvmPairs
 from texture_estimation.log_probabilities import undecided
 from texture_estimation.model import load_model
 from texture_estimation.recipe import Recipe
-from texture_estimation.training import train
 
 # Less of what takes time only.
 FASTER = {'svm_linear': {'repeats': 2, 'candidates': 5}}

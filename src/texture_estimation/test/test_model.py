@@ -7,11 +7,11 @@ import pytest
 import skops.io
 
 from texture_core.errors import ModelMismatch
+from texture_core.motion import Motion
+from texture_estimation.classification.training import train
 from texture_estimation.model import load_model
-from texture_estimation.motion import Motion
-from texture_estimation.next_motion import Explorations
+from texture_estimation.next_motion.choice import Explorations
 from texture_estimation.recipe import load_recipe
-from texture_estimation.training import train
 
 
 @pytest.fixture

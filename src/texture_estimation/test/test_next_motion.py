@@ -9,8 +9,8 @@ import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.features import FeatureVector
-from texture_estimation.motion import Motion
-from texture_estimation.next_motion import Explorations, Felt, slide_values
+from texture_core.motion import Motion
+from texture_estimation.next_motion.choice import Explorations, Felt, slide_values
 
 ACROSS = Motion('linear_slide', 0.0, 0.1, 2.0, 1.0)
 ALONG = replace(ACROSS, direction_rad=np.pi / 2)

@@ -8,16 +8,16 @@ from scipy.signal import lfilter
 
 from texture_core.resources import folder
 from texture_core.window import Window
-from texture_estimation.familiarity import Familiarity
-from texture_estimation.labelled_features import LabelledFeatures
+from texture_estimation.classification.training import train
+from texture_estimation.incremental.ridge_classifier import TaughtHead
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.log_probabilities import log_softmax
+from texture_estimation.open_set.novelty import Familiarity
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.catalogue import HEADS
 from texture_estimation.roughness.head import ROUGH, SMOOTH
-from texture_estimation.taught_head import TaughtHead
-from texture_estimation.training import train
-from texture_features.windows import CutWindow
+from texture_features.labelled_features import LabelledFeatures
+from texture_features.windowing.windows import CutWindow
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 SHIPPED.remove('kaboli-svm')  # it takes its time; its features are those of the others, its learner is tried above

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.prediction_sets import PredictionSets, learnt
+from texture_estimation.open_set.prediction_sets import PredictionSets, learnt
 
 WORTHS = np.array([1.0, 2.0, 4.0])
 

@@ -6,7 +6,7 @@ import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch, UnknownName
 from texture_core.features import FeatureVector
-from texture_estimation.labelled_features import LabelledFeatures
+from texture_estimation.classification.training import train
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.evidence import NO_MODEL, NO_WINDOW, SILENT, RoughnessEvidence
@@ -14,7 +14,7 @@ from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.model import NORMAL_90, load_roughness_model
 from texture_estimation.roughness.recipe import RoughnessRecipe
 from texture_estimation.roughness.training import hold_out, train_grades
-from texture_estimation.training import train
+from texture_features.labelled_features import LabelledFeatures
 
 FINGERPRINT = 'abcd1234 signal=1000Hz*1'
 NAMES = ('signal/integral/f', 'signal/arc_length/f', 'signal/bursts/f', 'signal/log_variance/f')

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_estimation.stopping import Stopping, learnt
+from texture_estimation.open_set.stopping import Stopping, learnt
 
 WORTHS = 1.0 + 0.5 * np.arange(9)
 

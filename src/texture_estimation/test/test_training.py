@@ -5,9 +5,9 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_core.features import FeatureVector
-from texture_estimation.labelled_features import LabelledFeatures
+from texture_estimation.classification.training import train
 from texture_estimation.recipe import load_recipe
-from texture_estimation.training import train
+from texture_features.labelled_features import LabelledFeatures
 
 RECIPE = load_recipe('default')
 

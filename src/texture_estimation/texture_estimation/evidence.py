@@ -10,9 +10,9 @@ from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
-from texture_estimation.familiarity import WORTHS
 from texture_estimation.fingerprint import difference
 from texture_estimation.model import Model
+from texture_estimation.open_set.novelty import WORTHS
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
 NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
@@ -44,6 +44,7 @@ class Evidence:
             self._start(vector.exploration_id)
         if vector.last:
             self._over = True
+            self._note_skipped(vector.skipped)
             return self._estimate(vector, final=True)
         if self.model is not None:
             self._judge(vector, self.model)
@@ -62,6 +63,13 @@ class Evidence:
         self._values = self._zeros.copy()
         self._familiar_windows = 0
         self._known: bool | None = None  # not looked at yet
+
+    def _note_skipped(self, skipped: int) -> None:
+        """Say in the final estimate how much of the slide is missing from it."""
+        if skipped and not self._message:
+            self._message = (
+                f'{skipped} of {skipped + self._windows} windows were left out, as samples were lost or not finite'
+            )
 
     def _judge(self, vector: FeatureVector, model: Model) -> None:
         if vector.feature_set != model.feature_set:

@@ -16,16 +16,16 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch
 from texture_estimation import model_files
-from texture_estimation.examples import Examples
-from texture_estimation.familiarity import Familiarity
+from texture_estimation.incremental.added_examples import Lesson, read_lessons
+from texture_estimation.incremental.examples import Examples
+from texture_estimation.incremental.ridge_classifier import TaughtHead
 from texture_estimation.learners.learner import LogProbabilities
-from texture_estimation.lessons import Lesson, read_lessons
 from texture_estimation.log_probabilities import log_softmax, undecided
-from texture_estimation.next_motion import Explorations
-from texture_estimation.prediction_sets import PredictionSets
+from texture_estimation.next_motion.choice import Explorations
+from texture_estimation.open_set.novelty import Familiarity
+from texture_estimation.open_set.prediction_sets import PredictionSets
+from texture_estimation.open_set.stopping import Stopping
 from texture_estimation.recipe import Recipe
-from texture_estimation.stopping import Stopping
-from texture_estimation.taught_head import TaughtHead
 
 # Names of their parts in the file.
 EXAMPLES, FAMILIARITY, EXPLORATIONS = 'examples', 'familiarity', 'explorations'

@@ -10,13 +10,13 @@ from typing import Any
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
-from texture_estimation.evidence_rules import EVIDENCE_RULES, EvidenceRule
+from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
 from texture_features.choice import choose
 from texture_features.feature_set import FeatureSet
 from texture_features.recipe_file import read_recipe
-from texture_features.windows import WindowParams
+from texture_features.windowing.windows import WindowParams
 
 KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.bags import read_bag
-from texture_evaluation.dataset import describe
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import cut_recording
+from texture_features.windowing.windows import cut_recording
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import read_bag
+from texture_recordings.dataset import describe
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 FEATURES = FeatureSet.load('vibration-and-taxels')
 

@@ -8,10 +8,10 @@ import pytest
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
 from texture_core.signal import TactileSignal
 from texture_estimation.model import Model, load_model
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.bags import read_bag
 from texture_evaluation.evaluate import evaluate, evaluate_bags
 from texture_evaluation.train import train_from_bags
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import read_bag
 
 
 @pytest.fixture(scope='module')

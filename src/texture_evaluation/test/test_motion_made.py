@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from texture_core.exploration import ExplorationState, Phase
-from texture_estimation.motion import Motion
+from texture_core.motion import Motion
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.dataset import describe
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
-from texture_evaluation.motion_made import motion_made
+from texture_recordings.dataset import describe
+from texture_recordings.motion_made import motion_made
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 SECOND = 1_000_000_000
 TOUCH = ExplorationState(0, 'id', 'linear_slide', Phase.CONTACT)

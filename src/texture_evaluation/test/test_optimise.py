@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import TextureError
-from texture_estimation.genetic.search import SearchParams
 from texture_estimation.recipe import load_recipe
+from texture_estimation.search.genetic_search import SearchParams
 from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
 from texture_evaluation.train import train_from_bags
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from texture_core.resources import folder
+from texture_estimation.classification.training import train
 from texture_estimation.recipe import load_recipe
-from texture_estimation.training import train
-from texture_evaluation.dataset import describe
 from texture_evaluation.evaluate import evaluate
+from texture_recordings.dataset import describe
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 

@@ -3,12 +3,12 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_core.exploration import Phase
-from texture_evaluation.bag_writer import BagWriter
-from texture_evaluation.bags import read_bag
-from texture_evaluation.datasets.simulated import SlidePlan, write_simulated
-from texture_evaluation.segment import segment_bags
-from texture_evaluation.slides import find_slides
-from texture_features.segmentation import SegmentParams
+from texture_features.segmentation.segments import SegmentParams
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import read_bag
+from texture_recordings.segment import segment_bags
+from texture_recordings.slides import find_slides
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 SURFACE = 'ridge_2mm_deep'
 

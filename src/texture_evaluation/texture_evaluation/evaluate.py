@@ -19,10 +19,10 @@ from texture_estimation.evidence import Evidence
 from texture_estimation.fingerprint import difference
 from texture_estimation.model import Model, load_model
 from texture_evaluation import metrics
-from texture_evaluation.dataset import cut_slides, no_window
 from texture_evaluation.metrics import SlideResult
-from texture_evaluation.slides import Slide, find_slides
-from texture_features.windows import Piece
+from texture_features.windowing.windows import Piece
+from texture_recordings.dataset import cut_slides, no_window
+from texture_recordings.slides import Slide, find_slides
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,24 +11,24 @@ from typing import Any
 import yaml
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_estimation.genetic.division import Division
-from texture_estimation.genetic.examples import Examples
-from texture_estimation.genetic.grading import Grading
-from texture_estimation.genetic.optimise import Finalist, Optimised, optimise
-from texture_estimation.genetic.pairs import OptimisedPairs, beside, optimise_pairs
-from texture_estimation.genetic.recipe_space import RecipeSpace
-from texture_estimation.genetic.search import Generation, SearchParams
-from texture_estimation.genetic.spread import Spread, over_cores, over_dask
-from texture_estimation.genetic.telling_apart import TellingApart
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
-from texture_evaluation.dataset import cut_slides
+from texture_estimation.search.division import Division
+from texture_estimation.search.examples import Examples
+from texture_estimation.search.genetic_search import Generation, SearchParams
+from texture_estimation.search.grading import Grading
+from texture_estimation.search.optimise import Finalist, Optimised, optimise
+from texture_estimation.search.pairs import OptimisedPairs, beside, optimise_pairs
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.spread import Spread, over_cores, over_dask
+from texture_estimation.search.telling_apart import TellingApart
 from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
-from texture_evaluation.slides import find_slides
 from texture_evaluation.train import with_channels
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import CutWindow, WindowParams
+from texture_features.windowing.windows import CutWindow, WindowParams
+from texture_recordings.dataset import cut_slides
+from texture_recordings.slides import find_slides
 
 # The search space of a recipe, or else of its learner.
 OF_RECIPES: Mapping[str, str] = {

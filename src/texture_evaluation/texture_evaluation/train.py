@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from texture_core.errors import InvalidParameter
+from texture_estimation.classification.training import train
 from texture_estimation.model import Model
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.training import train
-from texture_evaluation.bags import find_bags
-from texture_evaluation.dataset import describe
+from texture_recordings.bags import find_bags
+from texture_recordings.dataset import describe
 
 FAST_TOPIC = 'signal'
 CHANNELS = ('fast', 'all')

@@ -11,8 +11,8 @@ from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.model import RoughnessModel
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
-from texture_evaluation.bags import find_bags
-from texture_evaluation.dataset import describe
+from texture_recordings.bags import find_bags
+from texture_recordings.dataset import describe
 
 
 def train_grades_from_bags(

@@ -25,7 +25,7 @@ def graph():
 def test_every_motion_of_a_preset_is_made_and_the_node_ends(graph, tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text(PRESET)
-    quick = {'start_height_m': 0.002, 'stale_s': 2.0}
+    quick = {'start_height_m': 0.002, 'stale_s': 2.0, 'watch_signal': False}
     explorer = ExplorerNode(parameter_overrides=[Parameter(name, value=value) for name, value in quick.items()])
     ended = threading.Event()
     asker = graph.add(partial(ExplorePreset, ended.set), preset=str(path), surface='cork', repeats=1)

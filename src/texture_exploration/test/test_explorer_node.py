@@ -1,5 +1,7 @@
 """The explorer as others meet it: over ROS, on a simulated arm in real time."""
 
+import contextlib
+import math
 import select
 import signal
 import socket
@@ -67,7 +69,7 @@ class World:
     """An explorer and a client in one executor."""
 
     def __init__(self, **parameters):
-        values = {'start_height_m': 0.002, 'stale_s': 1.0, **parameters}
+        values = {'start_height_m': 0.002, 'stale_s': 1.0, 'watch_signal': False, **parameters}
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         self.explorer = ExplorerNode(parameter_overrides=overrides)
         self.client = Client()
@@ -154,6 +156,45 @@ def test_an_unknown_motion_is_refused_with_the_nearest_name(world):
     assert not response.success
     assert "did you mean 'linear_slide'" in response.message
     assert response.exploration_id == ''
+
+
+def test_the_numbers_of_a_refusal_are_unknown_not_zero(world):
+    response = world.result(world.call(motion='linear_slid'))
+    assert math.isnan(response.texture.confidence)
+    assert math.isnan(response.roughness.grade)
+    assert math.isnan(response.roughness.grade_std)
+
+
+@pytest.mark.parametrize(
+    ('request_fields', 'sentence'),
+    [
+        ({'surface': 'x' * 100_000}, 'has 100000 characters; at most 100'),
+        ({'surface': '../../etc/x'}, 'slash'),
+        ({'direction_rad': 1e300}, 'direction_rad is 1e+300; allowed is'),
+        ({'direction_rad': math.nan}, 'direction_rad is nan; allowed is'),
+    ],
+)
+def test_a_request_that_cannot_be_meant_is_refused_before_anything_moves(world, request_fields, sentence):
+    response = world.result(world.call(**QUICK, **request_fields))
+    assert not response.success
+    assert sentence in response.message
+    assert not response.exploration_id
+
+
+def test_a_parameter_that_only_counts_at_the_start_is_read_only(world):
+    [outcome] = world.explorer.set_parameters([Parameter('arm', value='ur')])
+    assert not outcome.successful
+    assert world.explorer.get_parameter('arm').value == 'simulated'
+    [outcome] = world.explorer.set_parameters([Parameter('settle_s', value=0.2)])
+    assert outcome.successful, outcome.reason
+
+
+def test_without_any_sensor_an_exploration_aborts_by_default_and_says_how_to_go_on(make_world):
+    world = make_world(watch_signal=True)
+    response = world.result(world.call(**QUICK))
+    assert not response.success
+    assert response.message.startswith("no samples have come on 'signal' for")
+    assert 'watch_signal:=false' in response.message
 
 
 def test_a_second_request_at_once_is_refused(world):
@@ -290,7 +331,8 @@ def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros)
         bench.settimeout(DEADLINE_S)
         program = 'from texture_exploration.nodes.explorer import main; main()'
         port = f'finger_port:={bench.getsockname()[1]}'
-        with subprocess.Popen([sys.executable, '-c', program, '--ros-args', '-p', port]) as explorer:
+        options = ['--ros-args', '-p', port, '-p', 'watch_signal:=false']
+        with subprocess.Popen([sys.executable, '-c', program, *options]) as explorer, killed_on_error(explorer):
             client = Client()
             assert client.explore.wait_for_service(DEADLINE_S)
             answer = client.explore.call_async(srv.Explore.Request(**SLOW))
@@ -304,6 +346,16 @@ def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros)
     assert last.force_n == 0
     assert last.z_m == pytest.approx(0.01, abs=0.001)
     assert answer.result().message == 'the explorer was shut down'
+
+
+@contextlib.contextmanager
+def killed_on_error(process):
+    """End a process when the test fails: `Popen` would wait for its end for ever."""
+    try:
+        yield
+    except BaseException:
+        process.kill()
+        raise
 
 
 def last_until_exit(bench, process):

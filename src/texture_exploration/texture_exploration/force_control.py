@@ -7,16 +7,18 @@ controller sets the normal velocity
 
 and it comes into effect after the loop delay. The feed-forward dh/dt is not the arm's own movement: z + F/k is h
 whatever the controller does, so its slope is a disturbance that is observed, and adds no loop as far as k is right.
-k is estimated while the finger comes into contact, and g follows from it: see `texture_exploration.stability`.
+k is estimated while the finger comes into contact, and g follows from it: see `texture_exploration.stability`. The
+delay is measured while it comes down; if it is longer than declared, gain and speed are reduced accordingly.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
+from texture_exploration.lag import LagEstimate
 from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import Loop, border_gain
 from texture_exploration.stiffness import TOUCHING_N, StiffnessEstimate
@@ -25,6 +27,10 @@ NOISE_N = 0.005  # of the force
 SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
 SETTLED = 0.3  # from an error of this share of the wanted force on, the slope is observed
 REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
+LONGEST_DELAY_S = 0.1  # of `ForceLoopParams`
+UNDECLARED_PERIODS = 1.5  # a lag that is longer than declared by more than this counts
+LATE_IMPACT = 3.0  # so many times 'impact_n' may be met by an arm that is later than declared: coming down takes long
+INTEGRAL_LAGS = 20.0  # the integral part takes at least so many lags: a faster one adds to the overshoot
 NEAR_M = 0.001  # above a surface whose height is known, the finger slows down to closing speed
 
 
@@ -138,14 +144,12 @@ class ForceLoop:
         self._params = params
         self._period_s = period_s
         self.stiffness = StiffnessEstimate()
-        self._observer = SlopeObserver(params.loop_delay_s + 0.5 * period_s)
+        self.lag = LagEstimate()
+        self._told = params  # what was declared; `_params` holds what was measured
+        self._observer = self._new_observer()
         self._surface_m: float | None = None  # where the finger met it last
         self._chosen_for = math.nan
-        self.controller = ForceController(
-            params.force_gain_m_s_n or params.best_gain(params.stiffest_n_m, period_s),
-            params.integral_s,
-            params.force_speed_m_s,
-        )
+        self.controller = self._new_controller()
 
     def restart(self) -> None:
         """The finger is not under force control, or the command ended."""
@@ -164,6 +168,12 @@ class ForceLoop:
         self.stiffness.update(feeling.height_m, feeling.force_n)
         self._choose_gain()
 
+    def asked(self, height_m: float, asked_m_s: float, dt_s: float) -> None:
+        """Take note of the velocity that was asked for in the end: it tells how late the arm follows."""
+        self.lag.update(height_m, asked_m_s, dt_s)
+        if self.stiffness.empty:  # a gain is not changed in contact
+            self._adapt_to_lag()
+
     def velocity_m_s(self, wanted_n: float, feeling: Feeling, speed_m_s: float, dt_s: float) -> float:
         """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface."""
         height_m, force_n = feeling.height_m, feeling.force_n
@@ -181,11 +191,49 @@ class ForceLoop:
         """Return how fast the finger may come down: slowly where the surface may be."""
         params = self._params
         reaction_s = params.loop_delay_s + REACTION_PERIODS * self._period_s
-        slow = min(params.force_speed_m_s, params.closing_force_rate / reaction_s)
+        slow = min(params.force_speed_m_s, self._closing_m / reaction_s)
         if self._surface_m is None:
             return slow
         above_m = height_m - self._surface_m - NEAR_M
         return min(params.force_speed_m_s, max(slow, above_m / (4 * reaction_s)))
+
+    @property
+    def _closing_m(self) -> float:
+        """How deep the finger may run into the surface before it reacts, m."""
+        depth_m = self._told.closing_force_rate
+        if not self._late:
+            return depth_m
+        reactions_s = [params.loop_delay_s + REACTION_PERIODS * self._period_s for params in (self._params, self._told)]
+        felt = self.stiffness.value_n_m
+        if not self.stiffness.empty and not math.isnan(felt):
+            depth_m *= max(1.0, self._told.stiffest_n_m / felt)
+        return depth_m * min(LATE_IMPACT, reactions_s[0] / reactions_s[1])
+
+    @property
+    def _late(self) -> bool:
+        return self._params.loop_delay_s > self._told.loop_delay_s
+
+    def _adapt_to_lag(self) -> None:
+        """Take over the measured lag if it is longer than declared."""
+        lag_s = self.lag.value_s
+        told = self._told
+        late = lag_s > told.loop_delay_s + UNDECLARED_PERIODS * self._period_s  # not if it is NaN
+        delay_s = math.ceil(lag_s * 1e3) * 1e-3 if late else told.loop_delay_s
+        if delay_s == self._params.loop_delay_s:
+            return
+        integral_s = max(told.integral_s, INTEGRAL_LAGS * delay_s) if late else told.integral_s
+        self._params = replace(told, loop_delay_s=min(delay_s, LONGEST_DELAY_S), integral_s=integral_s)
+        self._observer = self._new_observer()
+        self.controller = self._new_controller()
+        self._chosen_for = math.nan
+
+    def _new_observer(self) -> SlopeObserver:
+        return SlopeObserver(self._params.loop_delay_s + 0.5 * self._period_s)
+
+    def _new_controller(self) -> ForceController:
+        params = self._params
+        gain = params.force_gain_m_s_n or params.best_gain(params.stiffest_n_m, self._period_s)
+        return ForceController(gain, params.integral_s, params.force_speed_m_s)
 
     def _choose_gain(self) -> None:
         felt = self.stiffness.value_n_m

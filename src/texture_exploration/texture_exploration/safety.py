@@ -12,6 +12,9 @@ from texture_core.exploration import ExplorationRequest
 from texture_core.parameters import param
 from texture_exploration.arms.protocol import ArmState, Vector
 
+# Several turns are a direction, too; an angle beyond this one is a mistake, and loses its meaning by rounding.
+MAX_DIRECTION_RAD = 100.0
+
 
 @dataclass(frozen=True)
 class SafetyLimits:
@@ -82,9 +85,10 @@ class SafetyLimits:
             if not low <= value <= high:
                 raise MotionRefused(f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}')
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
-        if not math.isfinite(request.direction_rad):
+        if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
             raise MotionRefused(
-                f'{request.motion}: direction_rad is {request.direction_rad}; a finite number is needed'
+                f'{request.motion}: direction_rad is {request.direction_rad:g}; '
+                f'allowed is -{MAX_DIRECTION_RAD:g} to {MAX_DIRECTION_RAD:g} rad'
             )
         return request
 

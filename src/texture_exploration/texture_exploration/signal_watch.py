@@ -12,8 +12,16 @@ from texture_core.parameters import param
 class SignalWatchParams:
     """Whether to end an exploration when the sensor falls silent."""
 
-    watch_signal: bool = param(False, 'Abort when no samples come on `signal`.')
-    signal_timeout_s: float = param(0.1, 'A longer silence aborts.', unit='s', low=0.02, high=5.0)
+    watch_signal: bool = param(
+        True, 'Whether an exploration is aborted, and the finger lifted, when no samples come on `signal`.'
+    )
+    signal_timeout_s: float = param(
+        0.25,
+        'Longest silence of `signal` before the abort; a longer time tolerates a busier machine.',
+        unit='s',
+        low=0.02,
+        high=5.0,
+    )
 
 
 class SignalWatch:
@@ -41,4 +49,7 @@ class SignalWatch:
         age_s = (self._clock() - max(self._heard_ns, awake_ns)) * 1e-9
         if age_s <= self._timeout_s:
             return ''
-        return f"no samples have come on 'signal' for {age_s * 1e3:.0f} ms; check the sensor"
+        return (
+            f"no samples have come on 'signal' for {age_s * 1e3:.0f} ms; check the sensor, or start the explorer with "
+            'watch_signal:=false to move without one'
+        )

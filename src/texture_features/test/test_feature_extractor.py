@@ -10,7 +10,7 @@ from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_features.feature_set import FeatureSet
 from texture_features.nodes.feature_extractor import FeatureExtractor
-from texture_features.windows import cut_recording
+from texture_features.windowing.windows import cut_recording
 
 pytestmark = pytest.mark.ros
 RATE_HZ = 1000.0

@@ -8,7 +8,7 @@ from texture_features.feature import Windows
 from texture_features.features.hjorth import hjorth
 from texture_features.features.log_bands import LogBands
 from texture_features.features.spectral_peaks import SpectralPeaks, highest_peaks
-from texture_features.spectrum import hann, mean_over_segments, segment_densities
+from texture_features.spectra.spectrum import hann, mean_over_segments, segment_densities
 
 RATE_HZ = 1000.0
 EVERY = pytest.mark.parametrize('name', FEATURES)

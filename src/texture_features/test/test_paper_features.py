@@ -15,7 +15,7 @@ from texture_features.features.region_peaks import RegionPeaks, region_peaks
 from texture_features.features.short_time_fourier import ShortTimeFourier
 from texture_features.features.spectral_peaks import SpectralPeaks
 from texture_features.features.wavelet_energy import DB4, WaveletEnergy, wavelet_energies
-from texture_features.spectrum import hann, long_densities
+from texture_features.spectra.spectrum import hann, long_densities
 
 RATE_HZ = 1000.0
 

@@ -6,7 +6,7 @@ from scipy import signal as scipy_signal
 
 from texture_features.catalogue import FEATURES
 from texture_features.feature import Windows
-from texture_features.spectrum import hann
+from texture_features.spectra.spectrum import hann
 
 RATE_HZ = 1000.0
 

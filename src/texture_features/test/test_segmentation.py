@@ -6,10 +6,10 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.exploration import Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_features.cell_power import cell_power
-from texture_features.contact_load import find_touches
-from texture_features.segmentation import SegmentParams, find_sliding
-from texture_features.slide_segmenter import SlideSegmenter, segment_recording
+from texture_features.segmentation.cell_power import cell_power
+from texture_features.segmentation.contact_load import find_touches
+from texture_features.segmentation.segments import SegmentParams, find_sliding
+from texture_features.segmentation.slide_segmenter import SlideSegmenter, segment_recording
 
 RATE_HZ, SLOW_HZ = 1000.0, 60.0
 START_NS = 10**15

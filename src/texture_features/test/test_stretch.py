@@ -9,8 +9,8 @@ from texture_features.catalogue import FEATURES
 from texture_features.feature import Windows
 from texture_features.feature_set import FeatureSet
 from texture_features.features.spectral_peaks import SpectralPeaks
-from texture_features.stretch import Stretched, resample, stretched_lengths
-from texture_features.windows import CutWindow
+from texture_features.windowing.stretch import Stretched, resample, stretched_lengths
+from texture_features.windowing.windows import CutWindow
 
 RATE_HZ = 1000.0
 RECIPE = {'inputs': {'signal': {'stretch_to_m_s': 0.1, 'features': [{'log_bands': {'bands': 16}}, 'hjorth', 'speed']}}}

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_features.stream import Stream
-from texture_features.windows import CutWindow, SlideEnd, WindowCutter, WindowParams, cut_recording
+from texture_features.windowing.stream import Stream
+from texture_features.windowing.windows import CutWindow, SlideEnd, WindowCutter, WindowParams, cut_recording
 
 PARAMS = WindowParams(length_s=0.5, hop_s=0.1)
 START_NS = 7 * NANOSECONDS

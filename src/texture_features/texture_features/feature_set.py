@@ -25,8 +25,8 @@ from texture_features.feature import Feature, Windows
 from texture_features.features.force import Force
 from texture_features.features.speed import Speed
 from texture_features.recipe_file import read_recipe
-from texture_features.stretch import Stretched
-from texture_features.windows import CutWindow, Piece, SlideEnd, WindowParams
+from texture_features.windowing.stretch import Stretched
+from texture_features.windowing.windows import CutWindow, Piece, SlideEnd, WindowParams
 
 # Windows described in one go: enough for speed, few enough for the memory cache.
 CHUNK = 64

@@ -6,7 +6,7 @@ import argparse
 
 from texture_bringup.dashboard.access import TOKEN_VARIABLE
 from texture_bringup.nodes.dashboard import Dashboard, DashboardParams
-from texture_bringup.ros.run_node import run_node
+from texture_core.ros.run_node import run_node
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

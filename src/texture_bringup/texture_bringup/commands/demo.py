@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_bringup.commands.options import add_channels, add_seed
-from texture_bringup.commands.train import WITH_SLOW_CHANNELS
 from texture_bringup.demo.plan import Plan
 from texture_bringup.demo.run import demonstrate
 from texture_bringup.demo.story import Story
+from texture_core.command_options import add_channels, add_seed
+from texture_evaluation.commands.train import WITH_SLOW_CHANNELS
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

@@ -11,9 +11,9 @@ from texture_bringup.ros.operator import Operator
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.exploration import ExplorationRequest
+from texture_core.motion import Motion
 from texture_estimation.model import Model, load_model
-from texture_estimation.motion import Motion
-from texture_estimation.next_motion import Explorations, slide_values
+from texture_estimation.next_motion.choice import Explorations, slide_values
 
 SHOWN = 3  # textures, of those that are possible
 

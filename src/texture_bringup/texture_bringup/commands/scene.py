@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_bringup.commands.options import add_seed
+from texture_bringup.scene_charts import caption, slide_picture, table_picture
+from texture_core.command_options import add_seed
 from texture_core.parameters import from_mapping
-from texture_evaluation.scene_charts import caption, slide_picture, table_picture
-from texture_evaluation.scene_view import ViewPlan, view
 from texture_simulation.scene import Scene, load_scene
+from texture_simulation.scene_view import ViewPlan, view
 
 
 def configure(parser: argparse.ArgumentParser) -> None:

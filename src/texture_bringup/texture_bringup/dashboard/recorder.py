@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from texture_bringup.launcher.child import ChildLauncher
 from texture_core.errors import InvalidParameter, LaunchFailed
+from texture_launch.child import ChildLauncher
 
 
 class Recorder:

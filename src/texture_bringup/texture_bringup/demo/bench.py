@@ -8,10 +8,10 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from texture_bringup.demo.isolation import isolate
-from texture_bringup.launcher.child import ChildLauncher
 from texture_bringup.ros.operator import Explored, Operator
 from texture_core.errors import MotionAborted
 from texture_core.exploration import ExplorationRequest
+from texture_launch.child import ChildLauncher
 
 RECORDED = ('signal', 'exploration')  # each is listened to by the feature extractor, too
 START_DEADLINE_S = 60.0  # a slow machine that imports everything for the first time

@@ -12,9 +12,9 @@ from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_evaluation.bags import read_bag
 from texture_evaluation.evaluate import Report
 from texture_evaluation.tour_chart import Tour, picture
+from texture_recordings.bags import read_bag
 
 
 def draw(bag: Path, surface: str, report: Report, source: str, path: Path) -> Path:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from texture_core.estimates import TextureEstimate
 from texture_core.signal import NANOSECONDS
-from texture_evaluation.bags import read_bag
+from texture_recordings.bags import read_bag
 
 
 @dataclass(frozen=True)

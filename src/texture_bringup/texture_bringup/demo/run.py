@@ -8,14 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from texture_bringup.commands import train as training
-from texture_bringup.commands.evaluate import percent
 from texture_bringup.demo.bench import DemoBench
 from texture_bringup.demo.picture import draw
 from texture_bringup.demo.plan import Plan
 from texture_bringup.demo.results import Row, latencies_s, table
 from texture_bringup.demo.story import Story
 from texture_core.errors import InvalidData
+from texture_evaluation.commands import train as training
+from texture_evaluation.commands.evaluate import percent
 from texture_evaluation.evaluate import Report, evaluate_bags
 from texture_evaluation.train import train_from_bags
 

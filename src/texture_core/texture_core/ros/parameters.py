@@ -26,8 +26,18 @@ TYPES = {
 UNBOUNDED = 1e300
 
 
-def declare(node: Any, cls: type[T]) -> T:
+def declare(node: Any, cls: type[T], *, changeable: bool = False) -> T:
     """Declare every field of `cls` with its description, unit and range; return the values the node was given.
+
+    Parameters
+    ----------
+    node
+        The rclpy node that gets the parameters.
+    cls
+        Parameter dataclass.
+    changeable
+        Whether a running node follows changes (see `on_change`). If not, the parameters are read-only after the start:
+        a change that had no effect would look as if it had one.
 
     Raises
     ------
@@ -38,7 +48,7 @@ def declare(node: Any, cls: type[T]) -> T:
         if node.has_parameter(item.name):
             continue
         try:
-            node.declare_parameter(item.name, item.default, _descriptor(item))
+            node.declare_parameter(item.name, item.default, _descriptor(item, read_only=not changeable))
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
             raise InvalidParameter(
                 f"parameter '{item.name}' of node '{node.get_name()}' was refused: {error}; {_needed(item)}"
@@ -81,7 +91,7 @@ def _needed(item: Parameter) -> str:
     return f'{TYPES[item.type].name.lower()} {item.range_text}'.strip() + ' is needed'
 
 
-def _descriptor(item: Parameter) -> ParameterDescriptor:
+def _descriptor(item: Parameter, *, read_only: bool) -> ParameterDescriptor:
     unit = f' [{item.unit}]' if item.unit else ''
     descriptor = ParameterDescriptor(
         name=item.name,
@@ -90,6 +100,7 @@ def _descriptor(item: Parameter) -> ParameterDescriptor:
         additional_constraints=item.range_text if item.choices else '',
         # A YAML file may give 1 where 1.0 is meant; check() makes it a number of the right type.
         dynamic_typing=False,
+        read_only=read_only,
     )
     if item.low is None and item.high is None:
         return descriptor

@@ -16,6 +16,7 @@ from texture_drivers.counting import SampleCounter
 from texture_drivers.tsf85 import tables
 from texture_drivers.tsf85.sets import Set
 from texture_drivers.tsf85.settings import Tsf85Settings
+from texture_drivers.unseen_loss import UnseenLoss
 
 IMAGE_HOLD_S = 0.25  # an image older than this is no measurement of now
 SIGNAL, STATIC, IMU = 'signal', 'signal_static', 'imu'
@@ -23,6 +24,8 @@ SIGNAL, STATIC, IMU = 'signal', 'signal_static', 'imu'
 
 class Finger:
     """Follow one finger: number its sets by the device's stamps, time them by the host's clock, cut batches.
+
+    Where the firmware sends no stamps, the host's clock also tells what was lost, half a second later.
 
     Parameters
     ----------
@@ -47,6 +50,7 @@ class Finger:
         self.clock = StreamClock(tables.RATE_HZ)
         self.counter = SampleCounter()
         self.cutter = BatchCutter(layout, settings, static_rate_hz or layout.static_rate_hz, frame_id, self.clock)
+        self._losses = UnseenLoss(tables.RATE_HZ)
         self._waiting: list[Set] = []
         self._interrupted = False
         self._clock_before: StreamClock | None = None  # before an interruption, until the clock is settled again
@@ -75,8 +79,9 @@ class Finger:
             self.interrupt()
         if not indices:
             return {}
-        self.clock.observe(indices[-1], arrival_ns)
-        skipped = self._skipped(indices[-1])
+        missing = self._unseen(waiting[: len(indices)], indices[-1], arrival_ns)
+        self.clock.observe(indices[-1] + missing, arrival_ns)
+        skipped = missing + self._skipped(indices[-1] + missing)
         return self.cutter.cut([index + skipped for index in indices], waiting[: len(indices)])
 
     def _begin_anew(self) -> None:
@@ -86,6 +91,16 @@ class Finger:
             self._clock_before = copy.copy(self.clock)
         self.clock.restart()
         self.counter.interrupt()
+
+    def _unseen(self, sets: Sequence[Set], index: int, arrival_ns: int) -> int:
+        """Return how many samples must have been lost before these, which have no stamps, and number on behind them."""
+        stamped = any(item.stamp_ms is not None for item in sets)
+        if stamped or not self.clock.settled or self._clock_before is not None:
+            self._losses.restart()
+            return 0
+        missing = self._losses.lost(arrival_ns - self.clock.time_ns(index), arrival_ns)
+        self.counter.skip(missing)
+        return missing
 
     def _skipped(self, index: int) -> int:
         """Return how many samples an interruption has cost that is over now, and number on behind them.

@@ -14,8 +14,8 @@ from texture_core.features import FeatureVector
 from texture_core.parameters import param
 from texture_core.ros.run import run
 from texture_estimation.evidence import NO_MODEL, Evidence
+from texture_estimation.incremental.incremental_classifier import Pupil
 from texture_estimation.model import Model, load_model
-from texture_estimation.pupil import Pupil
 from texture_estimation.ros.estimator_node import EstimatorNode
 
 

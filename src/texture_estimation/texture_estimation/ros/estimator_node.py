@@ -29,7 +29,7 @@ class EstimatorNode(Node):
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
-        self._evidence = self._load(declare(self, self.params).model)
+        self._evidence = self._load(declare(self, self.params, changeable=True).model)
         on_change(self, self.params, self._change)
         self._estimates = 0
         self._broken = 0

@@ -17,7 +17,7 @@ from texture_estimation.roughness.head import Head
 from texture_features.choice import choose
 from texture_features.feature_set import FeatureSet
 from texture_features.recipe_file import read_recipe
-from texture_features.windows import WindowParams
+from texture_features.windowing.windows import WindowParams
 
 KEYS = ('description', 'windows', 'inputs', 'head', 'checks', 'evidence', 'training')
 

@@ -11,13 +11,13 @@ from scipy.stats import t as student
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
-from texture_estimation.labelled_features import LabelledFeatures
 from texture_estimation.learners.learner import Codes
 from texture_estimation.roughness.checks import graded_columns, limits_of
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.head import Head
 from texture_estimation.roughness.model import NORMAL_90, Calibration, RoughnessModel
 from texture_estimation.roughness.recipe import RoughnessRecipe
+from texture_features.labelled_features import LabelledFeatures
 
 LEAST_TEXTURES = 4  # to hold one out and learn from the others
 SCALES = (0.05, 20.0)

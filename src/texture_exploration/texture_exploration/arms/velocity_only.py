@@ -39,7 +39,9 @@ class VelocityOnly:
 
     def ask(self, command: ArmCommand, state: ArmState, dt_s: float) -> None:
         """Ask for the velocity that a command needs, `dt_s` after the last time."""
-        normal = self._normal_m_s(command, state, min(dt_s, HOLDS_S))
+        held_s = min(dt_s, HOLDS_S)
+        normal = self._normal_m_s(command, state, held_s)
+        self._loop.asked(state.position[2], normal, held_s)
         self._late.ask(state.time_ns, (*command.tangential_m_s, normal))
 
     def _normal_m_s(self, command: ArmCommand, state: ArmState, dt_s: float) -> float:

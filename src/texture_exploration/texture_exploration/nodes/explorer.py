@@ -18,7 +18,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_core.catalogue import find
-from texture_core.errors import DeviceError, MotionRefused, UnknownName
+from texture_core.errors import DeviceError, InvalidData, MotionRefused, UnknownName
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.parameters import param
@@ -55,7 +55,7 @@ class ExplorerNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
-        self._certainty = declare(self, CertaintyParams)
+        self._certainty = declare(self, CertaintyParams, changeable=True)
         self._explorer = self._make_explorer()
         self._follow_parameters()
         self._identities = Identities(np.random.default_rng())
@@ -94,7 +94,8 @@ class ExplorerNode(Node):
     def _make_explorer(self) -> Explorer:
         arm_class = find(ARMS, declare(self, ArmParams).arm, 'arm')
         arm = arm_class(declare(self, arm_class.Params))
-        touch, limits = declare(self, TouchParams), declare(self, SafetyLimits)
+        touch = declare(self, TouchParams, changeable=True)
+        limits = declare(self, SafetyLimits, changeable=True)
         explorer = Explorer(arm, touch, limits, self._on_state, silence=self._watch_signal())
         try:
             explorer.connect()
@@ -135,8 +136,11 @@ class ExplorerNode(Node):
         try:
             identity = self._identities.next(self.get_clock().now().nanoseconds)
             exploration = self._explorer.begin(identity, request_from_msg(request))
-        except (MotionRefused, UnknownName) as error:
+        except (MotionRefused, UnknownName, InvalidData) as error:
             result.message = str(error)
+            # Their numbers are NaN, not the zeros that a new message holds.
+            nothing = Estimates('')
+            result.texture, result.roughness = to_msg(nothing.texture), to_msg(nothing.roughness)
             self.get_logger().warning(f'refused: {error}')
             return result
         estimates = self._open[exploration.exploration_id] = Estimates(exploration.exploration_id)

@@ -10,7 +10,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.spectrum import long_densities
+from texture_features.spectra.spectrum import long_densities
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.differences import differences, squares
 from texture_features.feature import Windows, shares
+from texture_features.features.differences import differences, squares
 
 VALUES = ('log_power', 'log_amplitude', 'skewness', 'log_kurtosis')
 # Far below any power, far above the smallest number: nothing over nothing becomes 0 or 1.

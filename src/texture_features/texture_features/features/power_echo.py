@@ -11,9 +11,9 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.differences import squares
 from texture_features.feature import Windows, shares
-from texture_features.spectrum import overlapping
+from texture_features.features.differences import squares
+from texture_features.spectra.spectrum import overlapping
 
 # Of a power squared: far below any, far above the smallest number, so that nothing over nothing is 1.
 TINY = 1e-200

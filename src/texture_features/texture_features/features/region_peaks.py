@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.spectrum import amplitudes_of
+from texture_features.spectra.spectrum import amplitudes_of
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.spectrum import densities_of
+from texture_features.spectra.spectrum import densities_of
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.spatial_spectrum import spatial_log_bands, without_level
+from texture_features.spectra.spatial_spectrum import spatial_log_bands, without_level
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.line_spectrum import line_spectrum, without_force
+from texture_features.spectra.line_spectrum import line_spectrum, without_force
 
 # A band is at least so wide: one beyond the lines takes part of the last.
 LEAST_LINES = 1e-3

@@ -10,7 +10,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.line_spectrum import line_spectrum, without_force
+from texture_features.spectra.line_spectrum import line_spectrum, without_force
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_features.feature import Windows
-from texture_features.spectrum import amplitudes_of
+from texture_features.spectra.spectrum import amplitudes_of
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_features.feature import Windows
 from texture_features.features.log_bands import LogBands
-from texture_features.spectrum import densities_of, mean_over_segments
+from texture_features.spectra.spectrum import densities_of, mean_over_segments
 
 
 @dataclass(frozen=True)

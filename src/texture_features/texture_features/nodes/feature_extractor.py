@@ -19,7 +19,7 @@ from texture_core.ros.parameters import declare
 from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_features.feature_set import FeatureSet
-from texture_features.windows import Piece, WindowCutter
+from texture_features.windowing.windows import Piece, WindowCutter
 
 SILENCE_PERIOD_S = 0.1
 

@@ -22,7 +22,7 @@ class BenchNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('bench', **kwargs)
-        self._params = declare(self, BenchParams)
+        self._params = declare(self, BenchParams, changeable=True)
         self._bench = Bench(self._params)
         self._bench.start()
         on_change(self, BenchParams, self._change)

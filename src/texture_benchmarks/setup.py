@@ -1,0 +1,50 @@
+"""Build this package. The same text in every Python package of the suite: all facts come from package.xml."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from setuptools import find_packages, setup
+
+HERE = Path(__file__).parent
+PACKAGE = ElementTree.parse(HERE / 'package.xml').getroot()
+NAME = PACKAGE.findtext('name')
+MAINTAINER = PACKAGE.find('maintainer')
+
+
+def shared(folder: str) -> list[tuple[str, list[str]]]:
+    """Return the files of a folder that are installed to share/, folder by folder."""
+    files = [path for path in (HERE / folder).rglob('*') if path.is_file()]
+    parents = sorted({path.parent for path in files})
+    return [
+        (f'share/{NAME}/{parent.relative_to(HERE)}', [str(p.relative_to(HERE)) for p in files if p.parent == parent])
+        for parent in parents
+    ]
+
+
+def executables() -> list[str]:
+    """Return one executable for each module of nodes/, named as the module."""
+    modules = sorted((HERE / NAME / 'nodes').glob('[a-z]*.py'))
+    return [f'{path.stem} = {NAME}.nodes.{path.stem}:main' for path in modules]
+
+
+setup(
+    name=NAME,
+    version=PACKAGE.findtext('version'),
+    description=PACKAGE.findtext('description'),
+    license=PACKAGE.findtext('license'),
+    maintainer=MAINTAINER.text,
+    maintainer_email=MAINTAINER.get('email'),
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={'': ['py.typed', '*.yaml', '*.csv']},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        *shared('launch'),
+        *shared('config'),
+    ],
+    install_requires=['setuptools'],
+    extras_require={'test': ['pytest']},
+    zip_safe=False,
+    entry_points={'console_scripts': executables()},
+    options={'develop': {'script_dir': f'$base/lib/{NAME}'}, 'install': {'install_scripts': f'$base/lib/{NAME}'}},
+)

@@ -1,0 +1,51 @@
+from pathlib import Path
+
+import pytest
+
+from texture_benchmarks import catalogue
+from texture_benchmarks.commands import bench as command
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.run_all import LONG
+from texture_bringup.command import main
+from texture_core.errors import InvalidData
+
+
+def good(bench: Bench) -> BenchResult:
+    return BenchResult('good', 'nothing', 'none', 'none', {})
+
+
+def bad(bench: Bench) -> BenchResult:
+    raise ArithmeticError('deliberately, for the test')
+
+
+def missing(bench: Bench) -> BenchResult:
+    raise InvalidData("no recorded data in 'no folder'")
+
+
+@pytest.fixture
+def benches(monkeypatch: pytest.MonkeyPatch) -> dict:
+    benches = {'missing': missing, 'recipes': good, 'good': good}
+    monkeypatch.setattr(command, 'BENCHES', benches)
+    monkeypatch.setattr(catalogue, 'BENCHES', benches)
+    return benches
+
+
+def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(benches, tmp_path: Path, capfd) -> None:
+    assert set(LONG) > {'recipes'}
+    for more, count in (([], 1), (['--long'], 2)):
+        assert main(['bench', 'all', '--out', str(tmp_path), '--data', str(tmp_path), *more]) == 0
+        said = capfd.readouterr().out
+        assert f'{count} benchmarks in ' in said
+        assert "missing: left out: no recorded data in 'no folder'" in said
+        assert 'left out, for their data is missing: missing; failed: none' in said
+
+
+def test_all_go_on_when_one_fails_and_the_command_ends_with_1(benches, tmp_path: Path, capfd) -> None:
+    benches['clock'] = bad
+    benches['last'] = good
+    assert main(['bench', 'all', '--out', str(tmp_path), '--data', str(tmp_path)]) == 1
+    said = capfd.readouterr()
+    assert '2 benchmarks in ' in said.out
+    assert 'failed: clock' in said.out
+    assert 'deliberately' in said.err
+    assert (tmp_path / 'good.json').is_file()

@@ -1,0 +1,127 @@
+"""A bag replayed through the running nodes gives the estimates that the evaluation gets from it."""
+
+import os
+import time
+from collections import defaultdict
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_benchmarks.ros.graph import Graph
+from texture_core.estimates import TextureEstimate
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.ros.conversions import to_msg
+from texture_estimation.model import Model, load_model
+from texture_evaluation.evaluate import judge
+from texture_evaluation.train import train_from_bags
+from texture_launch.node_process import NodeProcess
+from texture_recordings.dataset import cut_slides
+from texture_recordings.importers.biotac20 import import_biotac20
+from texture_recordings.slides import find_slides
+
+pytestmark = pytest.mark.ros
+
+DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data') / 'biotac20'
+Estimates = dict[str, list[TextureEstimate]]
+
+
+def offline(model: Model, bags: Path, slides: str) -> Estimates:
+    cut = cut_slides(find_slides([bags], slides), model.recipe.feature_set)
+    return {slide.exploration_id: judge(model, pieces)[1] for slide, pieces in cut}
+
+
+def live(model: Path, bags: Path, slides: str, rate: float, domain_id: int) -> tuple[Estimates, dict[str, str]]:
+    """Return the estimates of the running nodes and the last numbers of the feature extractor's diagnosis."""
+    heard: defaultdict[str, list[TextureEstimate]] = defaultdict(list)
+    health: dict[str, str] = {}
+    wanted = {slide.exploration_id for slide in find_slides([bags], slides)}
+
+    def on_estimate(estimate: TextureEstimate) -> None:
+        heard[estimate.exploration_id].append(estimate)
+
+    def node(package: str, name: str, **parameters: object) -> NodeProcess:
+        return NodeProcess(package, name, parameters, domain_id=domain_id)
+
+    with (
+        Graph(domain_id) as graph,
+        node('texture_features', 'feature_extractor', recipe=str(model.with_suffix('.json'))),
+        node('texture_estimation', 'classifier', model=str(model)),
+    ):
+        graph.listen('texture', on_estimate)
+        graph.listen('diagnostics', reader_of(health))
+        call_through(graph, heard)
+        with node(
+            'texture_recordings', 'replay', bag=str(bags), slides=slides, rate=rate, start_delay_s=2.0, deadline_s=60.0
+        ) as replay:
+            graph.wait_until(lambda: wanted <= ended(heard), 120.0, 'the final estimates')
+            assert replay.wait(60.0) == 0, replay.output
+        counted = health.copy()
+        graph.wait_until(lambda: health != counted, 30.0, 'a diagnosis after the last window')
+    return {name: estimates for name, estimates in heard.items() if name in wanted}, health
+
+
+def call_through(graph: Graph, heard: Estimates) -> None:
+    """Wait until an empty slide is answered: only then has every node found the next one."""
+    states = graph.publisher('exploration')
+    calls = count()
+
+    def answered() -> bool:
+        name = f'call {next(calls)}'
+        for phase in (Phase.SLIDE, Phase.DONE):
+            states.publish(to_msg(ExplorationState(time.time_ns(), name, '', phase)))
+        return bool(heard)
+
+    graph.wait_until(answered, 60.0, 'the answer to an empty slide')
+    graph.spin(0.5)
+    heard.clear()
+
+
+def ended(heard: Estimates) -> set[str]:
+    return {name for name, estimates in heard.items() if estimates[-1].final}
+
+
+def reader_of(health: dict[str, str]) -> Callable[[object], None]:
+    def read(message: object) -> None:
+        for status in message.status:  # type: ignore[attr-defined]
+            if status.name.endswith('feature_extractor'):
+                health.update({pair.key: pair.value for pair in status.values})
+                health['count'] = str(int(health.get('count', 0)) + 1)
+
+    return read
+
+
+def assert_equal(live_estimates: Estimates, offline_estimates: Estimates) -> None:
+    assert live_estimates.keys() == offline_estimates.keys()
+    for name, expected in offline_estimates.items():
+        got = live_estimates[name]
+        assert [(e.label, e.windows, e.final, e.stamp_ns) for e in got] == [
+            (e.label, e.windows, e.final, e.stamp_ns) for e in expected
+        ]
+        np.testing.assert_allclose(
+            [e.probabilities for e in got], [e.probabilities for e in expected], rtol=0, atol=1e-6
+        )
+
+
+@pytest.mark.parametrize(('rate', 'slides', 'domain_id'), [(1.0, '5', 53), (5.0, '5-6', 54)])
+def test_simulated_slides_are_judged_live_as_offline(
+    rate: float, slides: str, domain_id: int, simulated: Path, tmp_path: Path
+) -> None:
+    train_from_bags('vibration-and-taxels', [simulated], '1-4', tmp_path / 'model')
+    estimates, health = live(tmp_path / 'model.skops', simulated, slides, rate, domain_id)
+    assert_equal(estimates, offline(load_model(tmp_path / 'model'), simulated, slides))
+    assert (health['lost_samples'], health['skipped']) == ('0', '0')
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
+@pytest.mark.parametrize(('recipe', 'rate'), [('default', 1.0), ('vibration-and-taxels', 5.0)])
+def test_recorded_slides_are_judged_live_as_offline(recipe: str, rate: float, tmp_path: Path) -> None:
+    materials = ['material03', 'material05', 'material12']
+    import_biotac20(DATA, tmp_path / 'bags', '1-4,40', materials)
+    train_from_bags(recipe, [tmp_path / 'bags'], '1-4', tmp_path / 'model')
+    estimates, health = live(tmp_path / 'model.skops', tmp_path / 'bags', '5', rate, 55)
+    assert_equal(estimates, offline(load_model(tmp_path / 'model'), tmp_path / 'bags', '5'))
+    assert (health['lost_samples'], health['skipped']) == ('0', '0')
+    assert len(estimates) == len(materials)

@@ -1,0 +1,64 @@
+"""The generic sensor node with a device, and with a recording: real node, real topics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
+from texture_msgs import msg
+
+from texture_benchmarks.load.rig import Rig, biotac
+from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros.qos import SENSOR_QOS
+from texture_drivers.nodes.sensor import SensorNode
+from texture_simulation.devices.biotac import EmulatedBioTac
+
+pytestmark = pytest.mark.ros
+
+
+@pytest.fixture
+def graph() -> Iterator[LocalGraph]:
+    with LocalGraph(80) as graph:
+        yield graph
+
+
+def test_a_finger_of_a_biotac_board_is_published_and_replugging_survived(graph: LocalGraph, tmp_path: Path) -> None:
+    link = tmp_path / 'biotac'
+    fast, slow = (graph.listen(msg.TactileSignal, topic, SENSOR_QOS) for topic in ('signal', 'signal_static'))
+    reports = graph.listen(DiagnosticArray, '/diagnostics')
+    device = EmulatedBioTac(link, np.random.default_rng(0), ('BT-0', 'BT-1'))
+    with Rig('biotac', link, case=biotac(fingers=2), device=device) as rig:
+        graph.add(SensorNode, sensor='biotac', device=str(link), finger=1, frame_id='tip')
+        graph.until(lambda: len(fast) > 20 and len(slow) > 20)
+        assert (fast[-1].sensor, fast[-1].sampling_rate_hz, fast[-1].header.frame_id) == ('biotac/pac', 2200.0, 'tip')
+        assert set(np.diff(fast[-1].samples) % 4096) == {2.0}
+        assert (slow[-1].channels[:4], len(slow[-1].samples) % 22) == (['tdc', 'tac', 'pdc', 'electrode1'], 0)
+        before = fast[-1].first_sample
+        rig.do(device.unplug)
+        rig.do(device.plug)
+        fast.clear()
+        graph.until(lambda: fast)
+        graph.until(lambda: reports and KeyValue(key='reopened', value='1') in reports[-1].status[0].values)
+        assert fast[-1].first_sample > before
+
+
+def test_the_daq_finger_is_published_in_volts_under_its_names(graph: LocalGraph, tmp_path: Path) -> None:
+    signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
+    with Rig('daq', tmp_path / 'daq'):
+        graph.add(SensorNode, sensor='daq', device=str(tmp_path / 'daq'))
+        graph.until(lambda: len(signal) > 20)
+    assert (signal[-1].sensor, signal[-1].unit, signal[-1].sampling_rate_hz) == ('daq', 'V', 2500.0)
+    assert signal[-1].channels[::4] == ['pvdf_outer_1', 'strain_outer_1']
+    assert np.median(np.diff(signal[-1].samples[::8])) == pytest.approx(10 / 2**15, rel=1e-3)
+
+
+def test_a_recording_is_played_as_a_sensor(graph: LocalGraph, tmp_path: Path) -> None:
+    np.savez(tmp_path / 'slide.npz', samples=np.arange(500.0)[:, None], rate_hz=1000.0, channels=['film'])
+    signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
+    graph.add(SensorNode, sensor='file', device=str(tmp_path / 'slide.npz'), config='{loop: true, unit: Pa}')
+    graph.until(lambda: len(signal) > 60)
+    assert (signal[-1].sensor, signal[-1].unit, signal[-1].channels) == ('file/slide', 'Pa', ['film'])
+    assert all(message.samples[0] == message.first_sample % 500 for message in signal)

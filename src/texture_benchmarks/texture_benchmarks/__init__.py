@@ -1,0 +1,1 @@
+"""Benchmarks, rebuilt experiments of papers and endurance runs."""

@@ -1,0 +1,1 @@
+"""Benchmark: features, numbers, units and channels."""

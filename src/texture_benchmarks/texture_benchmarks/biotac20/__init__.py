@@ -1,0 +1,1 @@
+"""Benchmark: 20 recorded materials."""

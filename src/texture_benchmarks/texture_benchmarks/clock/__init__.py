@@ -1,0 +1,1 @@
+"""Benchmark: stamps in spite of late arrivals and drift."""

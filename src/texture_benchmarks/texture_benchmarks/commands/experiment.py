@@ -1,0 +1,32 @@
+"""`texture experiment`: rebuild a paper's experiment on simulated surfaces; it writes figures as JSON and charts."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from texture_benchmarks.papers import EXPERIMENTS, Experiment, run_experiment
+from texture_core.command_options import add_seed
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the sub-command."""
+    parser.add_argument('name', help=f'one of {", ".join(EXPERIMENTS)}')
+    parser.add_argument('--out', type=Path, default=Path('docs/charts'), metavar='DIR', help='folder for the results')
+    parser.add_argument('--quick', '--reduced', action='store_true', help='fewer slides; not for publishing')
+    parser.add_argument(
+        '--tune', action='store_true', help="search the recipe's parameters first, as the paper does, if it can"
+    )
+    add_seed(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run one experiment, print its table and name the files."""
+    result, path = run_experiment(options.name, Experiment(options.out, options.seed, options.quick, options.tune))
+    print(f'{result.name}: {result.measured}')
+    print(f'data: {result.data}; split: {result.split}')
+    for line in result.lines:
+        print(line)
+    for file in (path, *result.charts):
+        print(f'  {file}')
+    return 0

@@ -1,0 +1,1 @@
+"""Benchmark: early decisions, calibration, prediction sets and unknown surfaces."""

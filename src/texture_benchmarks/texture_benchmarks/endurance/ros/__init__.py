@@ -1,0 +1,1 @@
+"""What an endurance run needs of a running ROS graph."""

@@ -1,0 +1,1 @@
+"""Benchmark: computing time of each feature."""

@@ -1,0 +1,1 @@
+"""Benchmark: accuracy by window length and sliding time, and the cost of training."""

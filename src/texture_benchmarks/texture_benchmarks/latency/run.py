@@ -1,0 +1,100 @@
+"""How long from the last sample of a window to the estimate: in one process, and through the running nodes."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from texture_benchmarks.result import Bench, BenchResult
+from texture_core.arrays import Array
+from texture_evaluation.charts import histogram_chart
+from texture_evaluation.evaluate import judge
+from texture_evaluation.train import train_from_bags
+from texture_recordings.dataset import cut_slides
+from texture_recordings.slides import find_slides
+from texture_simulation.scene import load_scene
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
+
+if TYPE_CHECKING:
+    from texture_benchmarks.ros.live_latency import Live
+
+RECIPES = ('default', 'vibration-and-taxels')
+CLASSES = 10
+PASSES = 8  # over the test slides
+PLAN, QUICK_PLAN = SlidePlan(slides=20, slide_s=3.0), SlidePlan(slides=3, slide_s=1.5)
+LIVE_S, QUICK_LIVE_S = 40.0, 3.0
+TARGETS = {'in_process_median_us': 150.0, 'in_process_p99_us': 400.0, 'dds_p99_ms': 5.0, 'cpu_percent': 60.0}
+
+
+def run(bench: Bench) -> BenchResult:
+    """Train on simulated slides over ten surfaces, then time windows in one process and through the graph."""
+    from texture_benchmarks.ros.live_latency import driver_cpu  # noqa: PLC0415  # ROS is needed for this alone
+
+    plan = QUICK_PLAN if bench.quick else PLAN
+    with tempfile.TemporaryDirectory() as folder:
+        surfaces = tuple(load_scene('bench').surfaces)[:CLASSES]
+        bags = write_simulated(Path(folder) / 'bags', plan, np.random.default_rng(bench.seed), surfaces=surfaces)
+        timings = {recipe: _time(recipe, bags, plan.slides, Path(folder), bench) for recipe in RECIPES}
+    driver = driver_cpu()
+    chart = histogram_chart(
+        {f'{name}, {recipe}': values for recipe, timing in timings.items() for name, values in timing.charted.items()},
+        'From the last sample of a window to the estimate (simulated slides)',
+        'time (ms)',
+        bench.out / 'latency.png',
+    )
+    return BenchResult(
+        name='latency',
+        measured=(
+            f'windows of 0.5 s at 1 kHz every 0.1 s, {CLASSES} surfaces. In one process: from window to estimate, '
+            'after one pass to warm up. Through DDS: from publishing the last sample to receiving the '
+            'TextureEstimate, with feature_extractor and '
+            'classifier as processes while 1 kHz in batches of 10 ms and 28 taxels at 60 Hz stream. CPU in percent of '
+            'one core; the sensor node reads an emulated TSF-85'
+        ),
+        data='simulated TSF-85, scene bench',
+        split=f'trained on slides 1-{plan.slides - 1} of each surface; timed on slide {plan.slides}, live on a new one',
+        numbers={
+            'targets': TARGETS,
+            **{recipe: timing.numbers(driver) for recipe, timing in timings.items()},
+        },
+        charts=(chart,),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Timing:
+    """Times of one recipe."""
+
+    alone_us: Array
+    live: Live
+
+    @property
+    def charted(self) -> Mapping[str, Array]:
+        return {'in one process': self.alone_us / 1000, 'through DDS': 1000 * self.live.latency_s}
+
+    def numbers(self, driver: float) -> Mapping[str, Any]:
+        median, p99 = np.percentile(self.alone_us, (50, 99))
+        live = self.live.numbers()
+        cpu = {'sensor': round(100 * driver, 1), **live.pop('cpu_percent')}
+        return {
+            'in_process': {'windows': len(self.alone_us), 'median_us': float(median), 'p99_us': float(p99)},
+            'dds': live,
+            'cpu_percent': {**cpu, 'all': round(sum(cpu.values()), 1)},
+        }
+
+
+def _time(recipe: str, bags: list[Path], slides: int, folder: Path, bench: Bench) -> _Timing:
+    from texture_benchmarks.ros.live_latency import measure  # noqa: PLC0415
+
+    model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
+    cut = [list(pieces) for _, pieces in cut_slides(find_slides(bags, str(slides)), model.recipe.feature_set)]
+    # The last of each is the end of the slide, which is no window; the first pass warms up.
+    passes = [[judge(model, pieces)[2][:-1] for pieces in cut] for _ in range(1 + PASSES)]
+    alone_us = np.concatenate([taken for one in passes[1:] for taken in one])
+    live = measure(folder / f'{recipe}.skops', bench.seed, QUICK_LIVE_S if bench.quick else LIVE_S)
+    return _Timing(alone_us, live)

@@ -1,0 +1,1 @@
+"""Benchmark: classes added slide by slide."""

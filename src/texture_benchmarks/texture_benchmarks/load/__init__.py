@@ -1,0 +1,1 @@
+"""Benchmark: computing time and losses of sensor nodes."""

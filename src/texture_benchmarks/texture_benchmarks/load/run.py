@@ -1,0 +1,94 @@
+"""What the sensor nodes cost, what they lose, and how fast a device may be."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from texture_benchmarks.load.rig import Rig, fast_daq
+from texture_benchmarks.result import Bench, BenchResult
+from texture_evaluation.charts import line_chart
+
+if TYPE_CHECKING:
+    from texture_benchmarks.ros.sensor_load import Load
+
+ALONE = ('tsf85', 'tsf85_pair', 'biotac', 'daq', 'pvdf')
+TOGETHER = ('tsf85', 'biotac', 'daq', 'pvdf')
+FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # of the DAQ finger's 2.5 kHz
+QUICK_FACTORS = (1.0,)
+QUICK_S, ALONE_S, RATE_S = 2.0, 30.0, 10.0
+TARGETS = {'daq_lost': 0, 'daq_cpu_percent': 12.0, 'tsf85_cpu_percent': 12.0}
+
+
+def run(bench: Bench) -> BenchResult:
+    """Run each sensor's node alone, four at once, and one at ever higher rates."""
+    seconds = QUICK_S if bench.quick else max(QUICK_S, bench.duration_s)
+    alone_s, rate_s = min(seconds, ALONE_S), min(seconds, RATE_S)
+    alone = {name: _loads([name], alone_s)[name] for name in (('daq',) if bench.quick else ALONE)}
+    together = _loads(TOGETHER, seconds)
+    rates = [_fast(factor, rate_s) for factor in (QUICK_FACTORS if bench.quick else FACTORS)]
+    kilohertz = np.array([wanted_hz for wanted_hz, _ in rates]) / 1000
+    chart = line_chart(
+        {
+            'computing time, % of one core': (kilohertz, np.array([100 * load.cpu for _, load in rates])),
+            'samples lost, %': (kilohertz, np.array([100 * _lost_share(load) for _, load in rates])),
+        },
+        'Sensor node with 8 channels at ever higher rates (emulated DAQ finger)',
+        ('samples of each channel a second (kHz)', '%'),
+        bench.out / 'sensors-load.png',
+    )
+    return BenchResult(
+        name='sensors-load',
+        measured=(
+            f'the node `sensor` as a process of its own: each alone for {alone_s:g} s, four together for {seconds:g} '
+            f's, each other rate for {rate_s:g} s, with one subscriber. Samples and losses by its own counts, '
+            'computing time in percent of one core. '
+            'unsent_bytes: what the emulated device could not send, for the machine was busy'
+        ),
+        data='emulated devices on pseudo-terminals, fed in real time on the same machine',
+        split='none: nothing is trained',
+        numbers={
+            'targets': TARGETS,
+            'alone': _numbers(alone),
+            'together': {**_numbers(together), 'cpu_percent': sum(100 * load.cpu for load in together.values())},
+            'daq_at_rates': {f'{wanted_hz:g} Hz': _row(load) for wanted_hz, load in rates},
+            'highest_rate_without_loss_hz': max((w for w, load in rates if not load.lost), default=0.0),
+        },
+        charts=(chart,),
+    )
+
+
+def _loads(names: tuple[str, ...] | list[str], seconds: float) -> Mapping[str, Load]:
+    from texture_benchmarks.ros.sensor_load import measure  # noqa: PLC0415  # ROS is needed for this alone
+
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        rigs = {name: stack.enter_context(Rig(name, Path(folder) / name)) for name in names}
+        loads: Mapping[str, Load] = measure(rigs, {name: name for name in names}, seconds)
+        return loads
+
+
+def _fast(factor: float, seconds: float) -> tuple[float, Load]:
+    """Return the rate and the load of a DAQ finger of another rate."""
+    from texture_benchmarks.ros.sensor_load import measure  # noqa: PLC0415
+
+    with tempfile.TemporaryDirectory() as folder, fast_daq(Path(folder) / 'daq', factor) as rig:
+        return rig.case.rate_hz, measure({'daq': rig}, {'daq': 'daq'}, seconds)['daq']
+
+
+def _lost_share(load: Load) -> float:
+    return float(load.lost / max(1.0, load.lost + load.rate_hz * load.seconds))
+
+
+def _numbers(loads: Mapping[str, Load]) -> dict[str, Any]:
+    return {name: _row(load) for name, load in loads.items()}
+
+
+def _row(load: Load) -> Mapping[str, Any]:
+    values = asdict(load)
+    return {**values, 'cpu_percent': round(100 * values.pop('cpu'), 1)}

@@ -1,0 +1,1 @@
+"""Benchmark: force, speed and path by robot and surface."""

@@ -1,0 +1,142 @@
+"""Charts and tables of force control: what is kept on which surface, and where it is stable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_benchmarks.motion.trial import Trial
+from texture_core.arrays import Array
+from texture_evaluation.charts import COLOURS, chart
+
+MARKERS = 'o^vsD'
+TICKS = (0.2, 2, 20)
+
+STRAIGHT = ('linear_slide', 'in_hand_sliding')
+
+# What is drawn of each robot: motions (the first that it does), number, what it is called, in what unit times how much.
+PANELS = (
+    (STRAIGHT, 'force_rms', 'force error, rms (%)', 100),
+    (STRAIGHT, 'overshoot', 'overshoot of the force (%)', 100),
+    (('circular',), 'speed_error', 'largest speed error on the circle (%)', 100),
+    (('circular',), 'radius_error_m', 'largest error of the radius (mm)', 1000),
+)
+# The same as columns of a table.
+COLUMNS = (
+    ('force_rms', 'force error, rms (%)', 100),
+    ('overshoot', 'overshoot (%)', 100),
+    ('speed_error', 'largest speed error (%)', 100),
+    ('mean_speed_error', 'mean speed error (%)', 100),
+    ('radius_error_m', 'error of the radius (mm)', 1000),
+)
+
+
+def robot_table(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, float]) -> str:
+    """Return a Markdown table of what each robot kept; `robots` is as in the JSON of the bench."""
+    asked = [f'{times * targets[name]:g}' if name in targets else '' for name, _, times in COLUMNS]
+    rows = [
+        [robot, stiffness, motion, *(_cell(numbers.get(name), times) for name, _, times in COLUMNS)]
+        for robot, by_stiffness in robots.items()
+        for stiffness, motions in by_stiffness.items()
+        for motion, numbers in motions.items()
+    ]
+    return _table(
+        ['robot', 'stiffness', 'motion', *(title for _, title, _ in COLUMNS)],
+        [['asked: at most', '', '', *asked], *rows],
+    )
+
+
+def surface_table(surfaces: Mapping[str, Mapping[float, Trial]]) -> str:
+    """Return a Markdown table of the error of the force by surface and stiffness, in percent."""
+    stiffnesses = list(next(iter(surfaces.values())))
+    rows = [[name, *(_cell(trial.force_rms, 100) for trial in trials.values())] for name, trials in surfaces.items()]
+    return _table(['force error, rms (%)', *(f'{stiffness:.0f} N/m' for stiffness in stiffnesses)], rows)
+
+
+def robot_chart(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, float], path: str | Path) -> Path:
+    """Draw how each robot kept force, speed and circle over the stiffness; `robots` is as in the JSON of the bench."""
+    with chart(
+        path, (9.0, 6.4), 'Flat surfaces, 1 N: straight at 0.05 m/s (the hand 0.02), circle of 20 mm at 0.1 m/s'
+    ) as figure:
+        panels = list(figure.subplots(2, 2).flat)
+        for axes, (motions, number, name, times) in zip(panels, PANELS, strict=True):
+            highest = times * targets[number]
+            for (robot, by_stiffness), colour, marker in zip(robots.items(), COLOURS, MARKERS, strict=False):
+                kilo = [float(stiffness.split()[0]) / 1000 for stiffness in by_stiffness]
+                values = [times * _number(row, motions, number) for row in by_stiffness.values()]
+                axes.semilogx(kilo, values, color=colour, marker=marker, label=robot)
+                highest = max(highest, *values) if np.isfinite(values).all() else highest
+            axes.axhline(times * targets[number], color='black', linestyle='--', linewidth=1)
+            axes.set(title=name, xlabel='stiffness of the contact (kN/m)', xticks=TICKS, xticklabels=map(str, TICKS))
+            axes.set_ylim(top=1.15 * highest)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc='outside lower center', ncols=3)
+    return Path(path)
+
+
+def surface_chart(
+    surfaces: Mapping[str, Mapping[float, Trial]], targets: Mapping[str, float], path: str | Path
+) -> Path:
+    """Draw force and speed errors over stiffness, a line for each surface."""
+    with chart(path, (9.0, 4.4), 'An arm without a force mode over simulated surfaces: 1 N, 0.05 m/s') as figure:
+        force, speed = figure.subplots(1, 2)
+        for (name, trials), colour, marker in zip(surfaces.items(), COLOURS, MARKERS, strict=False):
+            kilo = np.array(list(trials)) / 1000
+            for axes, errors in (
+                (force, [trial.force_rms for trial in trials.values()]),
+                (speed, [trial.speed_error for trial in trials.values()]),
+            ):
+                axes.semilogx(kilo, 100 * np.array(errors), color=colour, marker=marker, markersize=4, label=name)
+        for axes, number, title in (
+            (force, 'force_rms', 'force error, rms (%)'),
+            (speed, 'speed_error', 'largest speed error in space (%)'),
+        ):
+            axes.axhline(100 * targets[number], color='black', linestyle='--', linewidth=1)
+            axes.set(title=title, xlabel='stiffness of the contact (kN/m)', ylim=(0, None))
+            axes.set(xticks=TICKS, xticklabels=map(str, TICKS))
+        force.legend(loc='best')
+    return Path(path)
+
+
+def border_chart(border: Mapping[str, Array], chosen: Array, path: str | Path) -> Path:
+    """Draw the gain from which the loop is unstable over its delay, predicted and simulated, and the chosen gains.
+
+    Parameters
+    ----------
+    border
+        See `texture_exploration.stability.stability_chart`.
+    chosen : (n_stiffnesses, n_delays)
+        Gains in m/s/N.
+    """
+    with chart(path, (8.0, 5.0)) as figure:
+        axes = figure.subplots()
+        delay_ms = 1000 * border['delay_s']
+        rows = zip(border['stiffness_n_m'], border['predicted'], border['simulated'], chosen, COLOURS, strict=False)
+        for stiffness, predicted, simulated, gains, colour in rows:
+            axes.semilogy(delay_ms, predicted, color=colour, label=f'{stiffness / 1000:g} kN/m')
+            axes.semilogy(delay_ms, simulated, '.', color=colour)
+            axes.semilogy(delay_ms, gains, ':', color=colour)
+        axes.set(
+            xlabel='delay of the loop (ms)',
+            ylabel='gain (m/s per N)',
+            title='Force control at 250 Hz is unstable above the lines: eigenvalues (lines), simulation (dots)\n'
+            'The gains that are chosen by themselves are dotted',
+        )
+        axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), title='stiffness')
+    return Path(path)
+
+
+def _number(row: Mapping[str, Mapping[str, float]], motions: Sequence[str], number: str) -> float:
+    """Return a number of the first of the motions that a robot does, NaN if it does none."""
+    return next((row[motion].get(number, np.nan) for motion in motions if motion in row), np.nan)
+
+
+def _cell(value: float | None, times: float) -> str:
+    return '' if value is None else f'{times * value:.2f}'
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ['---'] * len(head), *rows]
+    return ''.join(f'| {" | ".join(cells)} |\n' for cells in lines)

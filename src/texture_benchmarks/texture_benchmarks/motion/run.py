@@ -1,0 +1,146 @@
+"""How well force, speed and circle are kept, by which robot on which surface; and where force control is stable."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from texture_benchmarks.motion.chart import border_chart, robot_chart, robot_table, surface_chart, surface_table
+from texture_benchmarks.motion.robot_trials import ROBOTS, typical_trial
+from texture_benchmarks.motion.trial import ARM, CIRCLE, SLIDE, SURFACES, Trial, slide_trial, surface_trials
+from texture_benchmarks.result import Bench, BenchResult
+from texture_core.arrays import Array
+from texture_exploration.arms.simulated import RATE_HZ, SimulatedArmParams
+from texture_exploration.force_control import ForceController, ForceLoopParams
+from texture_exploration.stability import Loop, border_gain, stability_chart
+
+STIFFNESSES_N_M = (200.0, 2000.0, 20000.0)
+FINE_STIFFNESSES_N_M = tuple(float(k) for k in np.geomspace(200.0, 20000.0, 9))
+BORDER_STIFFNESSES_N_M = (100.0, 1e3, 1e4, 1e5)
+DELAYS_S = tuple(float(delay) for delay in np.linspace(0.0, 0.02, 21))
+QUICK_DELAYS_S = (0.0, 0.008, 0.02)
+QUICK_ROBOTS = ('emulated rails',)
+SPEEDS_M_S = (0.1, 0.07, 0.05, 0.035, 0.025, 0.018, 0.0125, 0.01, 0.007, 0.005)
+REPEATS = 3  # of the emulated robots
+SIMULATED: Mapping[str, SimulatedArmParams] = {
+    'simulated, force mode': replace(ARM, force_mode=True),
+    'simulated, velocities only': ARM,
+}
+TARGETS = {
+    'force_rms': 0.05,
+    'overshoot': 0.2,
+    'speed_error': 0.02,
+    'radius_error_m': 0.001,
+    'border_error': 0.1,
+    'margin': 2.0,
+}
+
+
+def run(bench: Bench) -> BenchResult:
+    """Slide straight and in a circle with every robot, over every surface; draw the border of stability."""
+    stiffnesses = STIFFNESSES_N_M[1:2] if bench.quick else STIFFNESSES_N_M
+    fine = STIFFNESSES_N_M if bench.quick else FINE_STIFFNESSES_N_M
+    surfaces = surface_trials(fine)
+    border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if bench.quick else DELAYS_S, _controller)
+    robots = {name: _simulated(arm, stiffnesses) for name, arm in SIMULATED.items()}
+    here = [name for name, robot in ROBOTS.items() if importlib.util.find_spec(robot.needs)]
+    for name in QUICK_ROBOTS if bench.quick else here:
+        robots[name] = _emulated(name, stiffnesses, 1 if bench.quick else REPEATS)
+    bench.out.mkdir(parents=True, exist_ok=True)
+    table = bench.out / 'motion.md'
+    table.write_text(robot_table(robots, TARGETS) + '\n' + surface_table(surfaces), encoding='utf-8')
+    return BenchResult(
+        name='motion',
+        measured=(
+            'one slide of 60 mm at 0.05 m/s and one of two turns at 0.1 m/s on a circle of 20 mm, with 1 N, for each '
+            'robot and stiffness; in the hand strokes of 20 mm at 0.02 m/s. Shares of what was asked for: overshoot '
+            'until the slide begins, force error (root mean square), largest and mean speed error of the slide; '
+            f'largest distance from the circle. Of emulated robots the median of {REPEATS} slides'
+        ),
+        data='simulated surfaces; the emulated robots in real time, on the same machine',
+        split='none: nothing is trained; the force loop was designed on these surfaces',
+        numbers={
+            'targets': TARGETS,
+            'robots': robots,
+            'surfaces_velocities_only': {name: _rows(trials) for name, trials in surfaces.items()},
+            'bump_speed_m_s': {_newtons(k): _bump_speed_m_s(k) for k in stiffnesses},
+            'border_error': float(np.abs(border['simulated'] / border['predicted'] - 1).max()),
+            'margin': _margins(),
+        },
+        charts=(
+            robot_chart(robots, TARGETS, bench.out / 'motion_robots.png'),
+            surface_chart(surfaces, TARGETS, bench.out / 'motion_surfaces.png'),
+            border_chart(border, _defaults(border), bench.out / 'motion_stability.png'),
+        ),
+    )
+
+
+def _controller(loop: Loop) -> ForceController:
+    return ForceController(loop.gain_m_s_n, loop.integral_s)
+
+
+def _simulated(arm: SimulatedArmParams, stiffnesses: Sequence[float]) -> dict[str, Any]:
+    arms = {k: replace(arm, stiffness_n_m=k) for k in stiffnesses}
+    return {
+        _newtons(k): {request.motion: _row(slide_trial(at, request)) for request in (SLIDE, CIRCLE)}
+        for k, at in arms.items()
+    }
+
+
+def _emulated(name: str, stiffnesses: Sequence[float], repeats: int) -> dict[str, Any]:
+    requests = ROBOTS[name].requests
+    return {
+        _newtons(k): {request.motion: _row(typical_trial(name, k, request, repeats)) for request in requests}
+        for k in stiffnesses
+    }
+
+
+def _rows(trials: Mapping[float, Trial]) -> dict[str, Any]:
+    return {_newtons(stiffness): _row(trial) for stiffness, trial in trials.items()}
+
+
+def _row(trial: Trial) -> dict[str, Any]:
+    """Return the numbers of a trial; what there is none of is left out, as is the message of a success."""
+    numbers = {name: value for name, value in asdict(trial).items() if isinstance(value, float) and isfinite(value)}
+    return {'success': trial.success, **numbers, **({} if trial.success else {'message': trial.message})}
+
+
+def _newtons(stiffness_n_m: float) -> str:
+    return f'{stiffness_n_m:.0f} N/m'
+
+
+def _bump_speed_m_s(stiffness_n_m: float) -> float:
+    """Return the highest of `SPEEDS_M_S` at which a bump of 2 mm is followed as well as asked, without a force mode."""
+    arm = replace(ARM, stiffness_n_m=stiffness_n_m, **SURFACES['bump of 2 mm'])
+    fits = (v for v in SPEEDS_M_S if slide_trial(arm, replace(SLIDE, speed_m_s=v)).force_rms <= TARGETS['force_rms'])
+    return next(fits, 0.0)
+
+
+def _defaults(border: Mapping[str, Array]) -> Array:
+    """Return the gains that are chosen for the stiffnesses and delays of a chart, (s, d)."""
+    return np.array(
+        [
+            [ForceLoopParams(loop_delay_s=delay).best_gain(stiffness, 1 / RATE_HZ) for delay in border['delay_s']]
+            for stiffness in border['stiffness_n_m']
+        ]
+    )
+
+
+def _margins() -> dict[str, float]:
+    """Return how many times stiffer, and later, the contact may be than expected before the chosen gain is unstable."""
+    params, period_s = ForceLoopParams(), 1 / RATE_HZ
+    gain = params.best_gain(params.stiffest_n_m, period_s)
+    delays = np.linspace(1.0, 20.0, 191)
+    late = [
+        border_gain(replace(params.loop(params.stiffest_n_m, period_s), delay_s=float(f) * params.loop_delay_s)) > gain
+        for f in delays
+    ]
+    return {
+        'stiffness': border_gain(params.loop(params.stiffest_n_m, period_s)) / gain,
+        'delay': float(delays[np.argmin(late)]),
+    }

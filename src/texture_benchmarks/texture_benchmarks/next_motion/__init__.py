@@ -1,0 +1,1 @@
+"""Benchmark: choice of the next exploration."""

@@ -1,0 +1,147 @@
+"""Slides over simulated textures with several motions, and how soon different choices of motions recognise them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.arrays import AnyArray, Array
+from texture_core.catalogue import find
+from texture_core.motion import Motion
+from texture_core.window import Window
+from texture_estimation.log_probabilities import log_softmax
+from texture_estimation.next_motion.choice import Explorations
+from texture_features.feature_set import FeatureSet
+from texture_features.windowing.windows import CutWindow
+from texture_simulation.scans import scans
+from texture_simulation.scene import Scene
+from texture_simulation.sensors.catalogue import SENSORS
+from texture_simulation.sliding import Sliding
+
+# Chooses a motion, by the log-posterior and the number of the slide.
+Choose = Callable[[Array, int], Motion]
+PLANNED, SIMULATED = 8, 20  # slides that are planned, and simulated trials of each texture by which they are
+
+
+def _informed(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    return lambda posterior, slide: known.best(posterior, motions).motion
+
+
+def _planned(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    """The order that tells most on average, found on simulated trials: whatever is felt, it is kept."""
+    truth = np.repeat(np.arange(len(known.textures)), SIMULATED)
+    posteriors = np.tile(known.ignorance, (len(truth), 1))
+    order: list[Motion] = []
+    for _ in range(PLANNED):
+        told = {motion: sum(known.information(own, motion) for own in posteriors) for motion in motions}
+        order.append(max(motions, key=told.__getitem__))
+        felt = known.felt[order[-1]]
+        places = felt.means[truth] + rng.standard_normal((len(truth), felt.means.shape[1]))
+        posteriors = log_softmax(posteriors + felt.log_likelihoods(places))
+    return lambda posterior, slide: order[slide % PLANNED]
+
+
+def _in_order(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    return lambda posterior, slide: motions[slide % len(motions)]
+
+
+def _by_direction(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    ordered = sorted(motions, key=lambda motion: motion.direction_rad)
+    return lambda posterior, slide: ordered[slide % len(ordered)]
+
+
+def _at_random(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+    return lambda posterior, slide: motions[int(rng.integers(len(motions)))]
+
+
+CHOICES: Mapping[str, Callable[[Explorations, Sequence[Motion], np.random.Generator], Choose]] = {
+    'informed': _informed,
+    'fixed order, planned': _planned,
+    'fixed order, turning first': _in_order,  # the order of the motions
+    'fixed order, turning last': _by_direction,  # every speed and force in one direction, then the next
+    'random': _at_random,
+}
+
+
+def described(
+    scene: Scene, motions: Sequence[Motion], count: int, features: FeatureSet, rng: np.random.Generator
+) -> Array:
+    """Return the features of slides, each one window long: (n_motions, n_textures, count, n_features)."""
+    return np.stack(
+        [
+            np.stack([_values(scene, texture, motion, count, features=features, rng=rng) for texture in scene.surfaces])
+            for motion in motions
+        ]
+    )
+
+
+def learnt(scene: Scene, motions: Sequence[Motion], values: Array) -> Explorations:
+    """Learn from what `described` gave; the textures keep the order of their names."""
+    n_motions, n_textures, count, n_features = values.shape
+    return Explorations.learnt(
+        values.reshape(-1, n_features),
+        np.tile(np.repeat(list(scene.surfaces), count), n_motions).tolist(),
+        [motion for motion in motions for _ in range(n_textures * count)],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """Whether the most probable texture is right, and its probability, after each slide: (n_trials, n_slides)."""
+
+    right: AnyArray
+    probability: Array
+
+    def until(self, sure: float) -> tuple[float, float]:
+        """Return the mean number of slides until a probability, or all, and the share of trials that are right then."""
+        over = self.probability >= sure
+        over[:, -1] = True
+        ends = over.argmax(axis=1)
+        return float(ends.mean()) + 1.0, float(self.right[np.arange(len(ends)), ends].mean())
+
+
+def explored(
+    scene: Scene, known: Explorations, motions: Sequence[Motion], values: Array, *, choose: Choose, n_slides: int
+) -> Trials:
+    """Explore each texture in trials of several slides.
+
+    Parameters
+    ----------
+    scene, known, motions
+        What is explored, what is known of it, and what may be done.
+    values : (n_motions, n_textures, n_trials * n_slides, n_features)
+        Test slides: a trial over a texture has `n_slides` of its own for each motion, the same for any choice.
+    choose
+        Which motion is next.
+    """
+    places = {motion: number for number, motion in enumerate(motions)}
+    right, probability = [], []
+    for number, texture in enumerate(scene.surfaces):
+        truth = known.textures.index(texture)
+        for first in range(0, values.shape[2] - n_slides + 1, n_slides):
+            posteriors = [known.ignorance]
+            for slide in range(n_slides):
+                motion = choose(posteriors[-1], slide)
+                posteriors.append(known.update(posteriors[-1], motion, values[places[motion], number, first + slide]))
+            right.append([int(posterior.argmax()) == truth for posterior in posteriors[1:]])
+            probability.append([float(np.exp(posterior.max())) for posterior in posteriors[1:]])
+    return Trials(np.array(right), np.array(probability))
+
+
+def _values(
+    scene: Scene, texture: str, motion: Motion, count: int, *, features: FeatureSet, rng: np.random.Generator
+) -> Array:
+    """Return the features of slides over one texture with one motion, (count, n_features)."""
+    sliding = Sliding(motion.speed_m_s, motion.force_n, motion.duration_s, motion.direction_rad)
+    pieces = _pieces(scene, motion, scans(scene, texture, count, sliding, rng))
+    return np.stack([vector.values for vector in features.describe_many(pieces)])
+
+
+def _pieces(scene: Scene, motion: Motion, samples: Array) -> Iterator[CutWindow]:
+    stream = find(SENSORS, scene.sensor, 'sensor model').fast
+    speed, force, length = motion.speed_m_s, motion.force_n, motion.duration_s
+    for number, felt in enumerate(samples):
+        window = Window(felt.astype(np.float64), stream.rate_hz, stream.channels, 0, speed, force)
+        yield CutWindow(0, str(number), length, length, {'signal': window}, speed, force, '')

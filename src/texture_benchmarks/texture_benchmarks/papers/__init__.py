@@ -1,0 +1,33 @@
+"""The papers' experiments by name, rebuilt on simulated surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+
+from texture_benchmarks.papers import ets_circular, ets_fine, ets_linear, hu, jamali, kaboli, roughness
+from texture_benchmarks.papers.experiment import Experiment, ExperimentResult, Run
+from texture_benchmarks.papers.report import run
+from texture_core.catalogue import find
+
+PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fine, jamali, kaboli, hu))
+
+EXPERIMENTS: Mapping[str, Run] = {
+    **{protocol.name: partial(run, protocol) for protocol in PROTOCOLS},
+    'roughness': roughness.run,  # Rispal et al.: grades of textures never felt
+}
+
+__all__ = ['EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment']
+
+
+def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
+    """Run one experiment; return its result and the JSON file, beside which its charts lie.
+
+    Raises
+    ------
+    TextureError
+        If there is no such experiment or it cannot be run.
+    """
+    result = find(EXPERIMENTS, name, 'experiment')(experiment)
+    return result, result.write(experiment.out)

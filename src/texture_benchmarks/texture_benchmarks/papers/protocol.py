@@ -1,0 +1,265 @@
+"""What a paper's experiment was: how each surface was touched, what judged it, how it was tested, what came out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_benchmarks.papers.interval import Interval
+from texture_benchmarks.papers.outcome import Outcome
+from texture_estimation.learners.learner import Codes
+from texture_estimation.search.halves import random_halves
+from texture_features.windowing.windows import WindowParams
+from texture_simulation.sliding import Sliding
+
+Mask = NDArray[np.bool_]
+# (surface and condition of each slide, randomness, whether to hurry) -> which slides are learnt from, by division
+Divide = Callable[[Codes, NDArray[np.str_], np.random.Generator, bool], Mask]
+Table = Sequence[Sequence[float]]
+
+
+@dataclass(frozen=True)
+class View:
+    """One of the ways in which a trial feels a surface; the features of all views of a trial are joined."""
+
+    finger: int = 0
+    turned_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Visits:
+    """Trials that are alike, over each surface.
+
+    Parameters
+    ----------
+    condition
+        What they have in common, in words.
+    count
+        How many over each surface.
+    sliding
+        How the finger goes.
+    views
+        What a trial consists of.
+    """
+
+    condition: str
+    count: int
+    sliding: Sliding
+    views: tuple[View, ...] = (View(),)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a paper tells of a method, as shares; None if it does not."""
+
+    learning: float | None = None
+    test: float | None = None
+    unclassified: float | None = None  # of the test slides
+
+
+@dataclass(frozen=True)
+class Method:
+    """A recipe on trial.
+
+    Parameters
+    ----------
+    recipe
+        Its name.
+    paper
+        What the paper got with it.
+    windows
+        How slides are cut, learnt from and judged; None: as the recipe says.
+    learner
+        Parameters of the learner that this experiment changes.
+    features
+        Parameters of features, by the feature's name, that it changes.
+    stretch_to_m_s, also
+        Speed to which the vibration is stretched, and features of it beside those of the recipe.
+    label
+        Name in the table; '' for that of the recipe.
+    views
+        Which views of a slide it is given; () for all.
+    singly
+        Whether the windows are dealt out to learn from one by one, half of them, instead of slide by slide: all slides
+        are then tested though parts of each are learnt. A fault on trial, to see what it would give.
+    divisions
+        It is tried on so many of the divisions; 0 for all.
+    confusion : (n_surfaces, n_surfaces) or (n_surfaces, n_surfaces + 1)
+        The paper's table; the last column, if there is one more, counts what is unclassified.
+    """
+
+    recipe: str
+    paper: Figures = Figures()
+    windows: WindowParams | None = None
+    learner: Mapping[str, Any] = field(default_factory=dict)
+    features: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    stretch_to_m_s: float = 0.0
+    also: tuple[str, ...] = ()
+    label: str = ''
+    views: tuple[int, ...] = ()
+    singly: bool = False
+    divisions: int = 0
+    confusion: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """Name in the table."""
+        return self.label or self.recipe
+
+
+# Decisions do not depend on the calibration, which takes most of the time: two parts will do.
+OURS = Method('default', learner={'folds': 2})
+FEW = 5  # divisions: enough for a method that stands beside the paper's, where it takes long
+
+
+@dataclass(frozen=True)
+class Task:
+    """Surfaces to tell apart, how they are touched, and what tries to.
+
+    Parameters
+    ----------
+    name
+        In a few words.
+    visits
+        How each surface is touched.
+    methods
+        What tries to tell them apart.
+    surfaces
+        Names; () for all of the scene.
+    """
+
+    name: str
+    visits: tuple[Visits, ...]
+    methods: tuple[Method, ...]
+    surfaces: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something a paper found, and whether it is found here.
+
+    Parameters
+    ----------
+    claim
+        In the paper's sense.
+    here
+        What was measured here, in words and numbers.
+    interval
+        What decides, with 95 %.
+    holds
+        None if the interval does not decide.
+    """
+
+    claim: str
+    here: str
+    interval: Interval
+    holds: bool | None
+
+
+Outcomes = Mapping[tuple[str, str], Outcome]  # (task, method) -> what came out
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """The one stated figure by which the difficulty of a scene is set: so many test slides are right by this method.
+
+    Parameters
+    ----------
+    knob
+        What of the scene was set by it.
+    experiment
+        Whose figure it is, if not of the same experiment.
+    shortfall
+        Why the figure could not be met; '' if it was.
+    """
+
+    task: str
+    method: str
+    test: float
+    source: str
+    knob: str = 'noise of the fast channels'
+    experiment: str = ''
+    shortfall: str = ''
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """A paper's experiment.
+
+    Parameters
+    ----------
+    name, scene
+        Of the experiment and of what is touched.
+    paper
+        Who did it.
+    tasks
+        What was to be told apart, by what.
+    divide, split
+        Which slides are learnt from, and that in words.
+    anchor
+        What the scene's noise was set by.
+    findings
+        Checks what the paper found.
+    quick_count
+        Trials over each surface, instead of those of each of the visits, for tests.
+    """
+
+    name: str
+    scene: str
+    paper: str
+    tasks: tuple[Task, ...]
+    divide: Divide
+    split: str
+    anchor: Anchor
+    findings: Callable[[Outcomes], Sequence[Finding]]
+    quick_count: int = 8
+
+
+def halves(count: int) -> Divide:
+    """Return what draws random halves, each surface halved."""
+
+    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
+        return random_halves(codes, np.arange(len(codes)), 2 if quick else count, rng)
+
+    return divide
+
+
+def folds(count: int, repeats: int) -> Divide:
+    """Return what holds out each part of the slides in turn, each surface dealt out at random, several times."""
+
+    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
+        learnt = []
+        for _ in range(1 if quick else repeats):
+            part = np.empty(len(codes), dtype=np.intp)
+            for code in np.unique(codes):
+                rows = np.flatnonzero(codes == code)
+                part[rows] = rng.permutation(len(rows)) % count
+            learnt += [part != held for held in range(2 if quick else count)]
+        return np.stack(learnt)
+
+    return divide
+
+
+def drawn(share: float, count: int) -> Divide:
+    """Return what draws so large a share of all slides to learn from, whatever their surface."""
+
+    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
+        ranks = np.stack([rng.permutation(len(codes)) for _ in range(2 if quick else count)])
+        learnt: Mask = ranks < round(share * len(codes))
+        return learnt
+
+    return divide
+
+
+def learnt_in(condition: str) -> Divide:
+    """Return what learns from the slides of one condition and tests on all others."""
+
+    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
+        learnt: Mask = (conditions == condition)[None, :]
+        return learnt
+
+    return divide

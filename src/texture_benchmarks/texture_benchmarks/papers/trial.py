@@ -1,0 +1,168 @@
+"""Run a protocol: feel the slides, search for parameters if wanted, learn from some slides, judge the others."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from texture_benchmarks.papers.gather import Slides, gather
+from texture_benchmarks.papers.outcome import Outcome
+from texture_benchmarks.papers.protocol import Mask, Method, Outcomes, Protocol, Task
+from texture_benchmarks.papers.tuning import Tuned, tune
+from texture_core.errors import InvalidParameter
+from texture_estimation.learners.learner import Codes
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.search.fitness import decided_by_slide
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.telling_apart import TellingApart
+from texture_evaluation.optimise import OF_RECIPES
+from texture_features.feature_set import InputFeatures
+from texture_features.windowing.stretch import Stretched
+from texture_simulation.scene import Scene
+
+FAST, SLOW = 'signal', 'signal_static'
+TunedRecipes = Mapping[tuple[str, str], Tuned[Recipe]]  # by task and recipe
+NONE: TunedRecipes = {}
+
+
+def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE) -> Outcomes:
+    """Return what comes out of each method in each task."""
+    return {
+        (task.name, method): outcome
+        for task in protocol.tasks
+        for method, outcome in of_task(protocol, task, scene, seed, quick=quick, tuned=tuned)
+    }
+
+
+def of_task(
+    protocol: Protocol, task: Task, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE
+) -> Iterator[tuple[str, Outcome]]:
+    """Yield what comes out of each method in one task.
+
+    One with a recipe that was searched for is tried on the first division alone: in the others it would be tested on
+    slides that the search has seen.
+    """
+    slides, learnt = _felt(protocol, task, scene, seed, quick=quick)
+    for method in task.methods:
+        found = tuned.get((task.name, method.recipe))
+        recipe = found.recipe if found else recipe_of(method)
+        divisions = learnt[:1] if found else learnt[: method.divisions or None]
+        yield method.name, judge(recipe, slides, divisions, method.views, singly=method.singly)
+
+
+def searched(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> TunedRecipes:
+    """Return the recipes for which the paper has a genetic search, found on what the first division learns from.
+
+    Raises
+    ------
+    InvalidParameter
+        If the paper searches for none.
+    """
+    methods = {
+        (task.name, method.recipe): (task, method)
+        for task in protocol.tasks
+        for method in reversed(task.methods)  # of several with one recipe, the first
+        if method.recipe in OF_RECIPES
+    }
+    if not methods:
+        raise InvalidParameter(
+            f"experiment '{protocol.name}' has nothing to tune: its paper searches for no parameters; leave --tune out"
+        )
+    found = {}
+    for key, (task, method) in methods.items():
+        slides, learnt = _felt(protocol, task, scene, seed, quick=quick)
+        space = RecipeSpace.load(OF_RECIPES[method.recipe], recipe_of(method))
+        found[key] = tune(space, slides.views[0].of(learnt[0]), TellingApart(), seed, quick=quick)
+    return found
+
+
+def _felt(protocol: Protocol, task: Task, scene: Scene, seed: int, *, quick: bool) -> tuple[Slides, Mask]:
+    """Return the slides of a task, and which of them each division learns from."""
+    task = reduced(task, protocol.quick_count) if quick else task
+    slow = any(SLOW in recipe_of(method).feature_set.topics for method in task.methods)
+    slides = gather(scene, task, seed, slow=slow)
+    return slides, protocol.divide(slides.codes, slides.conditions, np.random.default_rng(seed), quick)
+
+
+def recipe_of(method: Method) -> Recipe:
+    """Return the recipe as the protocol asks for it."""
+    recipe = load_recipe(method.recipe)
+    if method.stretch_to_m_s or method.also:
+        recipe = _with_motion(recipe, method)
+    windows = method.windows or recipe.feature_set.windows
+    inputs = tuple(_changed(item, method.features) for item in recipe.feature_set.inputs)
+    learner: Any = recipe.learner
+    return replace(
+        recipe,
+        feature_set=replace(recipe.feature_set, windows=windows, inputs=inputs, _layouts={}),
+        learner=replace(learner, **method.learner),
+        training=replace(recipe.training, hop_s=method.windows.hop_s) if method.windows else recipe.training,
+    )
+
+
+def _with_motion(recipe: Recipe, method: Method) -> Recipe:
+    content = recipe.as_mapping()
+    vibration = content['inputs'][FAST]
+    features = [*vibration['features'], *method.also]
+    content['inputs'][FAST] = {'stretch_to_m_s': method.stretch_to_m_s, 'features': features}
+    return Recipe.from_mapping(content, recipe.name)
+
+
+def _changed(item: InputFeatures, parameters: Mapping[str, Mapping[str, Any]]) -> InputFeatures:
+    features: list[tuple[str, Any]] = list(item.features)
+    changed = tuple((name, _with_parameters(feature, parameters.get(name, {}))) for name, feature in features)
+    return replace(item, features=changed)
+
+
+def _with_parameters(feature: Any, parameters: Mapping[str, Any]) -> Any:
+    if isinstance(feature, Stretched):
+        return replace(feature, feature=_with_parameters(feature.feature, parameters))
+    return replace(feature, **parameters)
+
+
+def judge(recipe: Recipe, slides: Slides, learnt: Mask, views: Sequence[int] = (), *, singly: bool = False) -> Outcome:
+    """Learn from the slides of each division and judge all.
+
+    Parameters
+    ----------
+    recipe
+        What learns and judges.
+    slides
+        What was felt.
+    learnt : (n_divisions, n_slides)
+        Which are learnt from.
+    views
+        Which views of the slides are used; () for all.
+    singly
+        See `Method`.
+    """
+    to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+    taught, owner = slides.describe(to_learn, views)
+    asked, slide = slides.describe(recipe.feature_set, views)
+    windows = recipe.feature_set.windows
+    decided = np.empty(learnt.shape, dtype=np.intp)
+    rows_of = _halves_of_windows(owner, len(learnt)) if singly else learnt[:, owner]
+    began = time.perf_counter()
+    for number, rows in enumerate(rows_of):
+        fitted = recipe.learner.fit(taught[rows], slides.codes[owner[rows]], owner[rows])
+        scores = recipe.learner.array_form(fitted.parts)(asked)
+        decided[number], _ = decided_by_slide(scores, slide, recipe.evidence, windows.hop_s / windows.length_s)
+    taken_s = (time.perf_counter() - began) / len(learnt)
+    known = np.zeros_like(learnt) if singly else learnt
+    return Outcome(slides.surfaces, slides.codes, slides.conditions, decided, known, taken_s, fitted.note)
+
+
+def _halves_of_windows(owner: Codes, count: int) -> Mask:
+    rng = np.random.default_rng(count)
+    return np.stack([rng.permutation(len(owner)) < len(owner) // 2 for _ in range(count)])
+
+
+def reduced(task: Task, count: int) -> Task:
+    """Return the task with fewer slides: so many over each surface, as equally as may be among the visits."""
+    each = max(1, count // len(task.visits))
+    visits = tuple(replace(visit, count=min(visit.count, each)) for visit in task.visits)
+    return replace(task, visits=visits)

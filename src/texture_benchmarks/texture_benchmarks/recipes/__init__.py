@@ -1,0 +1,1 @@
+"""Benchmark: all recipes side by side."""

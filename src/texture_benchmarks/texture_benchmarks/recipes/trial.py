@@ -1,0 +1,293 @@
+"""Recipes side by side on the same recorded slides: cut, described, learnt and judged by the code of the robot."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.signal import resample_poly
+
+from texture_core.errors import InvalidData
+from texture_core.exploration import ExplorationState
+from texture_core.features import FeatureVector
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_estimation.classification.training import train
+from texture_estimation.evidence import Evidence
+from texture_estimation.model import Model
+from texture_estimation.recipe import Recipe
+from texture_evaluation import metrics
+from texture_evaluation.evaluate import judge
+from texture_evaluation.metrics import SlideResult
+from texture_features.feature import Feature
+from texture_features.feature_set import InputFeatures
+from texture_features.features.force import Force
+from texture_features.features.log_spectrum import LogSpectrum
+from texture_features.features.speed import Speed
+from texture_features.labelled_features import LabelledFeatures
+from texture_features.windowing.stretch import Stretched
+from texture_features.windowing.windows import Piece, WindowParams, cut_recording
+from texture_recordings.slides import STREAMS, Slide, find_slides, read_slides
+
+# Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and learns from
+# windows this far apart.
+LENGTH_S = 0.5
+TIMED_SLIDES = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """One slide in memory."""
+
+    slide: Slide
+    signals: Mapping[str, Sequence[TactileSignal]]
+    states: Sequence[ExplorationState]
+    _cut: dict[tuple[WindowParams, tuple[str, ...]], list[Piece]] = dataclasses.field(
+        default_factory=dict, init=False, repr=False
+    )
+
+    def at_rate(self, topic: str, rate_hz: float) -> Recorded:
+        """Return the slide with one topic brought to another rate, stretch by stretch between losses."""
+        return dataclasses.replace(self, signals={topic: _at_rate(self.signals[topic], rate_hz)})
+
+    def cut(self, recipe: Recipe) -> list[Piece]:
+        """Return the windows that a recipe asks for, and the end."""
+        features = recipe.feature_set
+        missing = [topic for topic in features.topics if topic not in self.signals]
+        if missing:
+            raise InvalidData(f"slide '{self.slide.name}' has no '{missing[0]}', which recipe '{recipe.name}' needs")
+        asked = features.windows, features.topics
+        if asked not in self._cut:
+            used = {topic: self.signals[topic] for topic in features.topics}
+            self._cut.clear()  # the last ones alone: those of all recipes would fill the memory
+            self._cut[asked] = list(cut_recording(used, self.states, features.windows))
+        return self._cut[asked]
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """How a recipe did on slides it had not seen, over all the divisions tried.
+
+    Parameters
+    ----------
+    results
+        What was said of each slide when it was not learnt from.
+    train_s
+        Computing time of each training, from described windows to a model.
+    model
+        Of the last division.
+    """
+
+    results: Sequence[SlideResult]
+    train_s: Sequence[float]
+    model: Model
+
+    def numbers(self) -> dict[str, Any]:
+        """Return the figures of one cell of the table."""
+        return {
+            'window_accuracy': metrics.window_accuracy(self.results),
+            'accuracy_at_s': metrics.accuracy_at_times(self.results),
+            'accuracy_at_end': metrics.accuracy_at_end(self.results),
+            'unclassified_windows': metrics.unclassified_windows(self.results),
+            'unclassified_at_s': metrics.unclassified_at_times(self.results),
+            'train_s': round(float(np.mean(self.train_s)), 2),
+        }
+
+
+Described = Mapping[Slide, Sequence[FeatureVector]]
+Division = tuple[frozenset[str], frozenset[str]]  # names of the slides learnt from, and tested on
+
+
+def read_recorded(bags: Iterable[str | Path], streams: Sequence[str] = STREAMS) -> list[Recorded]:
+    """Return the labelled slides of bags with all messages of some streams."""
+    return [_recorded(*read) for read in read_slides(find_slides(bags), streams)]
+
+
+def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: float | None = None) -> Recipe:
+    """Return a recipe with windows as all others have them.
+
+    Parameters
+    ----------
+    recipe
+        Windows of LENGTH_S or more become LENGTH_S long and do not overlap; shorter ones are left as they are.
+    rate_hz
+        Of the signal: a longer power spectrum than a window has points is not asked for.
+    of_motion
+        Whether speed and force may be used. Where they belong to the recording session, they betray the surface.
+    length_s
+        Of all windows, if given; they begin so far apart, or LENGTH_S if they are longer.
+    """
+    windows = recipe.feature_set.windows
+    if length_s is not None:
+        windows = dataclasses.replace(windows, length_s=length_s, hop_s=min(length_s, LENGTH_S))
+    elif windows.length_s >= LENGTH_S:
+        windows = dataclasses.replace(windows, length_s=LENGTH_S, hop_s=LENGTH_S)
+    inputs = (_adapted(item, round(windows.length_s * rate_hz), of_motion) for item in recipe.feature_set.inputs)
+    inputs = (item for item in inputs if item.features)
+    feature_set = dataclasses.replace(recipe.feature_set, windows=windows, inputs=tuple(inputs), _layouts={})
+    return dataclasses.replace(recipe, feature_set=feature_set)
+
+
+def every(hop_s: float, recipe: Recipe) -> Recipe:
+    """Return a recipe whose windows begin so far apart."""
+    windows = dataclasses.replace(recipe.feature_set.windows, hop_s=hop_s)
+    feature_set = dataclasses.replace(recipe.feature_set, windows=windows, _layouts={})
+    return dataclasses.replace(recipe, feature_set=feature_set)
+
+
+def try_recipe(recipe: Recipe, recorded: Sequence[Recorded], divisions: Sequence[Division]) -> Outcome:
+    """Train and test a recipe on each division of the slides."""
+    return try_described(recipe, describe_all(recipe, recorded), divisions)
+
+
+def describe_all(recipe: Recipe, recorded: Sequence[Recorded]) -> Described:
+    """Return the features of all windows of all slides."""
+    return {item.slide: describe(recipe, item) for item in recorded}
+
+
+def try_described(
+    recipe: Recipe,
+    described: Described,
+    divisions: Sequence[Division],
+    lessons: Described | None = None,
+    apart_s: float = LENGTH_S,
+) -> Outcome:
+    """Train and test a recipe on each division of slides that it has described.
+
+    Parameters
+    ----------
+    recipe, described, divisions
+        What to learn, from which slides, and which to test it on.
+    lessons
+        The same slides in the windows to learn from, where these are others than those to test.
+    apart_s
+        How far apart the windows learnt from begin at least.
+    """
+    results: list[SlideResult] = []
+    taken: list[float] = []
+    for learnt, tested in divisions:
+        windows = (described if lessons is None else lessons).items()
+        examples = examples_of({slide: vectors for slide, vectors in windows if slide.name in learnt}, apart_s)
+        start = time.process_time()
+        model = train(recipe, examples)
+        taken.append(time.process_time() - start)
+        results += [_judged(model, slide, vectors) for slide, vectors in described.items() if slide.name in tested]
+    return Outcome([result for result in results if result.estimates], taken, model)
+
+
+def describe(recipe: Recipe, item: Recorded) -> list[FeatureVector]:
+    """Return the features of all windows of a slide, named after it."""
+    vectors = recipe.feature_set.describe_many(item.cut(recipe))
+    return [dataclasses.replace(vector, exploration_id=item.slide.name) for vector in vectors if not vector.last]
+
+
+def examples_of(described: Described, apart_s: float = LENGTH_S) -> LabelledFeatures:
+    """Return windows that begin at least so far apart, of all slides."""
+    chosen = [vector for vectors in described.values() for vector in _apart(vectors, apart_s)]
+    if not chosen:
+        raise InvalidData('no slide to learn from has a whole window; record longer slides')
+    examples = LabelledFeatures.from_vectors(chosen, {slide.name: slide.surface for slide in described})
+    return dataclasses.replace(examples, hop_s=max(apart_s, examples.hop_s))
+
+
+def latency_us(recipe: Recipe, model: Model, recorded: Sequence[Recorded]) -> dict[str, float]:
+    """Return median and 99th percentile of the computing time of windows one by one; the first slide warms up.
+
+    By the clock of the processor, which other work on the machine lengthens little.
+    """
+    cut = [item.cut(recipe) for item in recorded[:: max(1, len(recorded) // TIMED_SLIDES)]]
+    taken = [judge(model, pieces, time.process_time)[2][:-1] for pieces in (cut[0], *cut)][1:]
+    median, p99 = np.percentile(np.concatenate(taken), (50, 99))
+    return {'median': round(float(median), 1), 'p99': round(float(p99), 1)}
+
+
+def random_divisions(slides: Sequence[Slide], count: int, rng: np.random.Generator) -> list[Division]:
+    """Return divisions in which each slide is tested once; each surface is dealt out at random."""
+    part: dict[str, int] = {}
+    for _, group in groupby(sorted(slides, key=lambda slide: slide.surface), key=lambda slide: slide.surface):
+        own = list(group)
+        part |= {slide.name: int(k) % count for slide, k in zip(own, rng.permutation(len(own)), strict=True)}
+    return [_divided(part, held) for held in range(count)]
+
+
+def division_by_time(slides: Sequence[Slide], last_learnt: int) -> list[Division]:
+    """Return the one division in which the first slides of each surface are learnt and the later ones tested."""
+    return [_divided({slide.name: int(slide.number > last_learnt) for slide in slides}, 1)]
+
+
+def divisions_by(values: Mapping[str, float]) -> list[Division]:
+    """Return one division for each value that slides have, by name: those that have it are tested."""
+    order = sorted(set(values.values()))
+    return [_divided({name: order.index(value) for name, value in values.items()}, held) for held in range(len(order))]
+
+
+def _divided(part: Mapping[str, int], held: int) -> Division:
+    tested = frozenset(name for name, own in part.items() if own == held)
+    return frozenset(part) - tested, tested
+
+
+def _recorded(slide: Slide, messages: Sequence[tuple[str, int, Any]]) -> Recorded:
+    states = [value for _, _, value in messages if isinstance(value, ExplorationState)]
+    signals: dict[str, list[TactileSignal]] = {}
+    for topic, _, value in messages:
+        if isinstance(value, TactileSignal):
+            signals.setdefault(topic, []).append(value)
+    return Recorded(slide, signals, states)
+
+
+def _at_rate(batches: Sequence[TactileSignal], rate_hz: float) -> list[TactileSignal]:
+    ratio = Fraction(rate_hz / batches[0].sampling_rate_hz).limit_denominator(1000)
+    runs: list[list[TactileSignal]] = []
+    for batch in batches:
+        if runs and batch.first_sample == runs[-1][-1].next_sample:
+            runs[-1].append(batch)
+        else:
+            runs.append([batch])
+    return [_resampled(run, ratio, rate_hz) for run in runs]
+
+
+def _resampled(run: Sequence[TactileSignal], ratio: Fraction, rate_hz: float) -> TactileSignal:
+    samples = np.concatenate([batch.samples for batch in run]).astype(np.float64)
+    whole = resample_poly(samples, ratio.numerator, ratio.denominator, axis=0)[: int(len(samples) * ratio)]
+    return dataclasses.replace(
+        run[0],
+        sampling_rate_hz=rate_hz,
+        first_sample=round(run[0].first_sample * ratio),
+        samples=whole.astype(np.float32),
+    )
+
+
+def _adapted(item: InputFeatures, n_samples: int, of_motion: bool) -> InputFeatures:
+    features = [(name, _adapted_feature(feature, n_samples, of_motion)) for name, feature in item.features]
+    kept = tuple((name, feature) for name, feature in features if of_motion or not isinstance(feature, Speed | Force))
+    return dataclasses.replace(item, features=kept)
+
+
+def _adapted_feature(feature: Feature, n_samples: int, of_motion: bool) -> Feature:
+    if isinstance(feature, Stretched):
+        own = _adapted_feature(feature.feature, n_samples, of_motion)
+        return dataclasses.replace(feature, feature=own) if of_motion else own
+    if isinstance(feature, LogSpectrum):  # padding a window with zeros adds points, but nothing to them
+        return dataclasses.replace(feature, points=min(feature.points, max(2, n_samples // 2)))
+    return feature
+
+
+def _apart(vectors: Sequence[FeatureVector], apart_s: float) -> list[FeatureVector]:
+    kept: list[FeatureVector] = []
+    for vector in vectors:
+        if not kept or vector.start_ns - kept[-1].start_ns >= apart_s * NANOSECONDS - 1:
+            kept.append(vector)
+    return kept
+
+
+def _judged(model: Model, slide: Slide, vectors: Sequence[FeatureVector]) -> SlideResult:
+    evidence = Evidence(model)
+    estimates = [evidence.update(vector) for vector in vectors]
+    alone = model.decide(np.stack([vector.values for vector in vectors])) if vectors else []
+    return SlideResult(slide.surface, alone, estimates)

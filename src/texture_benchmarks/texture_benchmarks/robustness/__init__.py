@@ -1,0 +1,1 @@
+"""Benchmark: noise, wear, losses and speed errors."""

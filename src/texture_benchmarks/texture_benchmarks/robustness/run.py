@@ -1,0 +1,247 @@
+"""Where each recipe breaks down, as one thing degrades in slides that were learnt in good order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+import numpy as np
+
+from texture_benchmarks.imported_data import imported
+from texture_benchmarks.recipes.run import (
+    DATA,
+    LAST_LEARNT,
+    NEEDS_ARRAY,
+    QUICK_LAST_LEARNT,
+    QUICK_MATERIALS,
+    QUICK_SLIDES,
+    RATE_HZ,
+)
+from texture_benchmarks.recipes.trial import Recorded, comparable, read_recorded
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.robustness.chart import KEPT, Curve, Panel, robustness_chart, robustness_tables
+from texture_benchmarks.robustness.degradations import DEGRADATIONS, Degradation, breakdown
+from texture_benchmarks.robustness.scenes import (
+    CONDITIONS,
+    FORCE_N,
+    SCENE,
+    SLIDE_S,
+    SPEED_M_S,
+    Condition,
+    Felt,
+    felt_slides,
+)
+from texture_benchmarks.robustness.trial import TOPIC, Count, Pupils, degraded
+from texture_core.resources import folder
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_evaluation.train import with_channels
+
+# By how the names of recipes begin; what begins otherwise is in the first.
+FAMILIES: Mapping[str, tuple[str, ...]] = {
+    'this suite, and baselines': (),
+    'Roberge et al.': ('ets-',),
+    'Kaboli et al., Jamali & Sammut': ('kaboli-', 'jamali-'),
+}
+# Pairs of networks, and the search for the penalty of linear machines, learn for as long as all others together.
+SLOW = ('-ann', 'kaboli-svm.yaml')
+RECIPES = sorted(
+    path.stem
+    for path in folder('texture_estimation', 'config/recipes').glob('*.yaml')
+    if path.stem not in NEEDS_ARRAY and not any(part in path.name for part in SLOW)
+)
+LATER = 'later in the session'
+Score = Callable[[float], Mapping[str, Count]]
+Effect = TypeVar('Effect')
+
+
+@dataclass(frozen=True)
+class _Size:
+    """How much is learnt from and tested.
+
+    Parameters
+    ----------
+    recipes
+        Names.
+    materials, slides
+        Read; all if empty.
+    last_learnt
+        Later slides are tested.
+    every_slide, every_strength, every_effect
+        One in so many is tested.
+    early, later
+        For `LATER`: numbers of the slides of each surface that are learnt from, and of those tested, in groups.
+    simulated
+        Slides of each surface to learn from, and to test on.
+    """
+
+    recipes: Sequence[str]
+    materials: Sequence[str]
+    slides: str
+    last_learnt: int
+    every_slide: int
+    every_strength: int
+    every_effect: int
+    early: Sequence[int]
+    later: Sequence[Sequence[int]]
+    simulated: tuple[int, int]
+
+
+WHOLE = _Size(
+    recipes=RECIPES,
+    materials=(),
+    slides='',
+    last_learnt=LAST_LEARNT,
+    every_slide=4,
+    every_strength=1,
+    every_effect=1,
+    early=(1, 2, 4, 5, 7, 8, 10, 11),
+    later=((3, 6, 9, 12), (13, 14, 15, 16), (21, 22, 23, 24), (29, 30, 31, 32), (37, 38, 39, 40)),
+    simulated=(20, 8),
+)
+QUICK = _Size(
+    recipes=('peaks-naive-bayes', 'kaboli-pa'),
+    materials=QUICK_MATERIALS,
+    slides=QUICK_SLIDES,
+    last_learnt=QUICK_LAST_LEARNT,
+    every_slide=1,
+    every_strength=3,
+    every_effect=5,
+    early=(1, 3),
+    later=((2,), (5, 6)),
+    simulated=(4, 2),
+)
+
+
+def run(bench: Bench) -> BenchResult:
+    """Train recipes on clean slides and test them on degraded ones."""
+    size = QUICK if bench.quick else WHOLE
+    with imported(bench, 'biotac20', size.slides, size.materials) as bags:
+        recorded = read_recorded(bags, (TOPIC,))
+    recipes = [_recipe(name) for name in size.recipes]
+    vibration = [item.at_rate(TOPIC, RATE_HZ) for item in recorded]
+    pupils = Pupils.taught(recipes, [item for item in vibration if item.slide.number <= size.last_learnt])
+    slides = [item for item in recorded if item.slide.number > size.last_learnt][:: size.every_slide]
+    panels = {
+        **{name: _degraded(pupils, slides, each, size, bench.seed) for name, each in _some(DEGRADATIONS, size)},
+        LATER: _later(recipes, vibration, size),
+        **_simulated(recipes, size, bench.seed),
+    }
+    return _result(bench, panels, len(slides), size)
+
+
+def _some(effects: Mapping[str, Effect], size: _Size) -> list[tuple[str, Effect]]:
+    return list(effects.items())[:: size.every_effect]
+
+
+def _recipe(name: str) -> Recipe:
+    """Return a shipped recipe for the vibration alone, as it is compared with all others."""
+    return comparable(with_channels(load_recipe(name), 'fast'), RATE_HZ, of_motion=False)
+
+
+def _degraded(pupils: Pupils, slides: Sequence[Recorded], degradation: Degradation, size: _Size, seed: int) -> Panel:
+    """Return how recipes do on slides that are made worse."""
+
+    def score(strength: float) -> Mapping[str, Count]:
+        rng = np.random.default_rng(seed)
+        worse = [degraded(item, degradation, strength, RATE_HZ, rng) for item in slides]
+        return pupils.counts(worse, strength if degradation.of_windows else 1.0)
+
+    strengths = degradation.strengths[:: size.every_strength]
+    return _panel(degradation.axis, strengths, score, 'recorded', of_all=degradation.loses)
+
+
+def _later(recipes: Sequence[Recipe], recorded: Sequence[Recorded], size: _Size) -> Panel:
+    """Return how recipes that learnt at the beginning of the session do further and further on."""
+    pupils = Pupils.taught(recipes, [item for item in recorded if item.slide.number in size.early])
+    groups = {max(0.0, float(np.mean(group)) - max(size.early)): group for group in size.later}
+
+    def score(since: float) -> Mapping[str, Count]:
+        return pupils.counts([item for item in recorded if item.slide.number in groups[since]])
+
+    return _panel('slides since the last one learnt', tuple(groups), score, 'recorded')
+
+
+def _simulated(recipes: Sequence[Recipe], size: _Size, seed: int) -> dict[str, Panel]:
+    """Return how recipes do where a scene is felt otherwise than it was learnt."""
+    to_learn, to_test = size.simulated
+    pupils: dict[Callable[[], Felt], Pupils] = {}
+    panels = {}
+    for name, condition in _some(CONDITIONS, size):
+        if condition.taught not in pupils:
+            slides = felt_slides(condition.taught(), to_learn, np.random.default_rng([seed, 0]))
+            pupils[condition.taught] = Pupils.taught(recipes, slides)
+        score = partial(_felt_otherwise, pupils[condition.taught], condition, to_test, seed)
+        panels[name] = _panel(condition.axis, condition.strengths[:: size.every_strength], score, 'simulated')
+    return panels
+
+
+def _felt_otherwise(
+    pupils: Pupils, condition: Condition, count: int, seed: int, strength: float
+) -> Mapping[str, Count]:
+    """Return what is recognised of slides that touch the same places at every strength."""
+    return pupils.counts(felt_slides(condition.felt(strength), count, np.random.default_rng([seed, 1])))
+
+
+def _panel(axis: str, strengths: Sequence[float], score: Score, slides: str, *, of_all: bool = False) -> Panel:
+    """Return the curves of all recipes: shares of the windows cut, or `of_all` that would be at no strength."""
+    found = [score(strength) for strength in strengths]
+    curves = {}
+    for recipe, clean in found[0].items():
+        own = [counts[recipe] for counts in found]
+        shares = [count.right / max(1, clean.cut if of_all else count.cut) for count in own]
+        curves[recipe] = Curve(shares, breakdown(strengths, shares, KEPT))
+    return Panel(axis, strengths, curves, slides)
+
+
+def _result(bench: Bench, panels: Mapping[str, Panel], tested: int, size: _Size) -> BenchResult:
+    bench.out.mkdir(parents=True, exist_ok=True)
+    (bench.out / 'robustness.md').write_text(robustness_tables(panels), encoding='utf-8')
+    return BenchResult(
+        name='robustness',
+        measured=(
+            'share of single windows recognised as one thing degrades in the tested slides only, by its strength; '
+            f'breakdown: strength at which it falls below {100 * KEPT:.0f} % of the share without degradation, linear '
+            'between strengths, null if it does not'
+        ),
+        data=(
+            f'recorded: {DATA["biotac20"]}; PAC at 1 kHz; degraded by computation. Simulated: scene {SCENE}, '
+            f'capacitive fingertip at 1 kHz, {SPEED_M_S} m/s, {FORCE_N} N'
+        ),
+        split=(
+            f'recorded: learnt from slides 1-{LAST_LEARNT} of each material, tested on {tested} of the later ones; '
+            f'{LATER}: learnt from slides {_listed(size.early)}, tested on {"; ".join(map(_listed, size.later))}. '
+            f'Simulated: {size.simulated[0]} slides of {SLIDE_S} s a surface learnt, {size.simulated[1]} others tested'
+        ),
+        numbers={effect: _numbers(panel) for effect, panel in panels.items()},
+        charts=tuple(
+            robustness_chart(effect, panel, _families(panel), bench.out / f'robustness_{effect.replace(" ", "_")}.png')
+            for effect, panel in panels.items()
+        ),
+    )
+
+
+def _families(panel: Panel) -> dict[str, list[str]]:
+    """Return the recipes of each family that has any."""
+    first, *others = FAMILIES
+    found: dict[str, list[str]] = {family: [] for family in FAMILIES}
+    for recipe in panel.curves:
+        found[next((family for family in others if recipe.startswith(FAMILIES[family])), first)].append(recipe)
+    return {family: recipes for family, recipes in found.items() if recipes}
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return ', '.join(map(str, numbers))
+
+
+def _numbers(panel: Panel) -> dict[str, Any]:
+    return {
+        'slides': panel.slides,
+        'strength': panel.axis,
+        'strengths': [strength if np.isfinite(strength) else None for strength in panel.strengths],
+        'recipes': {
+            name: {'window_accuracy': [round(share, 4) for share in curve.shares], 'breakdown': curve.breakdown}
+            for name, curve in panel.curves.items()
+        },
+    }

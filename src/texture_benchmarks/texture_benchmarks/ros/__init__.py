@@ -1,0 +1,1 @@
+"""What the benchmarks need of a running ROS graph."""

@@ -1,0 +1,1 @@
+"""Benchmark: time from window to grade."""

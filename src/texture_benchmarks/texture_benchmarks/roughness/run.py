@@ -1,0 +1,54 @@
+"""How long from a window to its grade, in one process."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from texture_benchmarks.papers.roughness_scans import FORCE_N, SPEED_M_S, USED_S, Felt
+from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.roughness.grade_latency import times_us
+from texture_estimation.roughness.grades import TEST, TRAIN, read_grades
+from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.training import train_grades
+from texture_evaluation.charts import histogram_chart
+from texture_simulation.scene import load_scene
+
+RECIPES = {'ours': 'roughness', 'SVM5': 'ets-roughness-svm5', 'ANN5': 'ets-roughness-ann5'}
+SCANS, QUICK_SCANS = 20, 4
+TIMED, QUICK_TIMED = 5000, 200
+TARGET_US = 200.0
+
+
+def run(bench: Bench) -> BenchResult:
+    """Train on simulated scans, then time windows of textures never felt, one by one."""
+    grades = read_grades('ets_roughness')
+    felt = Felt(load_scene('roughness'), bench.seed)
+    count = QUICK_SCANS if bench.quick else SCANS
+    windows = [piece for texture in grades.used_for(TEST) for piece in felt.pieces(texture, count, SPEED_M_S, FORCE_N)]
+    times = {}
+    for name, recipe_name in list(RECIPES.items())[: 1 if bench.quick else None]:
+        recipe = load_roughness_recipe(recipe_name)
+        examples = felt.describe(recipe.feature_set, grades.used_for(TRAIN), count, SPEED_M_S, FORCE_N)
+        model = train_grades(recipe, examples, grades)
+        times[name] = times_us(model, windows, QUICK_TIMED if bench.quick else TIMED)
+    chart = histogram_chart(
+        times,
+        'From the samples of a window to the grade, in one process (simulated)',
+        'time (µs)',
+        bench.out / 'roughness-latency.png',
+    )
+    percentiles = {name: np.percentile(values, (50, 99)).tolist() for name, values in times.items()}
+    return BenchResult(
+        name='roughness-latency',
+        measured=(
+            f'computing time of a core: features, checks, head and evidence for windows of {USED_S} s at 1 kHz, '
+            'one by one, in one process'
+        ),
+        data='simulated TSF-85, scene roughness',
+        split="by texture, the paper's: 15 learnt, windows of the 10 others timed",
+        numbers={
+            'target_us': TARGET_US,
+            **{name: {'median_us': median, 'p99_us': p99} for name, (median, p99) in percentiles.items()},
+        },
+        charts=(chart,),
+    )

@@ -1,0 +1,1 @@
+"""Benchmark: start and end of sliding."""

@@ -1,0 +1,1 @@
+"""Benchmark: faults on every sensor's line."""

@@ -1,0 +1,1 @@
+"""Benchmark: speeds, forces and directions outside the training."""

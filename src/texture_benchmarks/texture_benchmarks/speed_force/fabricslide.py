@@ -1,0 +1,102 @@
+"""Fabrics under slow taxels at forces, speeds and in directions that were not taught.
+
+Each fabric was mounted once, and the shares of the load among the taxels know the mounting, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from texture_benchmarks.speed_force.conditions import Conditions, described
+from texture_benchmarks.speed_force.held_out import Mask, Outcome, Trial, one_out, recognised, run, run_chosen
+from texture_benchmarks.speed_force.turns import TurnFree
+from texture_core.arrays import AnyArray, Array
+from texture_estimation.learners.learner import Learner
+from texture_estimation.learners.svm_rbf import SvmRbf
+from texture_features.feature import Feature, Windows
+from texture_features.features.level_share import LevelShare
+from texture_features.features.mean_spatial_bands import MeanSpatialBands
+
+COMPLETE = ('BeigeCotton', 'BrownCotton', 'Canvas', 'Linen')  # of all forces, speeds and directions
+START_ROWS = 3  # of the touch before the finger moves: 84 ms
+ENERGIES = (0.0, 0.8, 0.9, 0.95, 0.98)  # how much of the turn is taken out; 0 for none of it
+# Waves that 35.7 rows a second reach at 150 mm/s, and as long as a run shows some of.
+BANDS = MeanSpatialBands(bands=16, longest_m=0.2, shortest_m=8.5e-3, floor=1e-4)
+
+
+@dataclass(frozen=True, eq=False)
+class Fabricslide:
+    """The protocols on one set of slides.
+
+    Parameters
+    ----------
+    conditions
+        The slides, with their touch before they begin.
+    learner
+        What learns the loads; they are of one kind, and what a turn has left of a taxel is not to be blown up.
+    energies
+        How much of the turn is taken out, of which the training chooses.
+    """
+
+    conditions: Conditions
+    learner: Learner = field(default_factory=lambda: SvmRbf(common_scale=True))
+    energies: Sequence[float] = ENERGIES
+
+    def splits(self) -> dict[str, dict[str, tuple[Mask, Mask]]]:
+        """Return train and test slides by protocol and by what is left out."""
+        return {
+            'one force out': one_out(self.conditions.force_n),
+            'one speed out': one_out(self.conditions.speed_mm_s),
+            'one direction out': one_out(self.conditions.upwards),
+        }
+
+    def loads(self) -> dict[str, Outcome]:
+        """Return how slides are recognised from the shares of the load; no speed is needed.
+
+        How much of what a turn changes is taken out is chosen within the training: for forces and speeds by leaving
+        another one out; for directions by slides of another force whose finger has not moved yet, as there is no other
+        direction to learn from.
+        """
+        starts, steady = self._shares()
+        slides = {f'{energy:.0%}': self._load_trial(starts, steady, energy) for energy in self.energies}
+        touches = {f'{energy:.0%}': self._load_trial(starts, steady, energy, starts) for energy in self.energies}
+        force, speed = self.conditions.force_n, self.conditions.speed_mm_s
+        inner = {
+            'one force out': (slides, [force]),
+            'one speed out': (slides, [speed]),
+            'one direction out': (touches, [force]),
+        }
+        return {
+            name: run_chosen(slides, parts, inner[name][1], inner[name][0]) for name, parts in self.splits().items()
+        }
+
+    def loads_as_they_are(self) -> dict[str, Outcome]:
+        """Return the same with nothing taken out."""
+        trial = self._load_trial(*self._shares(), energy=0.0)
+        return {name: run(trial, parts) for name, parts in self.splits().items()}
+
+    def bands(self) -> dict[str, Outcome]:
+        """Return how slides are recognised without the pattern: from mean bands of waves per metre."""
+        windows = [slide.windows() for slide in self.conditions.slides]
+        trial = self.conditions.trial(described([BANDS], windows), SvmRbf())
+        return {name: run(trial, parts) for name, parts in self.splits().items()}
+
+    def _shares(self) -> tuple[Array, Array]:
+        """Return the load when each finger is about to slide and while it slides, (n, n_taxels)."""
+        slides = self.conditions.slides
+        share: Sequence[Feature] = [LevelShare()]
+        starts = described(share, [Windows(slide.before[:START_ROWS], slide.rate_hz) for slide in slides])
+        return starts, described(share, [slide.windows() for slide in slides])
+
+    def _load_trial(self, starts: Array, steady: Array, energy: float, tested: Array | None = None) -> Trial:
+        surfaces, names = self.conditions.surfaces, self.conditions.names
+        asked: AnyArray = steady if tested is None else tested
+
+        def trial(train: Mask, test: Mask) -> Mask:
+            free = TurnFree.learnt(starts[train], steady[train], energy)
+            return recognised(
+                self.learner, (free(steady[train]), surfaces[train], names[train]), (free(asked[test]), surfaces[test])
+            )
+
+        return trial

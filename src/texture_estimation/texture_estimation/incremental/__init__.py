@@ -1,0 +1,1 @@
+"""Incremental classification: classes added after the training."""

@@ -1,0 +1,1 @@
+"""Open-set recognition: novelty scores, prediction sets and early stopping."""

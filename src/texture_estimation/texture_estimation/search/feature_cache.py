@@ -1,0 +1,125 @@
+"""Features computed once, however many individuals ask for them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.errors import InvalidData
+from texture_estimation.search.examples import Cut
+from texture_estimation.search.spread import Spread, in_turn
+from texture_features.feature import Feature, Windows
+from texture_features.feature_set import FeatureSet, InputFeatures
+from texture_features.features.spectral_peaks import SpectralPeaks, by_frequency
+from texture_features.windowing.stretch import Stretched
+from texture_features.windowing.windows import WindowParams
+
+# Windows described in one go: what they and their spectra take should fit the processor's cache.
+CHUNK = 64
+Key = tuple[WindowParams, str, Hashable]
+
+
+class FeatureCache:
+    """Values of feature sets on the same slides.
+
+    A feature is computed once for all feature sets that hold it. The highest peaks of a spectrum are chosen one after
+    the other, so n of them are the first n of any larger number: they are computed once for each gap.
+
+    Parameters
+    ----------
+    cut
+        Gives the windows.
+    most_peaks
+        Largest number of spectral peaks that will be asked for.
+    """
+
+    def __init__(self, cut: Cut, most_peaks: int = 15) -> None:
+        self._cut = cut
+        self._most_peaks = most_peaks
+        self._chunks: dict[Key, list[Windows]] = {}
+        self._blocks: dict[Key, Array] = {}
+        self.hits = 0
+        self.misses = 0
+
+    def values(self, feature_set: FeatureSet, spread: Spread = in_turn) -> Array:
+        """Return the values of each window, (n, n_values)."""
+        return self.many([feature_set], spread)[0]
+
+    def many(self, feature_sets: Sequence[FeatureSet], spread: Spread = in_turn) -> list[Array]:
+        """Return the values of each feature set, (n, n_values) each; what is not there yet is computed over `spread`.
+
+        Raises
+        ------
+        InvalidData
+            If a value is not finite.
+        """
+        wanted = {
+            self._key(feature_set.windows, item, feature): (feature_set.windows, item, self._source(feature))
+            for feature_set in feature_sets
+            for item in feature_set.inputs
+            for _, feature in item.features
+        }
+        missing = [key for key in wanted if key not in self._blocks]
+        self.hits += len(wanted) - len(missing)
+        self.misses += len(missing)
+        jobs = [(self._windows(windows, item), feature) for windows, item, feature in map(wanted.__getitem__, missing)]
+        for key, block in zip(missing, spread(_describe, jobs), strict=True):
+            if not np.isfinite(block).all():
+                raise InvalidData(
+                    f"feature {key[2]!r} of '{key[1]}' is not finite in some windows; leave it out of the search"
+                )
+            self._blocks[key] = block
+        return [self._joined(feature_set) for feature_set in feature_sets]
+
+    def _joined(self, feature_set: FeatureSet) -> Array:
+        blocks = []
+        for item in feature_set.inputs:
+            for _, feature in item.features:
+                block = self._blocks[self._key(feature_set.windows, item, feature)]
+                blocks.append(_derived(block, feature).reshape(len(block), -1))
+        return np.concatenate(blocks, axis=1)
+
+    def _windows(self, params: WindowParams, item: InputFeatures) -> list[Windows]:
+        key = (params, item.topic, None)
+        if key not in self._chunks:
+            inputs = self._cut(params).inputs
+            first, *others = (inputs[topic] for topic in item.topics)
+            self._chunks[key] = [
+                replace(_some(first, rows), joined=tuple(_some(other, rows) for other in others))
+                for rows in (slice(start, start + CHUNK) for start in range(0, len(first.samples), CHUNK))
+            ]
+        return self._chunks[key]
+
+    def _key(self, params: WindowParams, item: InputFeatures, feature: Feature) -> Key:
+        return params, item.topic, self._source(feature)
+
+    def _source(self, feature: Feature) -> Any:
+        """Return the feature from whose values those of `feature` are taken."""
+        if isinstance(feature, Stretched):
+            return replace(feature, feature=self._source(feature.feature))
+        if isinstance(feature, SpectralPeaks):
+            return replace(feature, peaks=max(self._most_peaks, feature.peaks), order='intensity')
+        return feature
+
+
+def _some(windows: Windows, rows: slice) -> Windows:
+    return Windows(windows.samples[rows], windows.rate_hz, windows.speed_m_s[rows], windows.force_n[rows])
+
+
+def _derived(block: Array, feature: Feature) -> Array:
+    """Return the values of `feature` of those of its source, (n, n_channels, n_names)."""
+    if isinstance(feature, Stretched):
+        return _derived(block, feature.feature)
+    if not isinstance(feature, SpectralPeaks):
+        return block
+    peaks = block.reshape(*block.shape[:-1], -1, 2)[..., : feature.peaks, :]
+    return by_frequency(peaks) if feature.order == 'frequency' else peaks
+
+
+def _describe(job: tuple[list[Windows], Feature]) -> Array:
+    chunks, feature = job
+    return np.concatenate([feature(windows) for windows in chunks])

@@ -1,0 +1,60 @@
+"""How well an individual does: shares of right decisions on what was learnt and on what was not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_estimation.classification.evidence_rules import EvidenceRule
+from texture_estimation.learners.learner import Codes
+from texture_estimation.log_probabilities import log_softmax
+from texture_estimation.search.halves import Mask
+
+UNDECIDED = -1
+
+
+def fitness(learning: Sequence[float] | Array, test: Sequence[float] | Array) -> float:
+    """Return the mean of learning and test accuracy over all halves.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section IV.
+    """
+    return float((np.mean(learning) + np.mean(test)) / 2.0)
+
+
+def decisions(scores: Array) -> Codes:
+    """Return the label with the highest score, (n,) of (n, n_labels); UNDECIDED where several share it."""
+    best = scores.max(axis=1, keepdims=True)
+    chosen: Codes = scores.argmax(axis=1)
+    chosen[(scores == best).sum(axis=1) > 1] = UNDECIDED
+    return chosen
+
+
+def shares_right(decided: Codes, codes: Codes, learnt: Mask) -> tuple[float, float]:
+    """Return the shares of right decisions among the learnt and among the other examples; undecided is not right."""
+    right = decided == codes
+    return float(right[learnt].mean()), float(right[~learnt].mean())
+
+
+def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share: float) -> tuple[Codes, Codes]:
+    """Return what each slide is taken for by all its windows, (n_slides,), and the row of its first window.
+
+    Parameters
+    ----------
+    scores : (n, n_labels)
+        Of each window; equal highest ones are a tie.
+    slides : (n,)
+        Number of each window's slide.
+    rule
+        Joins the windows.
+    hop_share
+        Distance of the windows over their length: of what overlaps, only the new part counts.
+    """
+    _, first, member = np.unique(slides, return_index=True, return_inverse=True)
+    member = member.reshape(-1)
+    counts = np.bincount(member)
+    voices = rule.voice(log_softmax(scores))
+    sums = np.stack([np.bincount(member, weights=column) for column in voices.T], axis=1)
+    worth = 1.0 + min(hop_share, 1.0) * (counts[:, None].astype(np.float64) - 1.0)
+    return decisions(rule.log_posterior(sums / counts[:, None], worth, 1.0)), first

@@ -1,0 +1,246 @@
+"""Which parts of a recipe a search varies: a table in YAML, and the recipes that individuals stand for."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic
+
+from texture_core.catalogue import find, unknown
+from texture_core.errors import InvalidParameter
+from texture_core.plain_data import load_yaml, shown
+from texture_core.resources import find_file
+from texture_estimation.search.task import R
+from texture_estimation.search.variables import Choice, Individual, Integer, LogReal, SearchSpace, Value, Variable
+
+MOST_INCLUDES = 10
+KEYS = ('description', 'include', 'variables')
+PACKAGE, FOLDER = 'texture_estimation', 'config/search'
+
+
+@dataclass(frozen=True)
+class Edit:
+    """One change of a recipe: `path` ('inputs/signal/features/force') is set to a value, used, or dropped."""
+
+    action: str
+    path: tuple[str, ...]
+    value: Any = None
+
+    def apply(self, recipe: dict[str, Any]) -> None:
+        """Change a recipe written as mappings and lists.
+
+        Raises
+        ------
+        InvalidParameter
+            If the recipe has no such place.
+        """
+        *way, last = self.path
+        place: Any = recipe
+        for step in way:
+            place = _enter(place, step, self.path)
+        ACTIONS[self.action](place, last, self.value)
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A variable, and what each of its values does to a recipe.
+
+    Parameters
+    ----------
+    variable
+        Its values.
+    path
+        What is set to the value; () if `edits` tell.
+    edits
+        For each option of a choice.
+    """
+
+    variable: Variable
+    path: tuple[str, ...] = ()
+    edits: Mapping[str, tuple[Edit, ...]] | None = None
+
+    def edits_for(self, value: Value) -> tuple[Edit, ...]:
+        """Return the changes that a value stands for."""
+        return (Edit('set', self.path, value),) if self.edits is None else self.edits[str(value)]
+
+
+@dataclass(frozen=True)
+class RecipeSpace(Generic[R]):
+    """The variables of a recipe, of textures or of roughness.
+
+    Examples
+    --------
+    >>> space = RecipeSpace.load('ets-svm', load_recipe('ets-linear-svm'))
+    >>> space.recipe(space.variables.decode(np.full(len(space.variables.names), 0.5)))
+    """
+
+    base: R
+    axes: Mapping[str, Axis]
+    name: str = ''
+
+    @classmethod
+    def load(cls, name_or_path: str, base: R) -> RecipeSpace[R]:
+        """Read a table of variables, by the name of a shipped one or by path.
+
+        Raises
+        ------
+        UnknownName, InvalidParameter
+            If there is none, it is wrong, or the recipe lacks what it varies.
+        """
+        space = cls(base, _read(name_or_path), Path(name_or_path).stem)
+        space.recipe(tuple(axis.variable.value(0) for axis in space.axes.values()))  # refused now, not amid a search
+        return space
+
+    @property
+    def variables(self) -> SearchSpace:
+        """What the search sees."""
+        return SearchSpace({name: axis.variable for name, axis in self.axes.items()})
+
+    def recipe(self, individual: Individual) -> R:
+        """Return the recipe that an individual stands for."""
+        content = copy.deepcopy(self.base.as_mapping())
+        for axis, value in zip(self.axes.values(), individual, strict=True):
+            for edit in axis.edits_for(value):
+                edit.apply(content)
+        recipe: R = self.base.from_mapping(content, self.base.name)
+        return recipe
+
+    def of_base(self) -> Individual:
+        """Return the individual nearest to the recipe itself."""
+        content = self.base.as_mapping()
+        return tuple(self._present(axis, content) for axis in self.axes.values())
+
+    def table(self) -> list[tuple[str, str, str]]:
+        """Return name, kind and range of each variable, for people."""
+        return [(name, *_described(axis.variable)) for name, axis in self.axes.items()]
+
+    def _present(self, axis: Axis, content: Mapping[str, Any]) -> Value:
+        variable = axis.variable
+        if axis.edits is not None:
+            return next(
+                (option for option in axis.edits if self._changes_nothing(axis.edits[option], content)),
+                variable.value(0),
+            )
+        place: Any = content
+        for step in axis.path:
+            place = _enter(place, step, axis.path)
+        try:
+            return variable.value(variable.index(place))
+        except ValueError:
+            return variable.value(0)
+
+    def _changes_nothing(self, edits: Sequence[Edit], content: Mapping[str, Any]) -> bool:
+        changed = copy.deepcopy(dict(content))
+        for edit in edits:
+            edit.apply(changed)
+        same: bool = self.base.from_mapping(changed, '').as_mapping() == content
+        return same
+
+
+def _read(name_or_path: str, depth: int = 0) -> dict[str, Axis]:
+    path = find_file(name_or_path, PACKAGE, FOLDER, 'search space')
+    content = load_yaml(path, 'search space')
+    if not isinstance(content, Mapping):
+        raise InvalidParameter(f"search space '{path}' holds no mapping; 'variables' is needed")
+    for key in content:
+        if key not in KEYS:
+            raise InvalidParameter(f"search space '{path}': {unknown(str(key), KEYS, 'key')}")
+    included, variables = content.get('include') or [], content.get('variables') or {}
+    if not isinstance(included, list) or not isinstance(variables, Mapping) or depth > MOST_INCLUDES:
+        raise InvalidParameter(
+            f"search space '{path}': 'include' is a list, at most {MOST_INCLUDES} deep, and 'variables' a mapping"
+        )
+    axes: dict[str, Axis] = {}
+    for other in included:
+        axes.update(_read(str(other), depth + 1))
+    for name, entry in variables.items():
+        axes[str(name)] = _axis(entry, f"search space '{path.stem}', variable '{name}'")
+    return axes
+
+
+def _axis(entry: Any, where: str) -> Axis:
+    if not isinstance(entry, Mapping) or 'kind' not in entry:
+        raise InvalidParameter(f"{where}: came {shown(entry)}; a mapping with 'kind' ({', '.join(KINDS)}) is needed")
+    values = {key: value for key, value in entry.items() if key != 'kind'}
+    try:
+        return find(KINDS, str(entry['kind']), 'kind of variable')(values)
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InvalidParameter(f'{where}: {dict(entry)} cannot be used ({type(error).__name__}: {error})') from error
+    except InvalidParameter as error:
+        raise InvalidParameter(f'{where}: {error}') from error
+
+
+def _integer(entry: Mapping[str, Any]) -> Axis:
+    return Axis(Integer(int(entry['low']), int(entry['high'])), _path(entry['set']))
+
+
+def _log(entry: Mapping[str, Any]) -> Axis:
+    return Axis(LogReal(float(entry['low']), float(entry['high'])), _path(entry['set']))
+
+
+def _choice(entry: Mapping[str, Any]) -> Axis:
+    options = entry['options']
+    if not isinstance(options, Mapping):
+        return Axis(Choice(tuple(map(str, options))), _path(entry['set']))
+    edits = {str(option): tuple(_edit(step) for step in steps or ()) for option, steps in options.items()}
+    return Axis(Choice(tuple(edits)), edits=edits)
+
+
+def _use(entry: Mapping[str, Any]) -> Axis:
+    path = _path(entry['feature'])
+    return Axis(Choice(('no', 'yes')), edits={'no': (Edit('drop', path),), 'yes': (Edit('use', path),)})
+
+
+def _edit(step: Mapping[str, Any]) -> Edit:
+    [(action, path)] = [(key, value) for key, value in step.items() if key != 'to']
+    find(ACTIONS, str(action), 'change of a recipe')
+    return Edit(str(action), _path(path), step.get('to'))
+
+
+def _path(text: str) -> tuple[str, ...]:
+    return tuple(str(text).split('/'))
+
+
+def _set(place: Any, last: str, value: Any) -> None:
+    old = place.get(last)
+    place[last] = float(value) if isinstance(old, float) and isinstance(value, int) else value
+
+
+def _use_feature(features: list[Any], name: str, value: Any) -> None:
+    if _position(features, name) is None:
+        features.append({name: dict(value or {})})
+
+
+def _drop_feature(features: list[Any], name: str, value: Any) -> None:
+    position = _position(features, name)
+    if position is not None:
+        del features[position]
+
+
+def _position(features: Sequence[Any], name: str) -> int | None:
+    return next((index for index, entry in enumerate(features) if name in entry), None)
+
+
+def _enter(place: Any, step: str, path: Sequence[str]) -> Any:
+    if isinstance(place, list):
+        position = _position(place, step)
+        place = place[position] if position is not None else {}
+    if not isinstance(place, Mapping) or step not in place:
+        raise InvalidParameter(
+            f"the recipe has no '{'/'.join(path)}', which the search varies ('{step}' is not there); "
+            'add it to the recipe, or give a search space that fits with --search'
+        )
+    return place[step]
+
+
+def _described(variable: Variable) -> tuple[str, str]:
+    if isinstance(variable, Choice):
+        return 'choice', ', '.join(variable.options)
+    kind = 'whole number' if isinstance(variable, Integer) else 'logarithmic'
+    return kind, f'{variable.value(0):g} to {variable.value(variable.count - 1):g}'
+
+
+ACTIONS = {'set': _set, 'use': _use_feature, 'drop': _drop_feature}
+KINDS = {'integer': _integer, 'log': _log, 'choice': _choice, 'use': _use}

@@ -1,0 +1,50 @@
+"""Searches for recipes that tell surfaces apart."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+from texture_core.arrays import Array
+from texture_estimation.recipe import Recipe
+from texture_estimation.search.cost import operations
+from texture_estimation.search.examples import Examples
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.judges.catalogue import judge_of
+from texture_estimation.search.recipe_trial import RecipeTrial
+from texture_features.feature_set import FeatureSet
+
+
+@dataclass(frozen=True)
+class TellingApart:
+    """What is counted is right decisions; see `texture_estimation.search.task.Task`."""
+
+    def described(self, recipe: Recipe) -> FeatureSet:
+        """Return the feature set with the windows that `train` learns from."""
+        return dataclasses.replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+
+    def trial(self, recipe: Recipe, values: Array, examples: Examples, halves: Mask, *, quick: bool) -> RecipeTrial:
+        """Return the trial of a recipe."""
+        windows = recipe.training_windows
+        return RecipeTrial(
+            judge=judge_of(recipe.learner_name, quick=quick),
+            learner=recipe.learner,
+            rule=recipe.evidence,
+            values=values,
+            codes=examples.codes,
+            slides=examples.slides,
+            halves=halves,
+            hop_share=windows.hop_s / windows.length_s,
+        )
+
+    def cost(self, recipe: Recipe, n_samples: int, n_values: int, examples: Examples) -> float:
+        """Return about how many operations a window costs, half the examples being learnt."""
+        features = [feature for item in recipe.feature_set.inputs for _, feature in item.features]
+        return operations(
+            features,
+            recipe.learner,
+            n_samples=n_samples,
+            n_values=n_values,
+            n_labels=len(examples.names),
+            n_learnt=len(examples.codes) // 2,
+        )

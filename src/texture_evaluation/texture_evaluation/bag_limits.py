@@ -1,0 +1,173 @@
+"""Limits for bags of strangers, set where rosbags has none: what unpacks, how often, and which files are opened at all.
+
+rosbags unpacks first and compares afterwards, when a chunk of a kilobyte may have filled the memory; it believes the
+index of an MCAP file, in which a chunk may stand a hundred thousand times; and what an SQLite file computes is not
+bounded by its size.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import sys
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import IO, Any, BinaryIO
+
+import apsw
+from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+from rosbags.rosbag2 import ReaderError, reader, storage_mcap, storage_sqlite3
+
+from texture_core.files import MB, Budget, FileRefused, open_regular, read_text, unpacked_limit
+
+if sys.version_info >= (3, 14):
+    from compression.zstd import ZstdDecompressor
+else:
+    from backports.zstd import ZstdDecompressor
+
+MOST_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
+# Each record in a chunk becomes objects of 150 bytes, however little it takes in the file.
+RECORDS_AT_LEAST = 16
+PACKED_RECORD_BYTES = 8
+CHUNK = 0x06
+CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
+RECORD_HEAD = struct.Struct('<BQ')
+# SQLite counts its own steps; reading a row three times takes fewer than a hundred, and a row 30 bytes or more.
+MOST_STEPS = 10_000_000
+STEPS_PER_BYTE = 4
+STEPS_AT_ONCE = 100_000
+MOST_TABLES = 100
+COMPUTED = re.compile(r'\bAS\s*\(|\bVIEW\b|\bVIRTUAL\b|\bTRIGGER\b', re.IGNORECASE)
+
+
+class CheckedPath(type(Path())):  # type: ignore[misc]
+    """A path from which only regular files are read, whoever opens them; files of text are short."""
+
+    def open(self, *_args: Any, **_options: Any) -> IO[Any]:
+        """Open the file for reading bytes."""
+        return open_regular(self)
+
+    def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
+        """Return the text of a short file."""
+        return read_text(self, MOST_METADATA_BYTES, encoding or 'utf-8')
+
+
+def check_storage(path: Path) -> None:
+    """Raise FileRefused or OSError unless a file of a bag is a regular one, within the limits."""
+    with open_regular(path) as file:
+        if path.suffix == '.mcap':
+            _check_mcap(file)
+        elif path.suffix == '.db3':
+            _check_sqlite(path)
+
+
+def check_index(storage: Any) -> None:
+    """Raise FileRefused if the index of an opened MCAP file names a part of the file twice."""
+    budget = _budget(Path(storage.path).stat().st_size)
+    end = 0
+    for chunk in sorted(storage.chunks, key=lambda chunk: int(chunk.chunk_start_offset)):
+        if chunk.chunk_start_offset < end:
+            raise FileRefused('it has an index in which chunks overlap')
+        end = chunk.chunk_start_offset + RECORD_HEAD.size + CHUNK_HEAD.size + chunk.compressed_size
+        budget.spend(chunk.uncompressed_size)
+
+
+def messages_budget(files: Iterable[Path]) -> Budget:
+    """Return how many bytes the messages of a bag may have: a damaged or altered file may give the same ones again."""
+    return _budget(sum(file.stat().st_size for file in files))
+
+
+def _budget(file_bytes: int) -> Budget:
+    return Budget(unpacked_limit(file_bytes))
+
+
+def _check_mcap(file: BinaryIO) -> None:
+    size = file.seek(0, 2)
+    budget = _budget(size)
+    for kind, head in _records(file, size):
+        if kind == CHUNK and len(head) == CHUNK_HEAD.size:
+            budget.spend(CHUNK_HEAD.unpack(head)[2])
+
+
+def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
+    """Yield the kind and the first bytes of each record; what is damaged is left to who reads on."""
+    at = len(b'\x89MCAP0\r\n')
+    while at + RECORD_HEAD.size <= size:
+        file.seek(at)
+        head = file.read(RECORD_HEAD.size + CHUNK_HEAD.size)
+        if len(head) < RECORD_HEAD.size:
+            return
+        kind, length = RECORD_HEAD.unpack_from(head)
+        yield kind, head[RECORD_HEAD.size :]
+        at += RECORD_HEAD.size + length
+
+
+def _check_sqlite(path: Path) -> None:
+    """Refuse what computes its content: what is stored is no more than the file holds."""
+    connection = apsw.Connection(
+        f'file:{path}?immutable=1', flags=apsw.SQLITE_OPEN_READONLY | apsw.SQLITE_OPEN_URI
+    )  # fmt: skip
+    try:
+        definitions = connection.execute('SELECT sql FROM sqlite_master LIMIT ?', (MOST_TABLES + 1,)).fetchall()
+    finally:
+        connection.close()
+    if len(definitions) > MOST_TABLES or any(COMPUTED.search(str(sql)) for (sql,) in definitions):
+        raise FileRefused('it has tables that are computed, which no bag has')
+
+
+class _Steps:
+    """How many steps of SQLite a connection may still take."""
+
+    def __init__(self, most: int) -> None:
+        self._left = most
+
+    def __call__(self) -> bool:
+        """Count; True ends the query with an error."""
+        self._left -= STEPS_AT_ONCE
+        return self._left < 0
+
+
+def _limit_sqlite(connection: apsw.Connection) -> None:
+    size = Path(connection.filename).stat().st_size
+    connection.limit(apsw.SQLITE_LIMIT_LENGTH, max(size, MB))
+    connection.set_progress_handler(_Steps(MOST_STEPS + STEPS_PER_BYTE * size), STEPS_AT_ONCE)
+
+
+def _unpacked(decompressor: Any, data: bytes, size: int) -> bytes:
+    """Return a chunk that claims to unpack to `size`; one byte more is enough to tell that it does not."""
+    if size > unpacked_limit(len(data)):
+        raise ReaderError(f'a chunk of {len(data)} bytes claims to unpack to {size}')
+    content = bytes(decompressor.decompress(data, max_length=size + 1))
+    most = RECORDS_AT_LEAST + len(data) // PACKED_RECORD_BYTES
+    if next(islice(_starts(content), most, None), None) is not None:
+        raise ReaderError(f'a chunk of {len(data)} bytes unpacks to more than {most} records')
+    return content
+
+
+def _starts(content: bytes) -> Iterator[int]:
+    """Yield where the records of a chunk begin."""
+    at, end = 0, len(content) - RECORD_HEAD.size
+    while at <= end:
+        yield at
+        at += RECORD_HEAD.size + RECORD_HEAD.unpack_from(content, at)[1]
+
+
+def _no_quality_of_service(_text: Any) -> list[Any]:
+    """Return nothing: the suite reads no quality of service from bags, and reading it takes seconds if it is long."""
+    return []
+
+
+def set_limits() -> None:
+    """Set the limits in rosbags and SQLite, for this process."""
+    storage_mcap.DECOMPRESSORS.update(
+        zstd=lambda data, size: _unpacked(ZstdDecompressor(), data, size),
+        lz4=lambda data, size: _unpacked(LZ4FrameDecompressor(), data, size),
+    )
+    for module in (reader, storage_mcap, storage_sqlite3):
+        module.parse_qos = _no_quality_of_service  # type: ignore[attr-defined]
+    if _limit_sqlite not in apsw.connection_hooks:
+        apsw.connection_hooks.append(_limit_sqlite)
+
+
+set_limits()

@@ -1,1 +1,0 @@
-"""Benchmarks: each measures one thing and writes its numbers and a chart."""

@@ -1,0 +1,102 @@
+"""`texture optimise`: tune a recipe on labelled bags by a genetic search."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from dataclasses import dataclass, field
+
+from texture_core.command_options import add_channels, add_seed, add_slides
+from texture_core.parameters import from_mapping
+from texture_estimation.search.genetic_search import OBJECTIVES, Generation, SearchParams
+from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags, over_machine
+
+BAR = 20  # letters
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the sub-command."""
+    usual = SearchParams()
+    parser.add_argument('recipe', help='name of a shipped recipe, such as ets-linear-svm, or path of your own')
+    parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
+    parser.add_argument('-o', '--out', required=True, metavar='FILE', help='recipe that is written, such as best.yaml')
+    parser.add_argument('--search', default='', metavar='NAME', help='search space: a shipped one, or a YAML file')
+    parser.add_argument('--grades', default='', metavar='FILE', help='CSV file texture,grade: tune a roughness recipe')
+    parser.add_argument('--per-pair', action='store_true', help='a recipe for each pair of surfaces by itself')
+    parser.add_argument(
+        '--objective', choices=OBJECTIVES, default=usual.objective, help='accuracy alone, or its front with computing'
+    )
+    parser.add_argument('--population', type=int, default=usual.population, metavar='N', help='of a generation')
+    parser.add_argument('--generations', type=int, default=usual.generations, metavar='N', help='the first included')
+    parser.add_argument('--halves', type=int, default=usual.halves, metavar='N', help='random divisions judged on')
+    parser.add_argument('--all-halves', action='store_true', help='judge each individual on all, however bad it is')
+    parser.add_argument('--jobs', type=int, default=-1, metavar='N', help='cores to use; -1: all')
+    parser.add_argument('--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead')
+    parser.add_argument('--resume', action='store_true', help='go on from the checkpoint beside FILE')
+    add_slides(parser)
+    add_channels(parser)
+    add_seed(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Search, write the recipe, and say how good it is."""
+    wanted = Wanted(
+        recipe=options.recipe,
+        bags=tuple(options.bags),
+        search=options.search,
+        slides=options.slides,
+        channels=options.channels or 'all',
+        grades=options.grades,
+        per_pair=options.per_pair,
+    )
+    chosen = {name: getattr(options, name) for name in ('population', 'generations', 'halves', 'seed', 'objective')}
+    params = from_mapping(SearchParams, {**chosen, 'race': not options.all_halves}, 'texture optimise')
+    progress = Progress()
+    try:
+        written = optimise_from_bags(
+            wanted,
+            params,
+            options.out,
+            over=over_machine(options.jobs, options.dask),
+            resume=options.resume,
+            tell=progress.tell,
+        )
+    except KeyboardInterrupt:
+        progress.end()
+        print(f"scores are kept in '{checkpoint_of(options.out)}': go on with --resume", file=sys.stderr)
+        raise
+    progress.end()
+    print('\n'.join(written.lines))
+    for path in written.files:
+        print(f'  {path}')
+    return 0
+
+
+@dataclass
+class Progress:
+    """A bar that grows with the generations: on a terminal in place, else a line each."""
+
+    terminal: bool = field(default_factory=sys.stderr.isatty)
+    _began_s: float = field(default_factory=time.monotonic)
+
+    def tell(self, pair: str, generation: Generation) -> None:
+        """Show where the search is."""
+        text = bar(generation, time.monotonic() - self._began_s, pair)
+        ending = '\r' if self.terminal and generation.number < generation.of else '\n'
+        print(f'\x1b[2K{text}' if self.terminal else text, end=ending, file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        """Leave the line of the bar."""
+        if self.terminal:
+            print(file=sys.stderr)
+
+
+def bar(generation: Generation, taken_s: float, pair: str = '') -> str:
+    """Return one line: how far, how good, how many tried, how long."""
+    done = BAR * generation.number // generation.of
+    return (
+        f'{pair}{": " if pair else ""}[{"#" * done}{"." * (BAR - done)}] {generation.number}/{generation.of}  '
+        f'best {100 * generation.best.fitness:.2f} %  {generation.judged} tried, {generation.remembered} remembered, '
+        f'{generation.halves} halves  {taken_s:.0f} s'
+    )

@@ -1,0 +1,71 @@
+"""`texture train`: learn a model from labelled bags."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from texture_core.command_options import add_channels, add_seed, add_slides
+from texture_estimation.model import Model
+from texture_estimation.roughness.model import RoughnessModel
+from texture_evaluation.train import train_from_bags
+from texture_evaluation.train_grades import train_grades_from_bags
+
+# What `--channels all` makes of a recipe that uses the vibration alone.
+WITH_SLOW_CHANNELS = {'default': 'vibration-and-taxels'}
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the sub-command."""
+    parser.add_argument(
+        'recipe', help='name of a shipped recipe, such as default, or roughness with --grades, or path of your own'
+    )
+    parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
+    parser.add_argument(
+        '--grades', metavar='FILE', help='CSV file texture,grade: learn to grade roughness, by a roughness recipe'
+    )
+    parser.add_argument('-o', '--out', required=True, metavar='MODEL', help='makes MODEL.skops and MODEL.json')
+    add_slides(parser)
+    add_channels(parser)
+    add_seed(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Train, save, and say what was learnt."""
+    if options.grades:
+        graded = train_grades_from_bags(options.recipe, options.bags, options.grades, options.slides, options.out)
+        print('\n'.join(graded_summary(graded, Path(options.out))))
+        return 0
+    recipe = WITH_SLOW_CHANNELS.get(options.recipe, options.recipe) if options.channels == 'all' else options.recipe
+    model = train_from_bags(recipe, options.bags, options.slides, options.out, channels=options.channels or 'all')
+    for line in summary(model, Path(options.out)):
+        print(line)
+    return 0
+
+
+def summary(model: Model, out: Path) -> list[str]:
+    """Return what a model knows and how well it did on what was held out, in lines."""
+    training = model.training
+    accuracy = training['held_out_window_accuracy']
+    held_out = (
+        'nothing could be held out' if accuracy is None else f'{100 * accuracy:.1f} % of the held-out windows right'
+    )
+    kinds = len(model.explorations.felt) if model.explorations else 0
+    return [
+        f"recipe '{model.recipe.name}' learnt {len(model.labels)} surfaces: {', '.join(model.labels)}",
+        f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
+        *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
+        f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it',
+    ]
+
+
+def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
+    """Return what a roughness model learnt and how it did on textures held out, in lines."""
+    training = model.training
+    error = training.get('held_out_error')
+    held_out = 'nothing could be held out' if error is None else f'{error:.2f} grades off on textures held out in turn'
+    return [
+        f"recipe '{model.recipe.name}' learnt the grades of {training['textures']} textures",
+        f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
+        f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it',
+    ]

@@ -1,1 +1,0 @@
-"""ROS nodes of texture_evaluation."""

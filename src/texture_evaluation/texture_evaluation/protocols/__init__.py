@@ -1,1 +1,0 @@
-"""What is asked of which recorded data, and how it is split."""

@@ -1,1 +1,0 @@
-"""ROS parts of the evaluation that are not nodes."""

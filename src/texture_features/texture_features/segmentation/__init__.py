@@ -1,0 +1,1 @@
+"""Segmentation: start and end of sliding, found from the signals alone."""

@@ -1,0 +1,1 @@
+"""Spectra that several features share."""

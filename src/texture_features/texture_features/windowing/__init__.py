@@ -1,0 +1,1 @@
+"""Windows: which part of a stream is classified at once."""

@@ -1,0 +1,227 @@
+"""Read an XML launch file: from its elements, in order, to the nodes it asks for.
+
+The elements and their attributes are a subset of upstream's (`ros2 launch`), with the same meaning: a `group` is a
+scope of its own, an `include` is not, so the arguments given to it stay set behind it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from texture_core.catalogue import unknown
+from texture_core.errors import InvalidLaunch, TextureError
+from texture_core.files import FileRefused, read_bounded
+from texture_launch.description import Argument, NodeDescription
+from texture_launch.elements import CONDITIONS, attribute, check_form, is_declaration, truth
+from texture_launch.node_element import joined_namespace, read_node
+from texture_launch.scope import Scope
+
+MOST_INCLUDES = 20  # of files within each other
+MOST_BYTES = 200_000  # of one file; the longest in use has 5 kB
+MOST_DEPTH = 30  # of elements within each other
+MOST_ELEMENTS = 5000  # in one file, and that are performed in all files together
+
+
+class _BoundedTree(ElementTree.TreeBuilder):
+    """Build the tree of a file that is neither deep nor large, and defines no entities."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._depth = self._count = 0
+
+    def start(self, tag: str, attrs: dict[str, str], /) -> Element:
+        """Begin an element."""
+        self._depth += 1
+        self._count += 1
+        if self._depth > MOST_DEPTH or self._count > MOST_ELEMENTS:
+            raise FileRefused(
+                f'it has more than {MOST_ELEMENTS} elements, or some more than {MOST_DEPTH} deep within each other'
+            )
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> Element:
+        """End an element."""
+        self._depth -= 1
+        return super().end(tag)
+
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Refuse what could define entities that multiply."""
+        raise FileRefused('it has a DOCTYPE, which no launch file needs')
+
+
+@dataclass
+class Reading:
+    """What has been read so far: nodes, names of all declared arguments, and the files being read."""
+
+    nodes: list[NodeDescription] = field(default_factory=list)
+    declared: set[str] = field(default_factory=set)
+    files: list[Path] = field(default_factory=list)
+    elements: int = 0
+
+
+def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -> list[NodeDescription]:
+    """Return the nodes that a launch file asks for, in its order.
+
+    Parameters
+    ----------
+    given
+        Launch arguments by name.
+    environment
+        Environment of the launcher: what `$(env …)` sees and the nodes inherit.
+
+    Raises
+    ------
+    InvalidLaunch, UnknownName
+        With the file and what is wrong in it.
+    """
+    reading = Reading()
+    _read_file(path, Scope(dict(given), dict(environment)), reading)
+    for name in given:
+        if name not in reading.declared:
+            raise unknown(name, reading.declared, f'argument of {path.name}')
+    return reading.nodes
+
+
+def declared_arguments(path: Path) -> list[Argument]:
+    """Return the arguments that a launch file itself declares."""
+    elements = [item for item in _parse(path).iter('arg') if is_declaration(item)]
+    return [Argument(item.get('name', ''), item.get('default'), item.get('description', '')) for item in elements]
+
+
+def all_arguments(path: Path, environment: Mapping[str, str]) -> list[Argument]:
+    """Return the arguments of a launch file, and of those it includes at a place that no argument decides."""
+    found = {argument.name: argument for argument in declared_arguments(path)}
+    for included in _certain_includes(path, environment, {path}):
+        for argument in declared_arguments(included):
+            found.setdefault(argument.name, argument)
+    return list(found.values())
+
+
+def _certain_includes(path: Path, environment: Mapping[str, str], seen: set[Path]) -> Iterator[Path]:
+    """Yield the files that a file includes at a place that no argument decides, and those that they include, once."""
+    for element in _parse(path).iter('include'):
+        with contextlib.suppress(TextureError):
+            included = Path(Scope({}, dict(environment)).expand(attribute(element, 'file')))
+            if included in seen or len(seen) > MOST_INCLUDES:
+                continue
+            seen.add(included)
+            inner = list(_certain_includes(included, environment, seen))
+            yield included
+            yield from inner
+
+
+def _parse(path: Path) -> Element:
+    try:
+        content = read_bounded(path, MOST_BYTES)
+        root: Element = ElementTree.fromstring(content, ElementTree.XMLParser(target=_BoundedTree()))
+    except OSError as error:
+        raise InvalidLaunch(f"launch file '{path}' cannot be read: {error.strerror}") from error
+    except FileRefused as error:
+        raise InvalidLaunch(f"launch file '{path}' is not read: {error}") from error
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: of its encoding
+        raise InvalidLaunch(f"launch file '{path}' is not well-formed XML: {error}") from error
+    if root.tag != 'launch':
+        raise InvalidLaunch(f"launch file '{path}' begins with <{root.tag}>; <launch> is needed")
+    return root
+
+
+def _read_file(path: Path, scope: Scope, reading: Reading) -> None:
+    root = _parse(path)
+    if len(reading.files) > MOST_INCLUDES:
+        raise InvalidLaunch(f"'{path}' is included more than {MOST_INCLUDES} levels deep; does it include itself?")
+    reading.files.append(path)
+    # Also those behind a condition that is not met: to give one of them is no error.
+    reading.declared |= {argument.name for argument in declared_arguments(path)}
+    try:
+        check_form(root, 'launch')
+        _read_children(root, scope, reading)
+    except TextureError as error:
+        raise type(error)(f'{path.name}: {error}') from error
+    reading.files.pop()
+
+
+def _read_children(parent: Element, scope: Scope, reading: Reading) -> None:
+    for element in parent:
+        reading.elements += 1
+        if reading.elements > MOST_ELEMENTS:
+            raise InvalidLaunch(
+                f'the files included have more than {MOST_ELEMENTS} elements; do they include each other?'
+            )
+        if element.tag not in READERS:
+            raise unknown(element.tag, READERS, 'launch element')
+        check_form(element, element.tag)
+        if _wanted(element, scope):
+            READERS[element.tag](element, scope, reading)
+
+
+def _wanted(element: Element, scope: Scope) -> bool:
+    given = [name for name in CONDITIONS if name in element.attrib]
+    if len(given) > 1:
+        raise InvalidLaunch(f"<{element.tag}> has both 'if' and 'unless'; give one of them")
+    if not given:
+        return True
+    met = truth(scope.expand(element.attrib[given[0]]), f"'{given[0]}' of <{element.tag}>")
+    return met == (given[0] == 'if')
+
+
+def _read_arg(element: Element, scope: Scope, _reading: Reading) -> None:
+    name = attribute(element, 'name')
+    if name not in scope.variables:
+        if 'default' not in element.attrib:
+            raise InvalidLaunch(f"argument '{name}' is required; give {name}:=VALUE")
+        scope.variables[name] = scope.expand(element.attrib['default'])
+    choices = [attribute(choice, 'value') for choice in element]
+    if choices and scope.variables[name] not in choices:
+        raise InvalidLaunch(f"argument '{name}' is '{scope.variables[name]}'; allowed is one of {', '.join(choices)}")
+
+
+def _read_let(element: Element, scope: Scope, _reading: Reading) -> None:
+    scope.variables[scope.expand(attribute(element, 'name'))] = scope.expand(attribute(element, 'value'))
+
+
+def _read_set_env(element: Element, scope: Scope, _reading: Reading) -> None:
+    scope.environment[scope.expand(attribute(element, 'name'))] = scope.expand(attribute(element, 'value'))
+
+
+def _read_namespace(element: Element, scope: Scope, _reading: Reading) -> None:
+    scope.namespace = joined_namespace(scope.namespace, scope.expand(attribute(element, 'namespace'))) or '/'
+
+
+def _read_group(element: Element, scope: Scope, reading: Reading) -> None:
+    scoped = truth(element.get('scoped', 'true'), "'scoped' of <group>")
+    _read_children(element, scope.copy() if scoped else scope, reading)
+
+
+def _read_include(element: Element, scope: Scope, reading: Reading) -> None:
+    path = Path(scope.expand(attribute(element, 'file')))
+    known = {argument.name for argument in declared_arguments(path)}
+    given = {}
+    for item in element:
+        check_form(item, 'arg of an include')
+        name = scope.expand(attribute(item, 'name'))
+        if name not in known:
+            raise unknown(name, known, f'argument of {path.name}')
+        given[name] = scope.expand(attribute(item, 'value'))
+    scope.variables.update(given)
+    _read_file(path, scope, reading)
+
+
+def _read_node(element: Element, scope: Scope, reading: Reading) -> None:
+    reading.nodes.append(read_node(element, scope))
+
+
+READERS: Mapping[str, Callable[[Element, Scope, Reading], None]] = {
+    'arg': _read_arg,
+    'let': _read_let,
+    'set_env': _read_set_env,
+    'push_ros_namespace': _read_namespace,
+    'push-ros-namespace': _read_namespace,
+    'group': _read_group,
+    'include': _read_include,
+    'node': _read_node,
+}

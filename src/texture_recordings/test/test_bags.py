@@ -1,0 +1,244 @@
+import contextlib
+import dataclasses
+import math
+import os
+import re
+import sqlite3
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lz4.frame import compress as lz4_compress
+from rosbags.rosbag2 import ReaderError, storage_mcap
+
+from texture_core.errors import InvalidData
+from texture_core.estimates import RoughnessEstimate, TextureEstimate
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.features import FeatureVector
+from texture_core.signal import TactileSignal
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import find_bags, read_bag, read_raw
+from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode
+
+if sys.version_info >= (3, 14):
+    from compression.zstd import compress as zstd_compress
+else:
+    from backports.zstd import compress as zstd_compress
+
+STAMP_NS = 1_700_000_000_123_456_789
+
+
+def signal(first_sample: int = 7, channels: tuple[str, ...] = ('a', 'b')) -> TactileSignal:
+    samples = np.arange(5 * len(channels), dtype=np.float32).reshape(5, -1) + first_sample
+    return TactileSignal(STAMP_NS + first_sample, 'x/y', channels, 'count', 1000.0, first_sample, samples, 'tip')
+
+
+VALUES = [
+    ('signal', signal()),
+    ('exploration', ExplorationState(STAMP_NS, 'e1', 'linear_slide', Phase.SLIDE, 0.5, 0.1, 2.0, surface='cork')),
+    ('features', FeatureVector(STAMP_NS, 'e1', 0.5, 0.1, ('f', 'g'), np.array([1.5, math.nan]), feature_set='abc')),
+    (
+        'texture',
+        TextureEstimate(STAMP_NS, 'e1', 'cork', True, 0.9, ('cork', 'felt'), (0.9, 0.1), True, ('cork',), 3, 0.7),
+    ),
+    ('roughness', RoughnessEstimate(STAMP_NS, 'e1', True, 3.5, 0.4)),
+]
+
+
+def write(path: Path, count: int = 200, namespace: str = '/') -> Path:
+    with BagWriter(path, namespace) as bag:
+        for index in range(count):
+            bag.write('signal', signal(5 * index), STAMP_NS + index)
+    return path
+
+
+@pytest.mark.parametrize(('topic', 'value'), VALUES)
+def test_what_is_written_is_read(topic: str, value: object, tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write(topic, value, 42)
+    ((topic_read, log_ns, read),) = read_bag(tmp_path / 'bag')
+    assert (topic_read, log_ns) == (topic, 42)
+    for field in dataclasses.fields(value):
+        np.testing.assert_array_equal(getattr(read, field.name), getattr(value, field.name))
+
+
+def test_every_message_of_the_suite_is_in_the_table_and_tested() -> None:
+    assert {type(value) for _, value in VALUES} == set(MESSAGES.values())
+
+
+def test_messages_come_in_the_order_of_their_log_times_whatever_the_order_of_writing(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag') as bag:
+        for log_ns in (3, 1, 2):
+            bag.write('signal', signal(log_ns), log_ns)
+    assert [value.first_sample for _, _, value in read_bag(tmp_path / 'bag')] == [1, 2, 3]
+
+
+def test_the_fast_decoder_agrees_with_the_general_one_when_the_stream_changes() -> None:
+    decoder = SignalDecoder()
+    for sent in (signal(0), signal(5), signal(10, ('a', 'b', 'c')), signal(15), signal(2**40)):
+        fast, general = decoder.decode(encode(sent)), decode(encode(sent), TYPES[TactileSignal])
+        for field in dataclasses.fields(sent):
+            np.testing.assert_array_equal(getattr(fast, field.name), getattr(general, field.name))
+
+
+def test_topics_are_chosen_by_the_last_part_of_their_name(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag', '/left') as bag:
+        bag.write('signal', signal(), 1)
+        bag.write('features', VALUES[2][1], 2)
+    assert [topic for topic, _, _ in read_bag(tmp_path / 'bag', ('features',))] == ['features']
+    assert [message.topic for message in read_raw(tmp_path / 'bag')] == ['/left/signal', '/left/features']
+
+
+def test_of_several_namespaces_one_must_be_named(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write('/left/signal', signal(1), 1)
+        bag.write('/right/signal', signal(2), 2)
+    with pytest.raises(InvalidData, match='/left, /right; name one'):
+        list(read_bag(tmp_path / 'bag'))
+    with pytest.raises(InvalidData, match="no namespace '/middle'"):
+        list(read_bag(tmp_path / 'bag', namespace='middle'))
+    ((_, _, value),) = read_bag(tmp_path / 'bag', namespace='/right')
+    assert value.first_sample == 2
+
+
+def test_only_the_stretch_asked_for_is_read(tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag', count=10)
+    assert [log_ns - STAMP_NS for _, log_ns, _ in read_bag(bag, start_ns=STAMP_NS + 3, stop_ns=STAMP_NS + 5)] == [3, 4]
+
+
+def test_a_bag_is_never_overwritten(tmp_path: Path) -> None:
+    write(tmp_path / 'bag')
+    with pytest.raises(InvalidData, match='exists already'):
+        BagWriter(tmp_path / 'bag')
+
+
+def test_a_bag_is_complete_even_if_writing_ended_with_an_error(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), BagWriter(tmp_path / 'bag') as bag:
+        bag.write('signal', signal(), 1)
+        raise RuntimeError
+    assert len(list(read_bag(tmp_path / 'bag'))) == 1
+
+
+def test_a_missing_bag_a_foreign_folder_and_a_foreign_file_are_refused_with_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / 'notes.txt').write_text('no bag')
+    with pytest.raises(InvalidData, match='there is no bag'):
+        list(read_bag(tmp_path / 'nothing'))
+    for foreign in (tmp_path, tmp_path / 'notes.txt'):
+        with pytest.raises(InvalidData, match='is no bag; a folder'):
+            list(read_bag(foreign))
+
+
+def test_a_bag_without_messages_of_the_suite_is_refused(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag'):
+        pass
+    with pytest.raises(InvalidData, match='holds nothing'):
+        list(read_bag(tmp_path / 'bag'))
+
+
+def test_a_recording_that_was_cut_off_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag')
+    (bag / 'metadata.yaml').unlink()
+    with pytest.raises(InvalidData, match='cut off'):
+        list(read_bag(bag))
+
+
+def test_a_damaged_bag_is_refused_or_read_whole_whichever_byte_is_wrong(tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag')
+    file = bag / 'bag.mcap'
+    good = file.read_bytes()
+    random = np.random.default_rng(1)
+    for size in random.integers(0, len(good), 20):
+        file.write_bytes(good[:size])
+        with pytest.raises(InvalidData):
+            list(read_bag(bag))
+    for place in random.integers(0, len(good), 100):
+        file.write_bytes(good[:place] + bytes([good[place] ^ 4]) + good[place + 1 :])
+        try:
+            assert len(list(read_bag(bag))) == 200
+        except InvalidData:
+            continue
+
+
+ONE_RECORD = b'\x05' + (10**7 - 9).to_bytes(8, 'little') + bytes(10**7 - 9)
+
+
+@pytest.mark.parametrize('packed', [zstd_compress(ONE_RECORD), lz4_compress(ONE_RECORD)], ids=['zstd', 'lz4'])
+def test_a_chunk_is_unpacked_no_further_than_it_claims(packed: bytes) -> None:
+    kind = 'lz4' if packed.startswith(b'\x04\x22') else 'zstd'
+    assert len(storage_mcap.DECOMPRESSORS[kind](packed, 100)) == 101
+    assert storage_mcap.decompress(packed, kind, 10**7, 0) == ONE_RECORD
+    for claimed in (100, 10**10):
+        with pytest.raises(ReaderError, match=r'claims to unpack|size mismatch'):
+            storage_mcap.decompress(packed, kind, claimed, 0)
+
+
+def test_a_chunk_of_few_bytes_holds_few_records() -> None:
+    packed = zstd_compress((b'\x05' + (22).to_bytes(8, 'little') + bytes(22)) * 100_000)
+    with pytest.raises(ReaderError, match=r'more than .* records'):
+        storage_mcap.decompress(packed, 'zstd', 3_100_000, 0)
+
+
+def chunk_bomb(bag: Path) -> None:
+    """Let the index name the first chunk twenty times, as if there were so many."""
+    file = bag / 'bag.mcap'
+    content = file.read_bytes()
+    summary = int.from_bytes(content[-28:-20], 'little')
+    at = summary
+    while content[at] != 0x08:
+        at += 9 + int.from_bytes(content[at + 1 : at + 9], 'little')
+    end = at + 9 + int.from_bytes(content[at + 1 : at + 9], 'little')
+    file.write_bytes(content[:end] + content[at:end] * 19 + content[end:])
+
+
+def test_an_index_that_names_a_chunk_many_times_is_refused(tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag')
+    chunk_bomb(bag)
+    with pytest.raises(InvalidData, match='chunks overlap'):
+        list(read_bag(bag))
+
+
+def test_a_bag_of_a_named_pipe_or_a_device_is_refused_at_once(tmp_path: Path) -> None:
+    for name in ('bag.mcap', 'metadata.yaml'):
+        bag = write(tmp_path / name / 'bag')
+        (bag / name).unlink()
+        os.mkfifo(bag / name)
+        with pytest.raises(InvalidData, match=r'named pipe|no metadata'):
+            list(read_bag(bag))
+        (bag / name).unlink()
+        (bag / name).symlink_to('/dev/zero')
+        with pytest.raises(InvalidData, match=r'device|no metadata'):
+            list(read_bag(bag))
+
+
+COMPUTED = {
+    'a computed column': 'CREATE TABLE messages(id INTEGER, topic_id, timestamp, data AS (zeroblob(100000000)))',
+    'a view': 'CREATE TABLE messages(id, topic_id, timestamp, data); CREATE VIEW schema AS SELECT 1 AS schema_version',
+}
+
+
+@pytest.mark.parametrize('what', COMPUTED)
+def test_an_sqlite_bag_that_computes_is_refused(what: str, tmp_path: Path) -> None:
+    bag = write(tmp_path / 'bag')
+    metadata = bag / 'metadata.yaml'
+    metadata.write_text(metadata.read_text().replace('bag.mcap', 'bag.db3').replace(': mcap', ': sqlite3'))
+    with contextlib.closing(sqlite3.connect(bag / 'bag.db3')) as made:
+        made.executescript(f'CREATE TABLE topics(id, name, type, serialization_format); {COMPUTED[what]}')
+    with pytest.raises(InvalidData, match='tables that are computed'):
+        list(read_bag(bag))
+
+
+def test_a_bag_compressed_as_a_whole_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    file = write(tmp_path / 'bag') / 'metadata.yaml'
+    changed = re.sub('compression_mode: .*', 'compression_mode: MESSAGE', file.read_text())
+    assert changed != file.read_text()
+    file.write_text(changed)
+    with pytest.raises(InvalidData, match='ros2 bag convert'):
+        list(read_bag(tmp_path / 'bag'))
+
+
+def test_a_folder_of_bags_stands_for_its_bags(tmp_path: Path) -> None:
+    bags = [write(tmp_path / 'all' / name) for name in ('b', 'a')]
+    assert find_bags([tmp_path / 'all']) == sorted(bags)
+    with pytest.raises(InvalidData, match='no bag was given'):
+        find_bags([])

@@ -1,0 +1,18 @@
+import pytest
+
+from texture_core.estimates import RoughnessEstimate, TextureEstimate
+from texture_core.exploration import ExplorationState, Phase
+from texture_recordings.cdr import TYPES, decode, encode
+
+
+@pytest.mark.parametrize(
+    'value',
+    [
+        ExplorationState(1, 'e', 'circular', Phase.SLIDE, 0.5, 0.1, 2.0, 0.0, 0.5, 'cork'),
+        TextureEstimate(1, 'e', 'cork', True, 0.9, ('cork', 'felt'), (0.9, 0.1), True, ('cork',), 3, 0.7),
+        RoughnessEstimate(1, 'e', True, 3.5, 0.4),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_a_value_comes_back_equal_to_the_type_of_each_field(value: object) -> None:
+    assert decode(encode(value), TYPES[type(value)]) == value

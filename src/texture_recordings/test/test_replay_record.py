@@ -1,0 +1,94 @@
+"""Both nodes as real processes: what is replayed into the graph and recorded from it is what was in the bag."""
+
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import TactileSignal
+from texture_launch.node_process import NodeProcess
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import read_bag
+
+pytestmark = pytest.mark.ros
+
+STEP_NS = 10_000_000
+
+
+def write(path: Path, lost: int = 0) -> Path:
+    with BagWriter(path) as bag:
+        for count in range(200):
+            stamp_ns = 10**18 + count * STEP_NS
+            state = ExplorationState(
+                stamp_ns, f'slide{count // 100}', 'linear_slide', Phase.SLIDE, 0.01, surface='cork'
+            )
+            samples = np.full((10, 1), count, dtype=np.float32)
+            first = 10 * count + (lost if count > 150 else 0)
+            bag.write('exploration', state, stamp_ns)
+            bag.write(
+                'signal', TactileSignal(stamp_ns, 's', ('a',), '', 1000.0, first, samples), stamp_ns + STEP_NS - 1
+            )
+    return path
+
+
+def node(name: str, domain_id: int, **parameters: object) -> NodeProcess:
+    return NodeProcess('texture_recordings', name, parameters, namespace='/left', domain_id=domain_id)
+
+
+def wait_for(path: Path, deadline_s: float = 30.0) -> None:
+    end = time.monotonic() + deadline_s
+    while not path.exists():
+        assert time.monotonic() < end, f'{path} did not appear'
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_what_is_replayed_is_recorded_whole_and_in_order(number: int, tmp_path: Path) -> None:
+    source = write(tmp_path / 'source', lost=5)
+    with node('record', 50, out=str(tmp_path / 'copy')) as record:
+        wait_for(tmp_path / 'copy')
+        with node('replay', 50, bag=str(source), rate=5.0) as replay:
+            assert replay.wait(60.0) == 0, replay.output
+        assert record.stop(number) == 0, record.output
+    assert 'published 200 exploration, 200 signal' in replay.output
+    assert '5 lost samples' in record.output
+    for topic in ('signal', 'exploration'):
+        sent = [value for _, _, value in read_bag(source, (topic,))]
+        got = [value for _, _, value in read_bag(tmp_path / 'copy', (topic,))]
+        assert [value.stamp_ns for value in got] == [value.stamp_ns for value in sent]
+    np.testing.assert_array_equal(
+        [value.samples for _, _, value in read_bag(tmp_path / 'copy', ('signal',), '/left')],
+        [value.samples for _, _, value in read_bag(source, ('signal',))],
+    )
+
+
+def test_the_rate_and_the_chosen_slides_are_kept(tmp_path: Path) -> None:
+    source = write(tmp_path / 'source')
+    with node('replay', 51, bag=str(source), rate=2.0, slides='2', subscribers=0, start_delay_s=0.0) as replay:
+        assert replay.wait(60.0) == 0, replay.output
+    assert 'published 100 exploration, 100 signal: 1.0 s in 0.5 s' in replay.output
+
+
+@pytest.mark.parametrize(
+    ('name', 'parameters', 'sentence'),
+    [
+        ('replay', {}, "parameter 'bag' is ''"),
+        ('replay', {'bag': 'nowhere'}, "there is no bag 'nowhere'"),
+        ('replay', {'bag': 'source', 'deadline_s': 0.2}, 'did not get 1 subscription(s); start what shall listen'),
+        ('replay', {'bag': 'source', 'slides': '7-9'}, 'there are 1 to 2'),
+        ('record', {}, "parameter 'out' is ''"),
+        ('record', {'out': 'source'}, 'exists already'),
+    ],
+)
+def test_a_mistake_ends_the_node_with_code_2_and_a_sentence(
+    name: str, parameters: dict[str, object], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path / 'source')
+    monkeypatch.chdir(tmp_path)
+    with node(name, 52, **parameters) as process:
+        assert process.wait(60.0) == 2, process.output
+    assert sentence in process.output
+    assert 'Traceback' not in process.output

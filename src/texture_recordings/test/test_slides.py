@@ -1,0 +1,72 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidData
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.slides import find_slides, parse_selection, read_slides
+
+
+def write(path: Path, surfaces: list[str], start_s: int) -> Path:
+    with BagWriter(path) as bag:
+        for count, surface in enumerate(surfaces):
+            stamp_ns = (start_s + 10 * count) * NANOSECONDS
+            name = f'{path.stem}/{count}'
+            for step, phase in enumerate((Phase.APPROACH, Phase.SLIDE, Phase.DONE)):
+                state = ExplorationState(stamp_ns + step, name, 'linear_slide', phase, surface=surface)
+                bag.write('exploration', state, stamp_ns + step)
+            samples = np.full((1, 1), count, dtype=np.float32)
+            bag.write('signal', TactileSignal(stamp_ns, 's', ('a',), '', 1.0, count, samples), stamp_ns + 5)
+    return path
+
+
+@pytest.mark.parametrize(
+    ('text', 'numbers'),
+    [('1-3', {1, 2, 3}), ('1,3,5-7', {1, 3, 5, 6, 7}), (' 4 ', {4}), ('2-2', {2}), ('', None)],
+)
+def test_a_selection_names_numbers_and_ranges(text: str, numbers: set[int] | None) -> None:
+    assert parse_selection(text) == numbers
+
+
+@pytest.mark.parametrize('text', ['0-3', '3-1', 'all', '1-', '1;2', '-1', '1,,2', '1.5'])
+def test_a_selection_that_makes_no_sense_is_refused_with_a_sentence(text: str) -> None:
+    with pytest.raises(InvalidData, match="numbers from 1 and ranges are needed, such as '1-30'"):
+        parse_selection(text)
+
+
+def test_slides_are_counted_for_each_surface_in_the_order_recorded_over_all_bags(tmp_path: Path) -> None:
+    late = write(tmp_path / 'late', ['cork', 'felt'], start_s=1000)
+    early = write(tmp_path / 'early', ['felt', 'cork', 'felt'], start_s=0)
+    found = {slide.exploration_id: (slide.surface, slide.number) for slide in find_slides([late, early])}
+    assert found == {
+        'early/0': ('felt', 1),
+        'early/1': ('cork', 1),
+        'early/2': ('felt', 2),
+        'late/0': ('cork', 2),
+        'late/1': ('felt', 3),
+    }
+    assert {slide.exploration_id for slide in find_slides([late, early], '2')} == {'early/2', 'late/0'}
+
+
+def test_a_slide_yields_its_own_messages_only(tmp_path: Path) -> None:
+    bags = [write(tmp_path / name, ['cork', 'felt', 'cork'], start_s=0) for name in 'ab']
+    read = list(read_slides(find_slides(bags, '1,3')))
+    assert len(read) == 3
+    for slide, messages in read:
+        (signal,) = [value for topic, _, value in messages if topic == 'signal']
+        assert slide.exploration_id.endswith(f'/{signal.samples[0, 0]:.0f}')
+        assert [topic for topic, _, _ in messages] == ['exploration'] * 3 + ['signal']
+
+
+def test_unlabelled_slides_are_left_out_and_a_bag_without_labels_is_refused(tmp_path: Path) -> None:
+    assert len(find_slides([write(tmp_path / 'some', ['', 'cork'], start_s=0)])) == 1
+    with pytest.raises(InvalidData, match='is labelled'):
+        find_slides([write(tmp_path / 'none', ['', ''], start_s=0)])
+
+
+def test_slides_that_no_surface_has_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidData, match='there are 1 to 2'):
+        find_slides([write(tmp_path / 'bag', ['cork', 'cork'], start_s=0)], '30-40')

@@ -1,0 +1,151 @@
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidData, UnknownName
+from texture_core.exploration import Phase
+from texture_core.signal import NANOSECONDS, lost_samples
+from texture_features.features.spatial_bands import SpatialBands
+from texture_recordings.bags import read_bag
+from texture_recordings.importers.catalogue import IMPORTS
+from texture_recordings.importers.fabricslide import import_fabricslide
+from texture_recordings.importers.ntp21 import evenly, import_ntp21
+from texture_recordings.slides import find_slides
+from texture_recordings.whole_slides import whole_slides
+
+PITCH_M = 10e-3
+
+
+def make_ntp21(folder: Path, speeds: tuple[int, ...] = (100, 20), forces: tuple[float, ...] = (1.5, 0.0)) -> Path:
+    """Write two textures in the format of the data set: a grating of 10 mm under every taxel, jittering stamps."""
+    rng, content = np.random.default_rng(0), {}
+    for texture in ('texture07', 'texture03'):
+        for speed in speeds:
+            for force in forces:
+                count = round(60.0 / speed * 322.0)
+                time_s = np.arange(count) / 322.0
+                wave = np.sin(2 * np.pi * time_s * speed / 1000.0 / PITCH_M)
+                stamps = time_s + np.r_[0.0, rng.uniform(-0.001, 0.001, count - 2), 0.0]
+                columns = [*[wave + taxel for taxel in range(9)], np.zeros(count), stamps]
+                content[f'{texture}/speed{speed:03d}/force{force}'] = np.stack(columns, axis=1).astype(np.float32)
+    folder.mkdir()
+    np.savez(folder / 'slides.npz', **content)
+    return folder
+
+
+def make_fabricslide(folder: Path) -> Path:
+    """Write one fabric of two forces, two directions, two speeds and two repeats, and two runs over a grating."""
+    content = {}
+    for force in (120, 150):
+        for speed in (-10, -50, 10, 50):
+            for repeat in (0, 1):
+                content[f'Canvas/F{force}/V{speed}/{repeat}'] = run(round(594 / abs(speed) / 0.028), speed, force)
+    for speed in (5, 30):
+        content[f'grating/Board10mm_F120_V-{speed}mmps_0'] = run(round(151 / speed / 0.028), speed, 120)
+    folder.mkdir()
+    np.savez(folder / 'runs.npz', **content)
+    return folder
+
+
+def run(rows: int, speed: int, force: int) -> np.ndarray:
+    time_s = 0.028 * np.arange(rows)
+    values = np.zeros((rows, 19), dtype=np.int32)
+    values[:, 0] = 1000 * time_s
+    wave = 40 * np.sin(2 * np.pi * time_s * abs(speed) / 1000.0 / PITCH_M)
+    values[:, 3:] = force + np.arange(16) + wave[:, None]
+    return values
+
+
+def conditions(bag: Path, topic: str) -> list[tuple[float, float]]:
+    return [(round(1000 * slide.speed_m_s), slide.force_n) for slide in whole_slides([bag], topic)]
+
+
+def test_slides_of_a_texture_are_numbered_by_speed_then_force(tmp_path: Path) -> None:
+    bags = import_ntp21(make_ntp21(tmp_path / 'in'), tmp_path / 'out')
+    assert [bag.name for bag in bags] == ['texture03', 'texture07']
+    assert conditions(bags[0], 'signal') == [(20, 0.0), (20, 1.5), (100, 0.0), (100, 1.5)]
+    assert [slide.number for slide in find_slides(bags, '1-2')] == [1, 2, 1, 2]
+
+
+def test_a_slide_is_even_at_its_rate_and_covers_all_of_its_time(tmp_path: Path) -> None:
+    (bag,) = import_ntp21(make_ntp21(tmp_path / 'in'), tmp_path / 'out', slides='1', materials=['texture07'])
+    (slide,) = whole_slides([bag], 'signal')
+    batches = [value for _, _, value in read_bag(bag, ('signal',))]
+    assert lost_samples(batches) == 0
+    assert (slide.rate_hz, len(slide.channels), len(slide.before)) == (320.0, 9, 0)
+    assert slide.distance_m == pytest.approx(0.06, abs=2e-4)
+    assert slide.slide.exploration_id == 'texture07/speed020/force0.0'
+
+
+def test_a_slow_wave_passes_the_change_of_rate_unharmed() -> None:
+    def wave(rate_hz: float, count: int) -> np.ndarray:
+        return np.sin(2 * np.pi * 20.0 * np.arange(count) / rate_hz)[:, None]
+
+    np.testing.assert_allclose(evenly(wave(310.0, 311), 1.0), wave(320.0, 321), atol=1e-3)
+
+
+def test_runs_of_a_fabric_are_numbered_by_direction_force_speed_and_repeat(tmp_path: Path) -> None:
+    board, canvas = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out')
+    slides = whole_slides([canvas], 'signal_static')
+    assert [slide.slide.exploration_id for slide in slides][:5] == [
+        'Canvas/F120/V-10/0', 'Canvas/F120/V-10/1', 'Canvas/F120/V-50/0', 'Canvas/F120/V-50/1', 'Canvas/F150/V-10/0',
+    ]  # fmt: skip
+    assert [round(math.sin(slide.direction_rad)) for slide in slides] == [-1] * 8 + [1] * 8
+    assert {slide.force_n for slide in slides} == {1.2, 1.5}
+    assert conditions(board, 'signal_static') == [(5, 1.2), (30, 1.2)]
+
+
+def test_speeding_up_is_contact_and_no_slide(tmp_path: Path) -> None:
+    (canvas,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Canvas'])
+    for slide in whole_slides([canvas], 'signal_static'):
+        assert slide.distance_m == pytest.approx(0.5, abs=2e-3)
+        assert len(slide.before) / slide.rate_hz * slide.speed_m_s == pytest.approx(0.047, abs=2e-3)
+
+
+def test_the_line_of_a_printed_grating_stands_at_one_over_its_pitch_at_every_speed(tmp_path: Path) -> None:
+    (board,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Board10mm'])
+    bands = SpatialBands(bands=40, longest_m=0.05, shortest_m=2.5e-3, floor=1e-3)
+    for slide in whole_slides([board], 'signal_static'):
+        highest = bands(slide.windows()).argmax(axis=-1)
+        assert bands.edges_per_m[highest] == pytest.approx(1 / PITCH_M, rel=0.1)
+
+
+@pytest.mark.parametrize(('make', 'topic'), [(make_ntp21, 'signal'), (make_fabricslide, 'signal_static')])
+def test_states_come_before_the_samples_they_cover_and_a_slide_ends(tmp_path: Path, make, topic) -> None:
+    importer = IMPORTS[make.__name__.removeprefix('make_')]
+    bag = importer(make(tmp_path / 'in'), tmp_path / 'out', slides='1')[-1]
+    covered_ns = 0
+    for name, log_ns, value in read_bag(bag):
+        if name == 'exploration':
+            covered_ns = value.stamp_ns + round(value.steady_s * NANOSECONDS)
+        else:
+            assert name == topic
+            assert value.end_ns <= min(covered_ns + 1, log_ns)
+    assert value.phase is Phase.DONE
+
+
+def test_wrong_sources_names_numbers_and_channels_are_refused_with_a_sentence(tmp_path: Path) -> None:
+    ntp, fabric = make_ntp21(tmp_path / 'ntp'), make_fabricslide(tmp_path / 'fabric')
+    broken = tmp_path / 'broken'
+    broken.mkdir()
+    for file in ('slides.npz', 'runs.npz'):
+        (broken / file).write_bytes(b'nothing')
+    for importer, source, name in ((import_ntp21, ntp, 'texture30'), (import_fabricslide, fabric, 'Canvass')):
+        with pytest.raises(UnknownName, match='did you mean'):
+            importer(source, tmp_path / 'out', materials=[name])
+        with pytest.raises(InvalidData, match='none of the slides'):
+            importer(source, tmp_path / 'out', slides='500')
+        with pytest.raises(InvalidData, match='give the folder'):
+            importer(tmp_path, tmp_path / 'out')
+        with pytest.raises(InvalidData, match='no file of this data set'):
+            importer(broken, tmp_path / 'out')
+        with pytest.raises(InvalidData, match='channels are'):
+            importer(source, tmp_path / 'out', channels='some')
+
+
+def test_a_slide_without_the_topic_is_refused(tmp_path: Path) -> None:
+    bags = import_ntp21(make_ntp21(tmp_path / 'in'), tmp_path / 'out', slides='1')
+    with pytest.raises(InvalidData, match='name another topic'):
+        whole_slides(bags, 'signal_static')

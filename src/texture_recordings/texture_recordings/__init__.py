@@ -1,0 +1,1 @@
+"""Bags and labelled slides: recording, reading, replaying, importing and segmenting."""

@@ -1,0 +1,96 @@
+"""Write recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from texture_core.errors import InvalidData
+from texture_recordings.bags import RawMessage, short_name
+from texture_recordings.cdr import TYPES, encode, typestore
+
+FOREVER = QosTime(2147483647, 4294967295)
+
+
+def _offered(reliability: QosReliability, durability: QosDurability, depth: int) -> list[Qos]:
+    keep, lively = QosHistory.KEEP_LAST, QosLiveliness.AUTOMATIC
+    return [Qos(keep, depth, reliability, durability, FOREVER, FOREVER, lively, FOREVER, False)]
+
+
+# The same as texture_core.ros.qos, for `ros2 bag play`; by the last part of the topic's name.
+QOS: Mapping[str, list[Qos]] = {
+    'signal': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
+    'signal_static': _offered(QosReliability.BEST_EFFORT, QosDurability.VOLATILE, 200),
+    'exploration': _offered(QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL, 200),
+    'features': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 200),
+    'texture': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
+    'roughness': _offered(QosReliability.RELIABLE, QosDurability.VOLATILE, 50),
+}
+
+
+class BagWriter:
+    """Write a new bag; use it in a `with` block, at the end of which the bag is complete.
+
+    Parameters
+    ----------
+    path
+        Folder to make; nothing may exist there.
+    namespace
+        Put before topics that do not start with '/': 'signal' becomes '/left/signal' in '/left'.
+
+    Raises
+    ------
+    InvalidData
+        If something exists at `path`, or it cannot be made.
+    """
+
+    def __init__(self, path: str | Path, namespace: str = '/') -> None:
+        self.path = Path(path)
+        self._namespace = '/' + namespace.strip('/')
+        self._connections: dict[tuple[str, str], Connection] = {}
+        if self.path.exists():
+            raise InvalidData(f"'{path}' exists already; a bag is never overwritten, name another or remove it")
+        self._writer = Writer(self.path, version=8, storage_plugin=StoragePlugin.MCAP)
+        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        try:
+            self._writer.open()
+        except OSError as error:
+            raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
+
+    def write(self, topic: str, value: Any, log_ns: int) -> None:
+        """Write a data class of texture_core as received at `log_ns`."""
+        self.write_raw(RawMessage(topic, TYPES[type(value)], log_ns, encode(value)))
+
+    def write_raw(self, message: RawMessage) -> None:
+        """Write a message that is CDR already."""
+        key = message.topic, message.msgtype
+        if key not in self._connections:
+            self._connections[key] = self._connect(*key)
+        self._writer.write(self._connections[key], message.log_ns, message.data)
+
+    def close(self) -> None:
+        """Complete the bag; without this it cannot be read."""
+        self._writer.close()
+
+    def _connect(self, topic: str, msgtype: str) -> Connection:
+        name = topic if topic.startswith('/') else f'{self._namespace.rstrip("/")}/{topic}'
+        qos = QOS.get(short_name(name), [])
+        return self._writer.add_connection(name, msgtype, typestore=typestore(), offered_qos_profiles=qos)
+
+    def __enter__(self) -> BagWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,200 @@
+"""Find and read recordings: rosbag2 folders with MCAP inside, which `ros2 bag` opens too; no ROS is needed."""
+
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import apsw
+import yaml
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.typesys.base import TypesysError
+
+from texture_core.errors import InvalidData
+from texture_core.plain_data import parse_yaml
+from texture_core.signal import TactileSignal
+from texture_evaluation.bag_limits import CheckedPath, check_index, check_storage, messages_budget
+from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode, typestore
+
+if sys.version_info >= (3, 14):
+    from compression.zstd import ZstdError
+else:
+    from backports.zstd import ZstdError
+
+# What the reader raises, depending on which byte of a file is wrong.
+BROKEN = (
+    ReaderError, TypesysError, ZstdError, apsw.Error, yaml.YAMLError, OSError, EOFError, struct.error, RuntimeError,
+    ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
+)  # fmt: skip
+
+
+class RawMessage(NamedTuple):
+    """One message as it lies in a bag."""
+
+    topic: str
+    msgtype: str
+    log_ns: int
+    data: bytes
+
+
+def short_name(topic: str) -> str:
+    """Return the last part of a topic's name: 'signal' of '/left/signal'."""
+    return topic.rsplit('/', 1)[-1]
+
+
+def is_bag(path: Path) -> bool:
+    """Say whether something looks like a bag: a folder with metadata.yaml, or an MCAP file."""
+    return (path / 'metadata.yaml').is_file() or (path.is_file() and path.suffix == '.mcap')
+
+
+def find_bags(paths: Iterable[str | Path]) -> list[Path]:
+    """Return the bags among `paths`, each a bag or a folder of bags, in the order given and by name.
+
+    Raises
+    ------
+    InvalidData
+        If one is missing or neither.
+    """
+    found: list[Path] = []
+    for path in map(Path, paths):
+        inside = [path] if is_bag(path) else sorted(filter(is_bag, path.glob('*')))
+        if not inside:
+            raise InvalidData(_no_bag(path))
+        found += inside
+    if not found:
+        raise InvalidData('no bag was given; name one or more bags, or a folder of bags')
+    return found
+
+
+def _no_bag(path: Path) -> str:
+    if not path.exists():
+        return f"there is no bag '{path}'; give the folder that was recorded or imported"
+    if path.is_dir() and next(path.glob('*.mcap'), None):
+        return (
+            f"the bag '{path}' has no metadata.yaml, its recording was cut off; "
+            '`mcap recover` may save the .mcap file, which can be given by itself'
+        )
+    return f"'{path}' is no bag; a folder with metadata.yaml and an .mcap file, or a folder of such bags, is needed"
+
+
+def read_raw(
+    path: str | Path, namespace: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
+) -> Iterator[RawMessage]:
+    """Yield every message of a bag in the order of its log times, undecoded.
+
+    Parameters
+    ----------
+    path
+        The bag.
+    namespace
+        Only topics of this namespace; None if the bag has but one.
+    start_ns, stop_ns
+        Only messages logged from `start_ns` to before `stop_ns`.
+
+    Raises
+    ------
+    InvalidData
+        If there is no bag, it is damaged or foreign, or has several namespaces and none was named.
+    """
+    return _read(Path(path), lambda connection: True, namespace, start_ns, stop_ns)
+
+
+def read_bag(
+    path: str | Path,
+    topics: Iterable[str] | None = None,
+    namespace: str | None = None,
+    start_ns: int | None = None,
+    stop_ns: int | None = None,
+) -> Iterator[tuple[str, int, Any]]:
+    """Yield (topic, log time in ns, data class of texture_core) in the order of log times.
+
+    Only messages of the suite are read. Topics are named by their last part, 'signal' for '/left/signal', in
+    `topics` as in the answer; samples are views of the bytes read. The other arguments are those of `read_raw`.
+    """
+    wanted = None if topics is None else set(topics)
+    signals: dict[str, SignalDecoder] = {}
+
+    def chosen(connection: Connection) -> bool:
+        return connection.msgtype in MESSAGES and (wanted is None or short_name(connection.topic) in wanted)
+
+    for message in _read(Path(path), chosen, namespace, start_ns, stop_ns):
+        try:
+            if message.msgtype == TYPES[TactileSignal]:
+                value: Any = signals.setdefault(message.topic, SignalDecoder()).decode(message.data)
+            else:
+                value = decode(message.data, message.msgtype)
+        except InvalidData as error:
+            raise InvalidData(f"the bag '{path}' is damaged: {error}; record it anew") from error
+        yield short_name(message.topic), message.log_ns, value
+
+
+def _read(
+    path: Path,
+    chosen: Callable[[Connection], bool],
+    namespace: str | None,
+    start_ns: int | None,
+    stop_ns: int | None,
+) -> Iterator[RawMessage]:
+    if not is_bag(path):
+        raise InvalidData(_no_bag(path))
+    try:
+        checked = CheckedPath(path)
+        files = _files(checked)
+        for file in files:
+            check_storage(file)
+        budget = messages_budget(files)
+        with Reader(checked) as reader:
+            for storage in getattr(reader.storage, 'storages', [reader.storage]):
+                if hasattr(storage, 'chunks'):
+                    check_index(storage)
+            connections = [c for c in _of_namespace(path, reader.connections, namespace) if chosen(c)]
+            if not connections or not reader.message_count:
+                return
+            missing = sum(connection.msgcount for connection in connections)
+            for connection, log_ns, data in reader.messages(connections, start_ns, stop_ns):
+                missing -= 1
+                budget.spend(len(data))
+                yield RawMessage(connection.topic, connection.msgtype, log_ns, data)
+            if missing and start_ns is None and stop_ns is None:
+                raise ReaderError(f'{missing} of its messages are missing')
+    except BROKEN as error:
+        raise InvalidData(
+            f"the bag '{path}' cannot be read, it is damaged or cut off: {error}; record it anew"
+        ) from error
+
+
+def _files(path: Path) -> list[Path]:
+    """Return the files of a bag; one of `BROKEN` is raised if it may as a whole unpack to anything."""
+    if not path.is_dir():
+        return [path]
+    facts = parse_yaml((path / 'metadata.yaml').read_text(encoding='utf-8'))['rosbag2_bagfile_information']
+    if str(facts.get('compression_mode') or 'none').lower() != 'none':
+        raise ReaderError('it is compressed as a whole; let `ros2 bag convert` make it MCAP, which compresses inside')
+    # As rosbags finds them: beside the metadata, wherever the entry says that they were.
+    return [path / Path(str(name)).name for name in facts['relative_file_paths']]
+
+
+def _of_namespace(path: Path, connections: list[Connection], namespace: str | None) -> list[Connection]:
+    ours = [c for c in connections if c.msgtype in MESSAGES]
+    if not ours:
+        named = ', '.join(sorted({c.msgtype for c in connections})) or 'nothing'
+        raise InvalidData(
+            f"the bag '{path}' holds {named}; messages of texture_msgs are needed, record the suite's topics"
+        )
+    for connection in ours:
+        if connection.digest and connection.digest != typestore().hash_rihs01(connection.msgtype):
+            raise InvalidData(
+                f"the bag '{path}' was recorded with another definition of {connection.msgtype}; record it anew"
+            )
+    found = sorted({c.topic.rsplit('/', 1)[0] or '/' for c in ours})
+    if namespace is None and len(found) > 1:
+        raise InvalidData(f"the bag '{path}' has the namespaces {', '.join(found)}; name one of them")
+    prefix = found[0] if namespace is None else '/' + namespace.strip('/')
+    if prefix not in found:
+        raise InvalidData(f"the bag '{path}' has no namespace '{prefix}'; it has {', '.join(found)}")
+    common = [c for c in connections if c.topic == '/diagnostics']
+    return [c for c in ours if (c.topic.rsplit('/', 1)[0] or '/') == prefix] + common

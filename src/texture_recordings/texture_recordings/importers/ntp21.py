@@ -1,0 +1,92 @@
+"""The slides of a 9-taxel MEMS array over 21 textures at several speeds and forces, as labelled bags.
+
+Source: github LIMB-UCF/NTP ("Neuromorphic Real-time Tactile Perception Invariant to Contact Dynamics"), joined into one
+`slides.npz` with a key `textureNNN/speedSSS/forceF.F` (mm/s, N over contact) for each slide.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from texture_core.arrays import AnyArray, Array
+from texture_core.errors import InvalidData
+from texture_recordings.importers.slide_file import SlideFile
+from texture_recordings.importers.steady_slides import SteadySlide, Stream
+
+KEY = re.compile(r'([^/]+)/speed(\d+(?:\.\d+)?)/force(\d+(?:\.\d+)?)')
+TAXELS = 9
+TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out
+RATE_HZ = 320.0
+# The published signal has no unit.
+STREAM = Stream('signal', 'ntp/array', tuple(f'taxel{n}' for n in range(1, TAXELS + 1)), '', RATE_HZ)
+
+
+class Condition(NamedTuple):
+    """How one slide was made; sorted as the slides are numbered: by speed, then by force."""
+
+    speed_mm_s: float
+    force_n: float
+
+
+def place(key: str) -> tuple[str, Condition] | None:
+    """Return texture and condition of a key."""
+    match = KEY.fullmatch(key)
+    return (match[1], Condition(float(match[2]), float(match[3]))) if match else None
+
+
+def slide(key: str, texture: str, condition: Condition, recorded: AnyArray) -> SteadySlide:
+    """Return a slide, given its rows as recorded."""
+    samples = evenly(np.asarray(recorded[:, :TAXELS], dtype=float), float(recorded[-1, TIME] - recorded[0, TIME]))
+    return SteadySlide(key, texture, samples, condition.speed_mm_s / 1000.0, condition.force_n, math.nan)
+
+
+def evenly(samples: Array, duration_s: float) -> Array:
+    """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
+    own = np.linspace(0.0, duration_s, len(samples))
+    grid = np.arange(int(duration_s * RATE_HZ) + 1) / RATE_HZ
+    values: Array = CubicSpline(own, samples, axis=0)(grid)
+    return values
+
+
+DATA = SlideFile('slides.npz', STREAM, place, slide)
+
+
+def import_ntp21(
+    source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
+) -> list[Path]:
+    """Write one bag a texture, 'texture00' and so on, and return their paths.
+
+    The slides of a texture are numbered by speed, and by force within a speed: with four speeds and four forces, 1-4
+    are the slowest, of rising force, and 13-16 the fastest. The recorded stamps jitter by half a sample while the
+    samples are evenly spaced (read so, the speeds agree better with each other): each slide is read as evenly spaced
+    from its first stamp to its last, and brought from its own rate (310 to 323 Hz) to 320 Hz by a cubic spline.
+    `force_n` is the force beyond first contact.
+
+    Parameters
+    ----------
+    source
+        Folder of slides.npz.
+    out
+        Folder for the bags; made if missing.
+    slides
+        Which slides of each texture, such as '1-12'; '' for all.
+    materials
+        Names of textures; none for all.
+    channels
+        'fast' and 'all' are the same here: the nine taxels at 320 Hz.
+
+    Raises
+    ------
+    InvalidData
+        If the source lacks the file or slides, or a bag exists already.
+    """
+    if channels not in ('fast', 'all'):
+        raise InvalidData(f"channels are '{channels}'; 'fast' or 'all' is needed")
+    return DATA.write_bags(source, out, slides, materials)

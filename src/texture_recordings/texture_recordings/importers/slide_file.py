@@ -1,0 +1,74 @@
+"""A data set whose slides lie in one .npz file, to one bag for each surface."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from texture_core.arrays import AnyArray
+from texture_core.catalogue import unknown
+from texture_core.errors import InvalidData
+from texture_core.files import Arrays, open_regular
+from texture_recordings.importers.steady_slides import SteadySlide, Stream, write_steady_slides
+from texture_recordings.slides import parse_selection
+
+
+@dataclass(frozen=True)
+class SlideFile:
+    """What the file is called, and how its keys and arrays are read; slides are numbered in order of conditions."""
+
+    name: str
+    stream: Stream
+    place: Callable[[str], tuple[str, Any] | None]  # surface and condition of a key, None if it is no such key
+    slide: Callable[[str, str, Any, AnyArray], SteadySlide]  # of key, surface, condition and array
+
+    def write_bags(self, source: str | Path, out: str | Path, slides: str, surfaces: Sequence[str]) -> list[Path]:
+        """Write the slides of each surface that `slides` names ('' for all), of all surfaces if none is named.
+
+        Raises
+        ------
+        InvalidData, UnknownName
+            If the folder `source` lacks the file, slides or a surface, or a bag exists already.
+        """
+        content, wanted = self._read(Path(source)), parse_selection(slides)
+        found: defaultdict[str, list[tuple[Any, str]]] = defaultdict(list)
+        for key in content:
+            place = self.place(key)
+            if place is None:
+                raise InvalidData(f"'{self.name}' holds '{key}', which is no slide of this data set; fetch it anew")
+            found[place[0]].append((place[1], key))
+        for name in surfaces:
+            if name not in found:
+                raise unknown(name, found, 'surface')
+        return [
+            write_steady_slides(
+                Path(out) / name,
+                self.stream,
+                (
+                    self.slide(key, name, condition, content[key])
+                    for condition, key in _chosen(name, found[name], wanted)
+                ),
+            )
+            for name in (surfaces or sorted(found))
+        ]
+
+    def _read(self, folder: Path) -> dict[str, AnyArray]:
+        file = folder / self.name
+        if not file.is_file():
+            raise InvalidData(f"no file {self.name} in '{folder}'; give the folder that holds it")
+        try:
+            with open_regular(file) as opened:
+                content = Arrays(opened)
+                return {key: content[key] for key in content.names}
+        except (OSError, ValueError, KeyError) as error:
+            raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it anew") from error
+
+
+def _chosen(surface: str, slides: list[tuple[Any, str]], wanted: frozenset[int] | None) -> list[tuple[Any, str]]:
+    chosen = [slide for number, slide in enumerate(sorted(slides), 1) if wanted is None or number in wanted]
+    if not chosen:
+        raise InvalidData(f"'{surface}' has none of the slides asked for; it has 1 to {len(slides)}")
+    return chosen

@@ -1,0 +1,128 @@
+"""Record the topics of the suite into a bag."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.parameters import param
+from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.parameters import declare
+from texture_core.ros.run import run
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import RawMessage
+from texture_recordings.cdr import SignalDecoder
+from texture_recordings.continuity import Continuity
+from texture_recordings.ros.topics import TOPICS, Topic
+
+QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
+POLL_S = 0.2
+
+
+@dataclass(frozen=True)
+class RecordParams:
+    """Where to record."""
+
+    out: str = param('', 'Folder of the new bag; nothing may exist there.')
+
+
+class Record(Node):
+    """Write every message of the suite's topics to a bag, with the time of its arrival."""
+
+    def __init__(self) -> None:
+        super().__init__('record')
+        params = declare(self, RecordParams)
+        if not params.out:
+            raise InvalidParameter("parameter 'out' is ''; give the folder of the new bag")
+        self._path = params.out
+        self._bag = BagWriter(params.out)
+        self._counts: Counter[str] = Counter()
+        self._continuity = Continuity()
+        self._decoders: dict[str, SignalDecoder] = {}
+        self._queue: queue.Queue[RawMessage | None] = queue.Queue(QUEUE)
+        self._error: OSError | None = None
+        self._writer = threading.Thread(target=self._write, name='writer')
+        self._writer.start()
+        for topic in TOPICS.values():
+            self._subscribe(topic)
+        self._diagnostics = Diagnostics(self, self._report)
+        self.create_timer(POLL_S, self._check)
+        self.get_logger().info(f"recording {', '.join(TOPICS)} to '{self._path}'")
+
+    def shutdown(self) -> None:
+        """Write what is waiting and complete the bag."""
+        self._queue.put(None)
+        self._writer.join()
+        try:
+            self._bag.close()
+        except OSError as error:
+            self.get_logger().error(f"'{self._path}' cannot be completed: {error}; free some space and record anew")
+        else:
+            self.get_logger().info(f"'{self._path}' is complete: {self._report()[1]}")
+
+    def _subscribe(self, topic: Topic) -> None:
+        name = self.resolve_topic_name(topic.name)
+        # Deep queues: a burst must not be lost while the executor is busy. Volatile: of an exploration that was over
+        # before the recording began, the states alone would come, without the signal.
+        qos = QoSProfile(depth=1000, reliability=topic.qos.reliability)
+        self.create_subscription(topic.type, topic.name, lambda raw: self._on_message(name, topic, raw), qos, raw=True)
+
+    def _on_message(self, name: str, topic: Topic, raw: bytes) -> None:
+        message = RawMessage(name, topic.msgtype, self.get_clock().now().nanoseconds, raw)
+        try:
+            self._queue.put_nowait(message)
+        except queue.Full:
+            self._counts['dropped'] += 1
+
+    def _write(self) -> None:
+        """Take messages from the queue to the disk until told to stop."""
+        while (message := self._queue.get()) is not None:
+            try:
+                self._bag.write_raw(message)
+            except OSError as error:
+                self._error = self._error or error
+                continue
+            self._counts['messages'] += 1
+            self._count_losses(message)
+
+    def _count_losses(self, message: RawMessage) -> None:
+        if not message.msgtype.endswith('/TactileSignal'):
+            return
+        try:
+            signal = self._decoders.setdefault(message.topic, SignalDecoder()).decode(message.data)
+        except InvalidData:
+            self._counts['bad'] += 1
+            return
+        self._continuity.update(message.topic, signal)
+
+    def _check(self) -> None:
+        if self._error is not None:
+            raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record anew")
+
+    def _report(self) -> Report:
+        faults = {
+            'lost_samples': sum(self._continuity.lost.values()),
+            'dropped_messages': self._counts['dropped'],
+            'bad_messages': self._counts['bad'],
+        }
+        numbers: dict[str, Any] = {
+            'messages': self._counts['messages'],
+            **faults,
+            'restarts': sum(self._continuity.restarts.values()),
+            **{f'samples {topic}': count for topic, count in self._continuity.samples.items()},
+        }
+        said = ', '.join(f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count)
+        message = f'{self._counts["messages"]} messages recorded, {said or "nothing lost"}'
+        return ('WARN' if said else 'OK'), message, numbers
+
+
+def main() -> None:
+    """Run the node."""
+    run(Record)

@@ -1,0 +1,139 @@
+"""Publish a bag into the graph, at any rate, and exit when it is through."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import ReliabilityPolicy
+
+from texture_core.errors import DeviceError, InvalidParameter, TextureError
+from texture_core.parameters import param
+from texture_core.ros.parameters import declare
+from texture_core.ros.run import run
+from texture_recordings.bags import RawMessage, find_bags, read_raw, short_name
+from texture_recordings.ros.topics import TOPICS
+from texture_recordings.schedule import Schedule
+from texture_recordings.slides import find_slides
+
+# What is derived from these is left out: the live graph derives it anew.
+INPUTS = ('signal', 'signal_static', 'exploration')
+EARLY_S = 0.0005  # what is due so soon is published now: waking up again would cost more than it gains
+POLL_S = 0.05
+ACKNOWLEDGED_WITHIN = Duration(seconds=5)
+
+
+@dataclass(frozen=True)
+class ReplayParams:
+    """What is published, how fast, and who must be listening."""
+
+    bag: str = param('', 'The bag, or a folder of bags, to publish.')
+    rate: float = param(1.0, 'How many times faster than recorded.', low=0.01, high=1000.0)
+    slides: str = param('', "Which slides of each surface, such as '1-30'; '' for the whole recording.")
+    from_namespace: str = param('', "Namespace in the bag to publish; '' if it has but one.")
+    longest_pause_s: float = param(1.0, 'Longer pauses in the recording are shortened to this.', unit='s', low=0.0)
+    subscribers: int = param(
+        1, "Subscriptions that 'signal', 'exploration' and 'features' must have each before the start.", low=0, high=100
+    )
+    deadline_s: float = param(30.0, 'How long to wait for them.', unit='s', low=0.0)
+    start_delay_s: float = param(1.0, 'Rest between finding them and the start.', unit='s', low=0.0)
+
+
+class Replay(Node):
+    """Publish the signals and states of a bag as they were: order, stamps and bytes."""
+
+    def __init__(self) -> None:
+        super().__init__('replay')
+        self._params = declare(self, ReplayParams)
+        if not self._params.bag:
+            raise InvalidParameter("parameter 'bag' is ''; give the bag to replay")
+        self._messages = self._chosen()
+        topics = {name: TOPICS[name] for name in INPUTS}
+        self._outputs = {name: self.create_publisher(t.type, t.name, t.qos) for name, t in topics.items()}
+        self._counts: Counter[str] = Counter()
+        self._stop = threading.Event()
+        self._error: TextureError | None = None
+        self._player = threading.Thread(target=self._play, name='player')
+        self._player.start()
+        self.create_timer(POLL_S, self._check)
+
+    def shutdown(self) -> None:
+        """Stop publishing."""
+        self._stop.set()
+        self._player.join()
+
+    def _chosen(self) -> Iterator[RawMessage]:
+        """Return the messages to publish; a bag that cannot be read is refused here, before any thread runs."""
+        namespace = self._params.from_namespace or None
+        bags = find_bags([self._params.bag])
+        if not self._params.slides:
+            return (message for bag in bags for message in read_raw(bag, namespace))
+        chosen = find_slides(bags, self._params.slides, namespace)
+        return (message for s in chosen for message in read_raw(s.bag, namespace, s.start_ns, s.stop_ns))
+
+    def _check(self) -> None:
+        """End the node when the player is through; a fault of the player is raised where it is seen."""
+        if not self._player.is_alive():
+            if self._error is not None:
+                raise self._error
+            rclpy.try_shutdown()
+
+    def _play(self) -> None:
+        try:
+            self._wait_for_subscribers()
+            self._publish_all()
+        except TextureError as error:
+            self._error = error
+
+    def _wait_for_subscribers(self) -> None:
+        deadline = time.monotonic() + self._params.deadline_s
+        while not self._stop.wait(POLL_S):
+            missing = [name for name, count in self._listeners().items() if count < self._params.subscribers]
+            if not missing:
+                break
+            if time.monotonic() > deadline:
+                raise DeviceError(
+                    f"within {self._params.deadline_s} s '{missing[0]}' did not get {self._params.subscribers} "
+                    "subscription(s); start what shall listen, or set 'subscribers' to 0"
+                )
+        self._stop.wait(self._params.start_delay_s)
+
+    def _listeners(self) -> dict[str, int]:
+        """Return how many subscriptions there are; those of `features` tell that a classifier is ready, too."""
+        matched = {name: self._outputs[name].get_subscription_count() for name in ('signal', 'exploration')}
+        return {**matched, 'features': self.count_subscribers('features')}
+
+    def _publish_all(self) -> None:
+        schedule = Schedule(self._params.rate, self._params.longest_pause_s)
+        start, latest_s = time.monotonic(), 0.0
+        for message in self._messages:
+            name = short_name(message.topic)
+            if name not in self._outputs:
+                continue
+            ahead_s = schedule.due_s(message.log_ns) - (time.monotonic() - start)
+            if ahead_s > EARLY_S:
+                self._stop.wait(ahead_s)
+            if self._stop.is_set():
+                break
+            latest_s = max(latest_s, -ahead_s)
+            self._outputs[name].publish(message.data)
+            self._counts[name] += 1
+        for publisher in self._outputs.values():
+            if publisher.qos_profile.reliability == ReliabilityPolicy.RELIABLE:
+                publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
+        counts = ', '.join(f'{count} {name}' for name, count in self._counts.items()) or 'nothing'
+        self.get_logger().info(
+            f'published {counts}: {schedule.played_s:.1f} s in {time.monotonic() - start:.1f} s, '
+            f'at most {1000 * latest_s:.0f} ms late'
+        )
+
+
+def main() -> None:
+    """Run the node."""
+    run(Replay)

@@ -1,0 +1,1 @@
+"""What of texture_recordings needs ROS."""

@@ -1,0 +1,112 @@
+"""Give a bag the exploration states that its signals tell: for bags without them, or with wrong ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from texture_core.errors import InvalidData
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import TactileSignal
+from texture_features.segmentation.segments import SegmentParams
+from texture_features.segmentation.slide_segmenter import segment_recording
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import RawMessage, find_bags, read_bag, read_raw, short_name
+
+FAST_TOPIC, SLOW_TOPIC, STATE_TOPIC = 'signal', 'signal_static', 'exploration'
+
+
+def segment_bags(
+    bags: Iterable[str | Path],
+    out: str | Path,
+    params: SegmentParams,
+    surface: str = '',
+    namespace: str | None = None,
+) -> dict[Path, int]:
+    """Copy bags, their exploration states replaced by those that the signals tell; return the slides in each copy.
+
+    Surface, speed and force of a slide are those of the last state before its middle, if there is one. All other
+    messages are copied as they are.
+
+    Parameters
+    ----------
+    bags
+        Bags, or folders of bags.
+    out
+        Folder for the copies, each named as its bag; made if missing.
+    params
+        How sliding is found.
+    surface
+        Label of all slides; '' keeps those of the states.
+    namespace
+        Of the finger, if bags hold several.
+
+    Raises
+    ------
+    InvalidData
+        If a bag cannot be read, has no vibration, or a copy exists already.
+    """
+    return {
+        Path(out) / path.name: _segment(path, Path(out) / path.name, params, surface, namespace)
+        for path in find_bags(bags)
+    }
+
+
+def _segment(path: Path, out: Path, params: SegmentParams, surface: str, namespace: str | None) -> int:
+    signals: dict[str, list[TactileSignal]] = {FAST_TOPIC: [], SLOW_TOPIC: []}
+    told: list[ExplorationState] = []
+    for topic, _, value in read_bag(path, (*signals, STATE_TOPIC), namespace):
+        (told if topic == STATE_TOPIC else signals[topic]).append(value)
+    if not signals[FAST_TOPIC]:
+        raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; record the vibration too")
+    found = segment_recording(signals, params, exploration_id=path.name)
+    states = _labelled(found, sorted(told, key=lambda state: state.stamp_ns), surface)
+    _write(path, out, states, namespace)
+    return sum(state.phase is Phase.SLIDE for state in states)
+
+
+def _labelled(
+    found: Sequence[ExplorationState], told: Sequence[ExplorationState], surface: str
+) -> list[ExplorationState]:
+    """Return the states found, with what was told of the motion at the middle of each slide."""
+    states: list[ExplorationState] = []
+    known = ExplorationState(0, '', '', Phase.IDLE)
+    for state in found:
+        middle_ns = state.stamp_ns + round(state.steady_s * 5e8)
+        if state.phase is Phase.SLIDE:
+            known = next((item for item in reversed(told) if item.stamp_ns <= middle_ns), known)
+        states.append(
+            replace(
+                state,
+                surface=surface or known.surface,
+                speed_m_s=known.speed_m_s,
+                force_n=known.force_n,
+                direction_rad=known.direction_rad,
+            )
+        )
+    return states
+
+
+def _write(path: Path, out: Path, states: Sequence[ExplorationState], namespace: str | None) -> None:
+    """Copy a bag, with other states: each is logged before the samples that it covers, as an explorer would tell it."""
+    waiting = list(states)
+    with BagWriter(out) as bag:
+        prefix = ''
+        for message in read_raw(path, namespace):
+            prefix = prefix or _prefix(message)
+            while waiting and waiting[0].stamp_ns <= message.log_ns:
+                _put(bag, waiting.pop(0), prefix)
+            if short_name(message.topic) != STATE_TOPIC:
+                bag.write_raw(message)
+        for state in waiting:
+            _put(bag, state, prefix)
+
+
+def _put(bag: BagWriter, state: ExplorationState, prefix: str) -> None:
+    bag.write(f'{prefix}/{STATE_TOPIC}', state, state.stamp_ns)
+
+
+def _prefix(message: RawMessage) -> str:
+    """Return the namespace of a message of the finger, '' for the root."""
+    return '' if message.topic == '/diagnostics' else message.topic.rsplit('/', 1)[0]

@@ -1,0 +1,89 @@
+"""Slides over the surfaces of a simulated scene, as labelled bags: no recording is needed, and any number is had."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_core.parameters import param
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_recordings.bag_writer import BagWriter
+from texture_simulation.offline import simulate_exploration
+from texture_simulation.scene import Scene, load_scene
+
+START_NS = 1_000_000_000 * NANOSECONDS
+PAUSE_NS = NANOSECONDS
+DELAY_NS = 100_000  # a batch is logged this long after its last sample, a state at its stamp
+Logged = tuple[int, str, Any]
+
+
+@dataclass(frozen=True)
+class SlidePlan:
+    """How each surface is explored."""
+
+    slides: int = param(10, 'Slides over each surface.', low=1, high=100_000)
+    speed_m_s: float = param(0.1, 'Speed along the surface.', unit='m/s', low=0.001, high=1.0)
+    force_n: float = param(2.0, 'Normal force.', unit='N', low=0.05, high=20.0)
+    slide_s: float = param(3.0, 'Length of the steady part.', unit='s', low=0.1, high=600.0)
+    direction_rad: float = param(0.0, 'Direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0)
+
+
+def write_simulated(
+    out: str | Path, plan: SlidePlan, rng: np.random.Generator, scene: str = 'bench', surfaces: Sequence[str] = ()
+) -> list[Path]:
+    """Write one bag a surface, named after it, and return their paths.
+
+    Parameters
+    ----------
+    out
+        Folder for the bags; made if missing.
+    plan
+        How many slides, how fast, how hard and which way.
+    rng
+        Decides where the surfaces are touched, errors and noise.
+    scene, surfaces
+        Name or file of the scene, and which of its surfaces; all if none is named.
+    """
+    table = load_scene(scene)
+    chosen = [table.surface(name).name for name in surfaces] or list(table.surfaces)
+    start_ns = START_NS
+    for surface in chosen:
+        start_ns = _write_surface(Path(out) / surface, table, plan, start_ns, rng)
+    return [Path(out) / surface for surface in chosen]
+
+
+def _write_surface(path: Path, scene: Scene, plan: SlidePlan, start_ns: int, rng: np.random.Generator) -> int:
+    """Write the bag of one surface, named as the path; return when the next one may start."""
+    first: dict[str, int] = {}
+    with BagWriter(path) as bag:
+        for number in range(1, plan.slides + 1):
+            states, signals = simulate_exploration(
+                scene, path.name, plan.speed_m_s, plan.force_n, plan.slide_s,
+                start_ns=start_ns, exploration_id=f'{path.name}/slide{number:02d}', rng=rng,
+                direction_rad=plan.direction_rad,
+            )  # fmt: skip
+            streams = {topic: _running_on(batches, first, topic) for topic, batches in signals.items()}
+            for log_ns, topic, value in _in_order(states, streams):
+                bag.write(topic, value, log_ns)
+            start_ns = log_ns + PAUSE_NS
+    return start_ns
+
+
+def _running_on(batches: Iterable[TactileSignal], first: dict[str, int], topic: str) -> list[TactileSignal]:
+    """Number the samples of a slide on from those of the slide before, as a driver does that is not restarted."""
+    offset = first.get(topic, 0)
+    moved = [replace(batch, first_sample=batch.first_sample + offset) for batch in batches]
+    first[topic] = moved[-1].next_sample
+    return moved
+
+
+def _in_order(states: Iterable[Any], streams: dict[str, list[TactileSignal]]) -> Iterator[Logged]:
+    tracks: list[Iterable[Logged]] = [[(state.stamp_ns, 'exploration', state) for state in states]]
+    for topic, batches in streams.items():
+        tracks.append([(batch.end_ns + DELAY_NS, topic, batch) for batch in batches])
+    return heapq.merge(*tracks, key=lambda logged: logged[0])
