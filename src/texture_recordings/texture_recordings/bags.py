@@ -17,7 +17,7 @@ from rosbags.typesys.base import TypesysError
 from texture_core.errors import InvalidData
 from texture_core.plain_data import parse_yaml
 from texture_core.signal import TactileSignal
-from texture_evaluation.bag_limits import CheckedPath, check_index, check_storage, messages_budget
+from texture_recordings.bag_limits import CheckedPath, check_index, check_storage, messages_budget
 from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode, typestore
 
 if sys.version_info >= (3, 14):
