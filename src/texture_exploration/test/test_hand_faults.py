@@ -245,6 +245,12 @@ def test_an_adapter_as_it_is_delivered_is_told_as_too_slow(bus, hand):
     assert hand.state().fault == ''
 
 
+def test_firmware_whose_watchdog_is_known_not_to_stop_the_motor_is_told(bus, hand):
+    bus.motors.tables[3][6] = bus.motors.tables[5][6] = 51
+    hand.connect()
+    assert hand.warning().startswith('the watchdog of motors 3, 5 may not stop them')
+
+
 def test_a_motor_with_a_latched_error_can_be_rebooted(bus, hand):
     bus.motors.fail(1, OVERLOAD)
     assert hand.reboot().startswith("rebooted: motor 1 ('press' of index)")

@@ -66,7 +66,7 @@ class DynamixelHand:
         self._fingers = {name: Finger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
         self._trouble = NOT_CONNECTED
-        self._warning = ''
+        self._warning = self._doubt = ''
         self._highest_a: Mapping[int, float] = {}
         self._grip: Mapping[str, float] = {}
         self._orders: dict[str, tuple[ArmCommand, float]] = {}
@@ -79,7 +79,7 @@ class DynamixelHand:
         self.close()
         self._closing.clear()
         self._fresh.clear()
-        self._trouble = self._warning = ''
+        self._trouble = self._warning = self._doubt = ''
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
         if not self._fresh.wait(FIRST_STATE_S) or self._trouble:
@@ -104,7 +104,7 @@ class DynamixelHand:
 
     def warning(self) -> str:
         """Return what is not as it should be although the hand moves, '' if nothing."""
-        return self._warning
+        return '; '.join(filter(None, (self._doubt, self._warning)))
 
     def grip(self, forces_n: Mapping[str, float]) -> None:
         """Press from the next cycle on."""
@@ -167,6 +167,7 @@ class DynamixelHand:
             guard = TorqueGuard(self._device, self.profile.baud, off)
             self._highest_a = bus.limits_a
             bus.start()
+            self._doubt = self._doubtful(bus.deaf)
             self._lead(bus)
         except DeviceError as error:
             self._trouble = str(error)
@@ -214,6 +215,16 @@ class DynamixelHand:
                 bus.write_goals(goals)
             cycles.append(now_s)
             self._warning = self._slowness(cycles)
+
+    def _doubtful(self, deaf: Iterable[int]) -> str:
+        """Return what to say of motors whose watchdog may not stop them, '' if there are none."""
+        numbers = ', '.join(map(str, sorted(deaf)))
+        if not numbers or not self.profile.watchdog:
+            return ''
+        return (
+            f'the watchdog of motors {numbers} may not stop them when the cable is out or the computer hangs: their '
+            'firmware is known to go on; update it with DYNAMIXEL Wizard'
+        )
 
     def _slowness(self, cycles: Sequence[float]) -> str:
         """Return what to say of the rate of the cycles that began at these times, '' if they are fast enough."""

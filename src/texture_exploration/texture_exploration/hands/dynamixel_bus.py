@@ -18,7 +18,7 @@ from typing import Any
 import serial
 
 from texture_core.errors import DeviceError
-from texture_exploration.hands.models import describe
+from texture_exploration.hands.models import describe, goes_on
 from texture_exploration.hands.profile import Profile
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
@@ -27,6 +27,7 @@ PROTOCOL = 2.0
 SUCCESS = 0
 TRIES = 3
 WAIT_S = 0.001
+FIRMWARE = 6  # address of its version, of one byte, in all control tables of protocol 2.0
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
 SILENT = 'does not answer'
@@ -66,6 +67,7 @@ class DynamixelBus:
             ) from error
         self.missing: set[int] = set()
         self.limits_a: dict[int, float] = {}
+        self.deaf: set[int] = set()  # motors whose watchdog may not stop them
         self._reasons: dict[int, str] = {}  # why a motor is missing, where that is not silence
         self._energised: set[int] = set()
         self._goal_currents: dict[int, int] = {}  # as sent last
@@ -148,10 +150,15 @@ class DynamixelBus:
                 'profile for this model'
             )
         self.write(motor, 'torque_enable', 0)  # or the mode cannot be set
-        self.write(motor, 'bus_watchdog', 0)  # or no goal is taken after it has stopped the motor
+        if self.read_register(motor, 'bus_watchdog'):  # old firmware has none and refuses to write it
+            self.write(motor, 'bus_watchdog', 0)  # or no goal is taken after it has stopped the motor
         self.write(motor, 'operating_mode', profile.operating_mode)
         for register, value in profile.gains.items():
             self.write(motor, register, value)
+        with self._line():
+            firmware, result, _ = self._packets.read1ByteTxRx(self._port, motor, FIRMWARE)
+        if result == SUCCESS and goes_on(model, firmware):
+            self.deaf.add(motor)
         limit = self.read_register(motor, 'current_limit')
         if limit is None:
             return False
@@ -264,7 +271,7 @@ class DynamixelBus:
             at = address - self._health[0]
             return int.from_bytes(bytes(data[at : at + size]), 'little')
 
-        owner = self._profile.owner(motor)
+        owner, watchdog = self._profile.owner(motor), self._profile.watchdog
         if bits := value('hardware_error'):
             return f'{owner} reports {_reasons(bits)}{REMEDY}'
         if motor not in self._energised:
@@ -274,7 +281,7 @@ class DynamixelBus:
                 f'{owner} heard nothing for {self._profile.watchdog_s:g} s, and its watchdog stopped it: the computer '
                 'or the bus was held up; all motors were let go'
             )
-        if not value('torque_enable') or value('bus_watchdog') != self._profile.watchdog:
+        if not value('torque_enable') or (watchdog and value('bus_watchdog') != watchdog):
             self._reasons[motor] = f'{owner} {RESET}'
             self._energised.discard(motor)
             self.missing.add(motor)

@@ -32,6 +32,17 @@ MODELS: Mapping[int, Model] = {
 }
 TOLERANCE = 0.2  # of the torque of a count: motors of one model differ by less, and friction hides the rest
 
+SIZE_330 = range(1190, 1250)
+GOES_ON_TO = 51  # firmware of size 330 to this reports that the Bus Watchdog has tripped, and does not stop
+
+
+def goes_on(model: int, firmware: int) -> bool:
+    """Return whether a motor is known to move on after its Bus Watchdog has tripped.
+
+    Source: forum.robotis.com, topic 4814 (in current control; other modes were not told).
+    """
+    return model in SIZE_330 and firmware <= GOES_ON_TO
+
 
 def describe(model: int) -> str:
     """Return a model number with the model's name, if it is in the table."""
