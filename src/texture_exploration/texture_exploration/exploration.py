@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ENDED, ExplorationRequest, ExplorationState, Phase
-from texture_exploration.arms.protocol import Arm, ArmState
+from texture_exploration.arms.protocol import Arm, ArmCommand, ArmState, ForceReading
+from texture_exploration.force_watch import ForceWatch
 from texture_exploration.motions.protocol import Motion, MotionStep
 from texture_exploration.safety import SafetyLimits
 
@@ -88,6 +89,9 @@ class Exploration:
         self._clock = clock
         self._on_state = on_state
         self._silence = silence
+        reading = getattr(arm, 'force_reading', ForceReading.CONTROLLED)
+        self._force_watch = ForceWatch(limits, reading, motion.force_n)
+        self._commanded = ArmCommand()
         self._stop_reason = ''
         self._finish_reason = ''
         self._slid = False
@@ -131,6 +135,8 @@ class Exploration:
             self._motion.finish(self._finish_reason)
         step = self._motion.step(now_ns, arm)
         self._arm.command(step.command)
+        self._commanded = step.command
+        self._force_watch.note(step.phase, arm)
         self._tell(now_ns, step, arm)
         return step.phase in ENDED
 
@@ -138,7 +144,8 @@ class Exploration:
         """Return which limit was passed; a finger that was pushed out of the workspace may come home first."""
         outside = self._limits.outside(arm)
         self._entered |= not outside
-        return self._limits.too_hard(arm) or (outside if self._entered else '')
+        frozen = self._force_watch.frozen(arm, self._commanded)
+        return self._limits.too_hard(arm) or frozen or (outside if self._entered else '')
 
     def _note_gap(self, now_ns: int) -> None:
         if now_ns - self._last_ns > GAP_NS:
@@ -149,8 +156,9 @@ class Exploration:
     def _tell(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
         """Report the state if its phase is new or the time has come."""
         self._slid |= step.phase is Phase.SLIDE
-        if step.phase is Phase.DONE and not self._slid:
-            self.outcome, step = Outcome(False, NOT_SEEN_SLIDING, False), replace(step, phase=Phase.ABORTED)
+        flaw = self._flaw() if step.phase is Phase.DONE else ''
+        if flaw:
+            self.outcome, step = Outcome(False, flaw, self._slid), replace(step, phase=Phase.ABORTED)
         elif step.phase in ENDED:
             self.outcome = Outcome(step.phase is Phase.DONE, self._motion.message, self._slid)
         # A promise that is withdrawn is told at once: until then windows may be cut on it.
@@ -173,6 +181,10 @@ class Exploration:
                 surface=self.request.surface,
             )
         )
+
+    def _flaw(self) -> str:
+        """Return why an exploration whose motion ended as planned is no success, '' if it is."""
+        return self._force_watch.drifted() if self._slid else NOT_SEEN_SLIDING
 
     def _give_up(self, reason: str) -> None:
         """End at once: an arm that does not follow cannot be lifted, only stopped."""

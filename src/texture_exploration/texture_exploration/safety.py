@@ -25,6 +25,26 @@ class SafetyLimits:
     min_force_n: float = param(0.1, 'Lowest force that may be asked for.', unit='N', low=0.01)
     max_force_n: float = param(6.0, 'Highest force that may be asked for.', unit='N', low=0.01, high=50.0)
     force_limit_n: float = param(10.0, 'A higher measured force aborts.', unit='N', low=0.1, high=100.0)
+    frozen_force_s: float = param(
+        0.06,
+        'A measured force that stays exactly the same for longer, where it should change, aborts.',
+        unit='s',
+        low=0.02,
+        high=5.0,
+    )
+    frozen_travel_m: float = param(
+        0.00005,
+        'In contact, the force should change when the finger moves further along the normal.',
+        unit='m',
+        low=1e-6,
+        high=0.01,
+    )
+    force_drift_share: float = param(
+        0.3,
+        'The force in free air may change by this share of the wanted one over an exploration; more makes it aborted.',
+        low=0.01,
+        high=10.0,
+    )
     min_distance_m: float = param(0.002, 'Shortest slide that may be asked for.', unit='m', low=1e-4)
     max_distance_m: float = param(1.0, 'Longest slide that may be asked for.', unit='m', low=1e-3)
     min_radius_m: float = param(0.005, 'Smallest circle that may be asked for.', unit='m', low=1e-3)
@@ -114,6 +134,11 @@ class SafetyLimits:
         # Written so that NaN is too much too.
         if not arm.force_n <= self.force_limit_n:
             return f'the force of {arm.force_n:.2f} N is above the limit of {self.force_limit_n:g} N'
+        if arm.force_n < -self.force_limit_n:
+            return (
+                f'the force of {arm.force_n:.2f} N pulls by more than the limit of {self.force_limit_n:g} N; if the '
+                'finger was pressing, its sign is wrong'
+            )
         if not all(map(math.isfinite, arm.position)):
             return f'the place of the finger is unknown: the arm tells {arm.position}'
         return ''

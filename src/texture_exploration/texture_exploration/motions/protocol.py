@@ -40,6 +40,10 @@ class Motion(Protocol):
         """End the slide early, but no earlier than promised, and go on to DONE."""
 
     @property
+    def force_n(self) -> float:
+        """The wanted force of the slide."""
+
+    @property
     def message(self) -> str:
         """What happened, in one sentence."""
 

@@ -76,6 +76,11 @@ class StagedMotion:
             self._slide.finish()
 
     @property
+    def force_n(self) -> float:
+        """The wanted force of the slide."""
+        return self._slide.force_n
+
+    @property
     def message(self) -> str:
         """What happened, in one sentence."""
         return self._abort_reason or self._finish_reason or 'the motion ended as asked'

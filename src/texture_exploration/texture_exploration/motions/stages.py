@@ -193,7 +193,7 @@ class Slide(Stage):
         super().__init__(Phase.SLIDE, planned_s + limits.slide_overtime_s, 'the slide to end')
         self._follower = follower
         self._speed_m_s = speed_m_s
-        self._force_n = force_n
+        self.force_n = force_n
         self._contact = contact
         # A slide begins within twice the tolerance, so a smaller share would refuse what was let in.
         self._mean_share = max(touch.mean_force_share, 2 * touch.force_tolerance)
@@ -234,7 +234,7 @@ class Slide(Stage):
         if self._contact.touching:
             self.steady_s = min(PROMISE_S, left_s, self._follower.steady_m / self._speed_m_s)
             self._promised_ns = max(self._promised_ns, time_ns + int(self.steady_s * 1e9))
-        return ArmCommand(self._follower.velocity(self._speed_m_s), force_n=self._force_n)
+        return ArmCommand(self._follower.velocity(self._speed_m_s), force_n=self.force_n)
 
     def _left_s(self, time_ns: int, arm: ArmState) -> float:
         assert self._start_m is not None
@@ -247,10 +247,10 @@ class Slide(Stage):
 
     def _check_mean_force(self) -> None:
         mean_n = self._force_sum_n / self._steps
-        if not abs(mean_n - self._force_n) <= self._mean_share * self._force_n:
+        if not abs(mean_n - self.force_n) <= self._mean_share * self.force_n:
             raise MotionAborted(
                 f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_share:.0%} off the '
-                f'{self._force_n:g} N that were asked for; slide more slowly, or check the force control of the arm'
+                f'{self.force_n:g} N that were asked for; slide more slowly, or check the force control of the arm'
             )
 
 
@@ -323,21 +323,27 @@ class Halt(Stage):
 
 
 class Lift(Stage):
-    """Leave the surface along its normal, to the height of the start or at least by the clearance."""
+    """Leave the surface along its normal, to the height of the start or at least by the clearance.
+
+    The clearance counts from where the finger came free: a soft surface follows it for a while. A force that does not
+    fall, as that of a frozen sensor, does not lift the finger beyond `approach_travel_m`.
+    """
 
     def __init__(self, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to be lifted')
         self._goal_m = home[2]
+        self._highest_m = home[2]
         self._touch = touch
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Choose the height."""
         super().begin(time_ns, arm)
-        if arm.force_n > self._touch.contact_force_n:
-            self._goal_m = max(self._goal_m, arm.position[2] + self._touch.clearance_m)
+        self._highest_m = max(self._goal_m, arm.position[2] + self._touch.approach_travel_m)
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Go up."""
+        if arm.force_n > self._touch.contact_force_n:
+            self._goal_m = min(self._highest_m, max(self._goal_m, arm.position[2] + self._touch.clearance_m))
         if arm.position[2] >= self._goal_m - NEAR_M:
             return None
         return ArmCommand(normal_m_s=self._touch.lift_speed_m_s)

@@ -1,0 +1,110 @@
+"""A force sensor that freezes, drifts or has the wrong sign: it is noticed soon, and the finger is lifted."""
+
+from dataclasses import replace
+
+import pytest
+
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.force_watch import ForceWatch
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
+ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, stiffest_n_m=20000.0)
+TILT = 0.1745
+
+
+def explore(make_table, arm, happens, phase, request=REQUEST):
+    """Explore while something happens in a phase; return the table, the outcome, when it was, and the peak force."""
+    table = make_table(arm, TouchParams(approach_stiffness_n_m=arm.stiffest_n_m))
+    happened, peak, go_on = [], [0.0], table.pace
+
+    def pace():
+        go_on()
+        peak[0] = max(peak[0], table.arm.true_force_n)
+
+    def now():
+        happened.append(table.now_ns)
+        happens(table.arm)
+
+    table.pace = pace
+    table.when[phase] = now
+    outcome = table.explore(request)
+    return table, outcome, happened[0], peak[0]
+
+
+def lifted_ns(table):
+    """Return when the finger began to be lifted, or the end if it had not come down yet."""
+    return next(state.stamp_ns for state in table.states if state.phase in (Phase.LIFT, Phase.ABORTED))
+
+
+@pytest.mark.parametrize('tilt_rad', [0.0, TILT, -TILT])
+@pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
+@pytest.mark.parametrize('phase', [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE])
+def test_a_frozen_force_is_noticed_within_100_ms_and_the_finger_is_lifted(make_table, phase, stiffness, tilt_rad):
+    arm = replace(ARM, stiffness_n_m=stiffness, tilt_rad=tilt_rad)
+    table, outcome, frozen_ns, peak_n = explore(make_table, arm, SimulatedArm.freeze_force, phase)
+    assert not outcome.success
+    assert outcome.message.startswith('the measured force is frozen: it has been')
+    assert (lifted_ns(table) - frozen_ns) * 1e-9 <= 0.1
+    assert peak_n < 6.0
+    assert table.arm.true_force_n == 0.0
+
+
+@pytest.mark.parametrize('noise_n', [0.0, 0.001])
+@pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
+def test_a_force_that_freezes_far_from_the_wanted_one_is_noticed_without_noise_too(make_table, stiffness, noise_n):
+    arm = replace(ARM, stiffness_n_m=stiffness, force_noise_n=noise_n)
+    table, outcome, frozen_ns, peak_n = explore(make_table, arm, SimulatedArm.freeze_force, Phase.CONTACT)
+    assert outcome.message.startswith('the measured force is frozen')
+    assert (lifted_ns(table) - frozen_ns) * 1e-9 <= 0.1
+    assert peak_n < 6.0
+
+
+@pytest.mark.parametrize('force_mode', [True, False])
+@pytest.mark.parametrize('tilt_rad', [0.0, TILT, -TILT])
+@pytest.mark.parametrize('stiffness', [200.0, 2000.0, 20000.0])
+def test_an_arm_without_noise_whose_force_stays_the_same_is_believed(make_table, force_mode, tilt_rad, stiffness):
+    arm = replace(ARM, stiffness_n_m=stiffness, tilt_rad=tilt_rad, force_mode=force_mode, force_noise_n=0.0)
+    table = make_table(arm, TouchParams(approach_stiffness_n_m=20000.0))
+    outcome = table.explore(REQUEST)
+    assert outcome.success, outcome.message
+
+
+@pytest.mark.parametrize('force_mode', [True, False])
+@pytest.mark.parametrize('rate_n_s', [-0.5, 0.5, 2.0])
+def test_a_force_that_drifts_over_the_slide_is_no_success(make_table, rate_n_s, force_mode):
+    arm = replace(ARM, force_mode=force_mode)
+    _, outcome, _, peak_n = explore(
+        make_table, arm, lambda arm: arm.drift_force(rate_n_s), Phase.SLIDE, replace(REQUEST, distance_m=0.1)
+    )
+    assert not outcome.success
+    assert outcome.message.startswith(
+        ('the force in free air was', 'the contact with the surface was lost', 'the mean force of the slide was')
+    )
+    assert peak_n < 3.0
+
+
+@pytest.mark.parametrize('rate_n_s', [0.3, 1.0])
+def test_a_force_that_drifts_up_in_free_air_is_not_taken_for_a_slide(make_table, rate_n_s):
+    _, outcome, _, _ = explore(make_table, ARM, lambda arm: arm.drift_force(rate_n_s), Phase.APPROACH)
+    assert not outcome.success
+
+
+def test_a_small_drift_is_allowed(make_table):
+    _, outcome, _, _ = explore(make_table, ARM, lambda arm: arm.drift_force(0.05), Phase.SLIDE)
+    assert outcome.success, outcome.message
+
+
+def test_a_force_of_the_wrong_sign_is_limited_too():
+    state = ArmState(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), -10.1)
+    assert SafetyLimits().too_hard(state).endswith('its sign is wrong')
+
+
+def test_a_pause_of_the_arm_is_no_frozen_reading():
+    watch = ForceWatch(SafetyLimits(), ForceReading.NOISY, 1.0)
+    state = ArmState(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.5)
+    assert not any(watch.frozen(state, ArmCommand()) for _ in range(100))
+    assert watch.frozen(replace(state, time_ns=400_000_000), ArmCommand()) == ''  # one state after a pause
