@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from texture_core.errors import CommandRefused
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.protocol import ArmCommand
 from texture_simulation.devices.rails import EmulatedRails
@@ -70,6 +71,23 @@ def test_the_arm_stops_by_itself_when_it_hears_nothing(arm):
     arm.command(ArmCommand(normal_m_s=0.01))
     wait_for(lambda: arm.state().velocity[2] > 0)
     wait_for(lambda: not any(arm.state().velocity))
+
+
+def test_a_command_out_of_range_is_refused_and_the_arm_stands_still(arm):
+    refused = [
+        ArmCommand(tangential_m_s=(math.nan, 0.0)),
+        ArmCommand(tangential_m_s=(0.0, math.inf)),
+        ArmCommand(tangential_m_s=(5.0, 0.0)),
+        ArmCommand(normal_m_s=-5.0),
+        ArmCommand(force_n=-1.0),
+        ArmCommand(force_n=math.nan),
+    ]
+    for command in refused:
+        arm.command(ArmCommand(tangential_m_s=(0.01, 0.0)))
+        with pytest.raises(CommandRefused, match='the arm stopped'):
+            arm.command(command)
+        wait_for(lambda: not any(arm.state().velocity))
+    assert arm.state().fault == ''
 
 
 def test_closing_twice_and_connecting_again_is_no_trouble(arm):

@@ -136,7 +136,7 @@ class Exploration:
         step = self._motion.step(now_ns, arm)
         self._arm.command(step.command)
         self._commanded = step.command
-        self._force_watch.note(step.phase, arm)
+        self._force_watch.note(step.phase, arm, step.command)
         self._tell(now_ns, step, arm)
         return step.phase in ENDED
 

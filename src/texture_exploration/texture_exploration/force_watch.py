@@ -12,7 +12,7 @@ from texture_exploration.safety import SafetyLimits
 LEAST_REPEATS = 3  # of one reading, before it can count as frozen
 CONTACT_N = 0.1  # above the force in free air, which may stay the same for long
 HELD_SHARE = 0.1  # a force this close to the wanted one is being held
-ZEROING_S = 0.25  # an arm may zero its force sensor as it moves off
+ZEROING_S = 0.1  # an arm may zero its force sensor while it stands, or as it moves off
 BEFORE = 1000  # states before the contact
 LOW_SHARE = 0.25  # of them lie below the force in free air: on a soft surface the force rises long before it counts
 AFTER = 5  # readings at the end of the lift
@@ -71,10 +71,10 @@ class ForceWatch:
             f'finger moved by {moved_m * 1e3:.2f} mm along the normal; check the force sensor and its cable'
         )
 
-    def note(self, phase: Phase, arm: ArmState) -> None:
+    def note(self, phase: Phase, arm: ArmState, command: ArmCommand) -> None:
         """Take note of the force in free air, before the contact and after it."""
         if phase is Phase.APPROACH:
-            self._note_free(arm)
+            self._note_free(arm, command)
         elif phase is Phase.LIFT:
             self._after.append(arm.force_n)
 
@@ -90,8 +90,8 @@ class ForceWatch:
             'drifted, and the true force was wrong by up to the difference; let it warm up, zero it and check it'
         )
 
-    def _note_free(self, arm: ArmState) -> None:
-        if self._begin_ns is None:
+    def _note_free(self, arm: ArmState, command: ArmCommand) -> None:
+        if self._begin_ns is None or command == ArmCommand():
             self._begin_ns = arm.time_ns
         if arm.time_ns - self._begin_ns <= ZEROING_S * 1e9:
             self._before.clear()

@@ -95,6 +95,7 @@ class InHandArm:
         """Let the sliding fingers follow."""
         if not self._connected:
             raise DeviceError('the hand is not connected; connect it first')
+        self._params.check(command, self.stop)
         self.hand.command(self.fingers.slide, command)
 
     def stop(self) -> None:

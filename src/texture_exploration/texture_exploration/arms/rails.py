@@ -16,6 +16,7 @@ from texture_core.errors import DeviceError
 from texture_core.framing import Deframer, Frame, pack
 from texture_core.parameters import param
 from texture_exploration.arms import rails_tables as tables
+from texture_exploration.arms.command_limits import CommandLimits
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
@@ -26,7 +27,7 @@ READ_S = 0.05
 
 
 @dataclass(frozen=True)
-class RailsParams:
+class RailsParams(CommandLimits):
     """Where the rails are, and what their encoders count."""
 
     device: str = param('/tmp/texture/rails', 'Serial device; the default is that of the emulated one.')
@@ -105,6 +106,7 @@ class RailsArm:
 
     def command(self, command: ArmCommand) -> None:
         """Send an order."""
+        self._params.check(command, self.stop)
         vx, vy = (round(speed * tables.MICRO) for speed in command.tangential_m_s)
         mode, value = tables.MOVING, round(command.normal_m_s * tables.MICRO)
         if command.force_n is not None:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Mapping
 
 from texture_core.errors import DeviceError
-from texture_exploration.arms.protocol import ArmCommand, ArmState
+from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading
 from texture_exploration.arms.surface_frame import SurfaceFrame
 from texture_exploration.arms.ur_link import WorkerLink
 from texture_exploration.arms.ur_messages import RECOVER, STOP, Report, Wish
@@ -35,6 +35,7 @@ class UrArm:
     """
 
     Params = UrArmParams
+    force_reading = ForceReading.NOISY  # in double precision
 
     def __init__(self, params: UrArmParams = UrArmParams()) -> None:  # noqa: B008 (frozen)
         self._params = params

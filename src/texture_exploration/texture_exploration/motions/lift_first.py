@@ -92,6 +92,11 @@ class LiftFirst:
         self._motion.finish(reason)
 
     @property
+    def force_n(self) -> float:
+        """The wanted force of the slide."""
+        return self._motion.force_n
+
+    @property
     def message(self) -> str:
         """What happened, in one sentence."""
         return self._motion.message
