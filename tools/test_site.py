@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_bringup.command import COMMANDS
+from texture_bringup.command import installed
 from texture_core.exploration import ExplorationRequest
 from texture_core.parameters import parameters_of
 from texture_drivers.catalogue import SENSORS
@@ -201,7 +201,7 @@ def commands(start: str) -> list[tuple[str, str]]:
 def test_a_command_of_the_pages_has_the_arguments_that_it_takes(page: str, line: str) -> None:
     _, name, *rest = shlex.split(line)
     parser = argparse.ArgumentParser(exit_on_error=False)
-    module = importlib.import_module(COMMANDS[name].module)
+    module = installed()[name].load()
     module.configure(parser)
     options = parser.parse_args(rest)
     if name == 'launch':

@@ -30,7 +30,8 @@ BUILD_SITE_PACKAGES = re.compile(r'/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site
 BUILT = ('package.xml', 'setup.py', 'CMakeLists.txt', '*.msg', '*.srv', '*.action')
 # Behind the suite comes what the user has put there: sensors, motions and features of their own.
 OWN = '"${PYTHONPATH:+:$PYTHONPATH}"'
-LISTED = ('nodes/*.py', 'launch/*', 'config/*', 'config/*/*')  # linked: only their names matter
+# These are linked: only their names matter.
+LISTED = ('nodes/*.py', 'commands/*.py', 'bin/*', 'launch/*', 'config/*', 'config/*/*')
 
 
 def main() -> int:
@@ -164,7 +165,7 @@ def built_files() -> list[Path]:
 def linked_files() -> list[Path]:
     """Return the files that the build links without looking inside."""
     found = {path for pattern in LISTED for path in (ROOT / 'src').glob(f'*/**/{pattern}')}
-    return sorted(path for path in found if path.suffix and '__pycache__' not in path.parts)
+    return sorted(path for path in found if path.is_file() and '__pycache__' not in path.parts)
 
 
 def build() -> None:

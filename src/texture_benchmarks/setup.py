@@ -21,10 +21,25 @@ def shared(folder: str) -> list[tuple[str, list[str]]]:
     ]
 
 
+def modules(folder: str) -> list[str]:
+    """Return the names of the modules in a folder of the package."""
+    return sorted(path.stem for path in (HERE / NAME / folder).glob('[a-z]*.py'))
+
+
 def executables() -> list[str]:
-    """Return one executable for each module of nodes/, named as the module."""
-    modules = sorted((HERE / NAME / 'nodes').glob('[a-z]*.py'))
-    return [f'{path.stem} = {NAME}.nodes.{path.stem}:main' for path in modules]
+    """Return one executable for each module of nodes/, named as the module, and the one of command.py."""
+    command = [f'texture = {NAME}.command:program'] if (HERE / NAME / 'command.py').exists() else []
+    return [f'{module} = {NAME}.nodes.{module}:main' for module in modules('nodes')] + command
+
+
+def commands() -> list[str]:
+    """Return one sub-command of `texture` for each module of commands/, named as the module (import_ as 'import')."""
+    return [f'{module.rstrip("_")} = {NAME}.commands.{module}' for module in modules('commands')]
+
+
+def on_path() -> list[str]:
+    """Return the files of bin/, which are installed to where the shell finds them."""
+    return sorted(str(path.relative_to(HERE)) for path in HERE.glob('bin/*'))
 
 
 setup(
@@ -41,10 +56,11 @@ setup(
         (f'share/{NAME}', ['package.xml']),
         *shared('launch'),
         *shared('config'),
+        ('bin', on_path()),
     ],
     install_requires=['setuptools'],
     extras_require={'test': ['pytest']},
     zip_safe=False,
-    entry_points={'console_scripts': executables()},
+    entry_points={'console_scripts': executables(), 'texture.commands': commands()},
     options={'develop': {'script_dir': f'$base/lib/{NAME}'}, 'install': {'install_scripts': f'$base/lib/{NAME}'}},
 )

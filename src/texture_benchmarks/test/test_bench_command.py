@@ -49,3 +49,15 @@ def test_all_go_on_when_one_fails_and_the_command_ends_with_1(benches, tmp_path:
     assert 'failed: clock' in said.out
     assert 'deliberately' in said.err
     assert (tmp_path / 'good.json').is_file()
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [(['bench', 'biotc'], "did you mean 'biotac20'?"), (['bench', 'biotac20', '--quick'], '--data')],
+)
+def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:
+    monkeypatch.delenv('TEXTURE_DATA', raising=False)
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count('\n') == 1

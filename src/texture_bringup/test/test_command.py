@@ -1,10 +1,11 @@
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from texture_bringup.command import COMMANDS, main
+from texture_bringup.command import installed, main, summary
 
 pytestmark = pytest.mark.ros  # some sub-commands are nodes
 
@@ -12,7 +13,45 @@ pytestmark = pytest.mark.ros  # some sub-commands are nodes
 def test_without_a_sub_command_the_help_is_printed(capsys) -> None:
     assert main([]) == 0
     shown = capsys.readouterr().out
-    assert all(name in shown and command.summary in shown for name, command in COMMANDS.items())
+    assert all(f'  {name} ' in shown and summary(command) in shown for name, command in installed().items())
+
+
+def test_the_help_imports_no_sub_command() -> None:
+    script = (
+        'import sys; from texture_bringup.command import main; main([]); '
+        "print([name for name in ('numpy', 'sklearn', 'matplotlib', 'rclpy') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, '-c', script], check=True, stdout=subprocess.PIPE, text=True)
+    assert done.stdout.split('\n')[-2] == '[]'
+
+
+def test_every_module_of_a_folder_commands_is_a_sub_command() -> None:
+    modules = {
+        f'{path.parts[-3]}.commands.{path.stem}'
+        for path in Path(__file__).resolve().parents[2].glob('*/texture_*/commands/[a-z]*.py')
+    }
+    assert len(modules) > 10
+    assert modules == {command.value for command in installed().values()}
+
+
+def prefix() -> Path:
+    """Return where the suite is installed."""
+    places = [Path(place) for place in os.environ['AMENT_PREFIX_PATH'].split(os.pathsep)]
+    return next(place for place in places if (place / 'lib' / 'texture_bringup').is_dir())
+
+
+def test_the_command_is_on_the_path_of_a_shell_that_has_sourced_the_workspace() -> None:
+    clean = {'HOME': os.environ.get('HOME', '/'), 'PATH': '/usr/bin:/bin'}
+    script = f'source {prefix()}/setup.bash && cd / && texture launch bench --show-args'
+    done = subprocess.run(['bash', '-c', script], check=False, capture_output=True, text=True, env=clean)
+    assert 'surface:=glass' in done.stdout, done.stderr
+
+
+def test_ros2_run_finds_the_command() -> None:
+    program = prefix() / 'lib' / 'texture_bringup' / 'texture'  # where `ros2 run` looks
+    done = subprocess.run([program, 'trian'], check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, '')
+    assert "did you mean 'train'?" in done.stderr
 
 
 @pytest.mark.parametrize('arguments', [[], ['scene', '--help']])
@@ -32,12 +71,12 @@ def test_an_unknown_sub_command_gets_the_nearest(capsys) -> None:
     assert "did you mean 'train'?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('name', COMMANDS)
+@pytest.mark.parametrize('name', installed())
 def test_every_sub_command_explains_itself(name, capsys) -> None:
     with pytest.raises(SystemExit) as ended:
         main([name, '--help'])
     assert ended.value.code == 0
-    assert COMMANDS[name].summary in ' '.join(capsys.readouterr().out.split())
+    assert summary(installed()[name]) in ' '.join(capsys.readouterr().out.split())
 
 
 def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
@@ -55,8 +94,6 @@ def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
         (['scene', 'ets_lnear'], "no scene 'ets_lnear'; did you mean 'ets_linear'?"),
         (['scene', 'hu', 'linen_9'], 'Known: linen_1, linen_2, linen_3, linen_4, linen_5'),
         (['scene', 'hu', 'linen_1', '--speed', '-1'], 'speed_m_s'),
-        (['bench', 'biotc'], "did you mean 'biotac20'?"),
-        (['bench', 'biotac20', '--quick'], '--data'),
         (['identify', 'm', '--slides', '0'], '--slides is 0'),
         (['identify', '/nowhere'], "model card '/nowhere.json' cannot be read"),
     ],

@@ -50,7 +50,7 @@ class ChildLauncher:
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> ChildLauncher:
-        command = [sys.executable, '-m', 'texture_bringup.command', 'launch', *self._options]
+        command = [sys.executable, '-m', 'texture_launch', *self._options]
         with self.log.open('wb') as log:
             self._process = subprocess.Popen(
                 [*command, self._file, *self._given],

@@ -1,4 +1,4 @@
-"""`texture bench`: run a benchmark; it writes its figures as JSON and a chart."""
+"""`texture bench`: run a benchmark; writes figures and a chart."""
 
 from __future__ import annotations
 

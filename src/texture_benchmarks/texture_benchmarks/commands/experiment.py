@@ -1,4 +1,4 @@
-"""`texture experiment`: rebuild a paper's experiment on simulated surfaces; it writes figures as JSON and charts."""
+"""`texture experiment`: rebuild a paper's experiment: its figures beside ours."""
 
 from __future__ import annotations
 

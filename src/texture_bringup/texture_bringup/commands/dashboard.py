@@ -1,4 +1,4 @@
-"""`texture dashboard`: a web page of what is felt, with buttons to explore, stop, teach and record."""
+"""`texture dashboard`: show a web page of what is felt, with buttons to explore and stop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`texture explore`: slide the finger over the surface, show progress, print the estimates."""
+"""`texture explore`: slide the finger over the surface and say what it is."""
 
 from __future__ import annotations
 

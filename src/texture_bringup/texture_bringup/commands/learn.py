@@ -1,4 +1,4 @@
-"""`texture learn`: teach what was explored last, or unlearn it."""
+"""`texture learn`: teach what was explored last as a texture, at once; or undo it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`texture panel`: what a panel of people says about the roughness of textures, and how far they agree."""
+"""`texture panel`: say what a panel of people grades as rough, and how far they agree."""
 
 from __future__ import annotations
 

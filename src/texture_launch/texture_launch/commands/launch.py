@@ -1,4 +1,4 @@
-"""`texture launch`: start the nodes of a launch file, where `ros2 launch` is missing."""
+"""`texture launch`: start the nodes of a launch file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`texture segment`: find the slides in bags that lack exploration states, or have wrong ones."""
+"""`texture segment`: find the slides in bags that do not tell them."""
 
 from __future__ import annotations
 
