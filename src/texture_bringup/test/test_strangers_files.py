@@ -1,18 +1,26 @@
 """Files from strangers: cut off, altered, huge, of wrong types. Each is read or refused with one sentence.
 
-None runs code of the file, takes much memory or goes on for long. FUZZ_SEED and FUZZ_TRIES look further.
+None runs code of the file, takes much memory or goes on for long. FUZZ_SEED and FUZZ_TRIES look further; the full
+search, 1000 mutants of each file with memory and time measured for each:
+
+    FUZZ_MUTANTS=1000 .venv/bin/ros-run python -m pytest src/texture_bringup/test/test_strangers_files.py -k mutants -s
 """
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import hashlib
 import io
 import json
+import multiprocessing
 import os
 import pickle
+import resource
 import shutil
 import signal
+import time
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -24,6 +32,7 @@ import pytest
 import skops.io
 import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
+from scipy.io import wavfile
 
 from texture_core import resources
 from texture_core.errors import TextureError
@@ -31,6 +40,7 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
 from texture_drivers.daq.sensor import load_daq
 from texture_drivers.file.recording import load_recording
+from texture_drivers.tsf85.recording import COLUMNS, FIRST_COLUMN, load_vendor_csv
 from texture_estimation.classification.training import train
 from texture_estimation.incremental.added_examples import Lesson, write_lesson
 from texture_estimation.model import load_model
@@ -39,22 +49,29 @@ from texture_estimation.roughness.grades import Grades, read_grades
 from texture_estimation.roughness.model import load_roughness_model
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
+from texture_estimation.search.memory import Memory
 from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.trial import Record
 from texture_evaluation.ratings import read_ratings
 from texture_exploration.hands.profile import load_profile
 from texture_exploration.presets import load_preset
 from texture_features.feature_set import FeatureSet
 from texture_features.labelled_features import LabelledFeatures
+from texture_launch.reader import all_arguments
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.cdr import TYPES, decode, encode, typestore
 from texture_recordings.dataset import cut_slides
+from texture_recordings.importers.biotac20 import import_biotac20
+from texture_recordings.importers.ntp21 import import_ntp21
 from texture_recordings.slides import find_slides
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))
+MUTANTS = int(os.environ.get('FUZZ_MUTANTS', '30'))  # of each file, in a process that measures
 TRIES = int(os.environ.get('FUZZ_TRIES', '4'))  # of each kind of damage to each file; more of both to look for more
 DEADLINE_S = 60  # for a single file: a reader that hangs fails
 MOST_MB = 300
+MOST_CPU_S = 5.0  # of computing time: the machine may be busy
 STRANGE = (
     None, True, -1, 0, 0.5, 10**9, 10**30, 1e308, -1e308, float('nan'), float('inf'), '', 'x', 'antigravity:fly',
     'numpy:zeros', 'x' * 5000, [], [[]], [None], [1e9] * 3, {}, {'x': 1}, {'': {}},
@@ -146,6 +163,60 @@ def make_sqlite_bag(folder: Path) -> None:
             bag.write(connections[topic], log_ns, encode(value))
 
 
+def make_plain_bag(folder: Path) -> None:
+    """Write a bag that is not compressed, in which damage reaches the records."""
+    with Writer(folder / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        connections: dict[str, Any] = {}
+        for topic, value, log_ns in messages():
+            kind = TYPES[type(value)]
+            if topic not in connections:
+                connections[topic] = bag.add_connection(f'/{topic}', kind, typestore=typestore())
+            bag.write(connections[topic], log_ns, encode(value))
+
+
+def make_wav(folder: Path) -> None:
+    samples = np.random.default_rng(3).integers(-1000, 1000, (50, 2)).astype(np.int16)
+    wavfile.write(folder / 'good.wav', 1000, samples)
+
+
+def make_vendor_csv(folder: Path) -> None:
+    rows = np.random.default_rng(4).integers(-9, 9, (20, COLUMNS))
+    rows[:, 0] = np.arange(20)
+    header = ';'.join([FIRST_COLUMN] + ['x'] * (COLUMNS - 1))
+    np.savetxt(folder / 'good.csv', rows, delimiter=';', header=header, comments='', fmt='%d')
+
+
+def make_checkpoint(folder: Path) -> None:
+    memory = Memory({'seed': 1})
+    memory.keep((1, 2), Record(np.array([0.5]), np.array([0.25])))
+    memory.save(folder / 'good.json')
+
+
+def make_biotac(folder: Path) -> None:
+    rng = np.random.default_rng(5)
+    arrays = {
+        'frame_time': np.arange(600) / 100,
+        'frames': rng.integers(0, 99, (600, 44)).astype(np.int16),
+        'velocity': rng.normal(size=(500, 4)),
+        'wrench': rng.normal(size=(500, 7)),
+        'epoch': np.float64(1e9),
+    }
+    np.savez_compressed(folder / 'material01.npz', **{f'slide01/{name}': array for name, array in arrays.items()})
+
+
+def make_ntp(folder: Path) -> None:
+    slide = np.random.default_rng(6).normal(size=(834, 11)).astype(np.float32)
+    np.savez_compressed(folder / 'slides.npz', **{'texture00/speed020/force0.0': slide})
+
+
+def read_import(load: Callable[..., object]) -> Callable[[Path], object]:
+    def read_into_nothing(folder: Path) -> object:
+        shutil.rmtree(folder / 'out', ignore_errors=True)
+        return load(folder, folder / 'out')
+
+    return read_into_nothing
+
+
 def make_message(value: Any) -> Callable[[Path], None]:
     return lambda folder: (folder / 'message').write_bytes(encode(value)) and None
 
@@ -217,6 +288,15 @@ READERS = {
     'settings': text_file('texture_drivers', 'config/sensors/daq.yaml', load_daq),
     'grades': text_file('texture_simulation', 'config/grades/ets_roughness.csv', read_grades),
     'ratings': Reader(make_ratings, lambda folder: read_ratings(folder / 'good.csv'), ('good.csv',)),
+    'plain bag': Reader(make_plain_bag, read_slides, ('bag/bag.mcap',)),
+    'launch file': text_file('texture_bringup', 'launch/bench.launch.xml', lambda path: all_arguments(Path(path), {})),
+    'vendor recording': Reader(make_vendor_csv, lambda folder: load_vendor_csv(folder / 'good.csv'), ('good.csv',)),
+    'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
+    'checkpoint': Reader(
+        make_checkpoint, lambda folder: Memory({'seed': 1}).load(folder / 'good.json') or True, ('good.json',)
+    ),
+    'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),
+    'NTP data set': Reader(make_ntp, read_import(import_ntp21), ('slides.npz',)),
     **{f'recording {ending}': recording(ending) for ending in ('csv', 'npy', 'npz')},
 }
 CASES = [(name, file) for name, reader in READERS.items() for file in reader.files]
@@ -474,3 +554,273 @@ def test_what_is_made_to_do_harm_is_refused_and_runs_nothing(
     assert peak_mb(read) < MOST_MB
     assert refused
     assert not (tmp_path / 'trapped').exists()
+
+
+# ---- measured, in a process of its own ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What reading one file took."""
+
+    name: str
+    refused: bool
+    memory_mb: float
+    cpu_s: float
+    fault: str = ''
+
+
+def inserted(content: bytes, rng: np.random.Generator) -> bytes:
+    place = rng.integers(0, len(content) + 1)
+    return content[:place] + rng.bytes(int(rng.integers(1, 40))) + content[place:]
+
+
+def one_bit(content: bytes, rng: np.random.Generator) -> bytes:
+    place = int(rng.integers(0, len(content)))
+    return content[:place] + bytes([content[place] ^ (1 << int(rng.integers(8)))]) + content[place + 1 :]
+
+
+def repeated(content: bytes, rng: np.random.Generator) -> bytes:
+    first, last = np.sort(rng.integers(0, len(content), 2))
+    return content[:first] + content[first:last] * int(rng.integers(2, 6)) + content[last:]
+
+
+def inside(content: bytes, rng: np.random.Generator) -> bytes:
+    """Return an archive with one member damaged, where no checksum of the archive tells."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as source, zipfile.ZipFile(packed, 'w', zipfile.ZIP_DEFLATED) as file:
+        chosen = rng.integers(len(source.namelist()))
+        for number, name in enumerate(source.namelist()):
+            member = source.read(name)
+            file.writestr(name, CHANGES[rng.integers(len(CHANGES))](member, rng) if number == chosen else member)
+    return packed.getvalue()
+
+
+CHANGES = (*DAMAGE, inserted, one_bit, repeated)
+
+
+def mutant(content: bytes, file: str, rng: np.random.Generator) -> bytes:
+    ending = file.rpartition('.')[2]
+    if ending in ('skops', 'npz') and rng.random() < 0.6:
+        return inside(content, rng)
+    if ending in ('json', 'yaml') and rng.random() < 0.3:
+        return strange(content, rng, ending)
+    return CHANGES[rng.integers(len(CHANGES))](content, rng)
+
+
+def measure(name: str, reader: Reader, folder: Path) -> Measured:
+    """Read once, and say what it took; the sentence of a fault if it is one."""
+    refused, fault, begun = False, '', time.process_time()
+
+    def read() -> None:
+        nonlocal refused, fault
+        try:
+            refused = answer(reader, folder)
+        except BaseException as error:  # whatever it is, it is what this looks for
+            fault = f'{type(error).__name__}: {error}'
+
+    memory_mb = peak_mb(read)
+    return Measured(name, refused, memory_mb, time.process_time() - begun, fault)
+
+
+def in_a_child(work: Callable[[], Iterator[Measured]]) -> list[Measured]:
+    """Do work in a process whose memory is limited, and return what was measured until it ended or died."""
+    receiver, sender = multiprocessing.get_context('fork').Pipe(duplex=False)
+
+    def child() -> None:
+        warnings.simplefilter('ignore')
+        used = int(Path('/proc/self/statm').read_text().split()[0]) * os.sysconf('SC_PAGE_SIZE')
+        resource.setrlimit(resource.RLIMIT_AS, (used + 4 * 10**9,) * 2)  # a machine is not brought down by a fault
+        for measured in work():
+            sender.send(measured)
+        sender.send(None)
+
+    process = multiprocessing.get_context('fork').Process(target=child)
+    process.start()
+    sender.close()
+    found: list[Measured] = []
+    with contextlib.suppress(EOFError):
+        while (measured := receiver.recv()) is not None:
+            found.append(measured)
+    process.join()
+    assert process.exitcode == 0, f'the process ended with {process.exitcode} after {found[-1:]}'
+    return found
+
+
+def check(found: list[Measured]) -> None:
+    """Fail if reading one of the files was not refused or done in time, within memory, or by a sentence."""
+    assert [measured for measured in found if measured.fault] == []
+    assert [measured for measured in found if measured.memory_mb > MOST_MB or measured.cpu_s > MOST_CPU_S] == []
+
+
+def write_file(folder: Path, file: str, good: Path, content: bytes) -> None:
+    (folder / file).write_bytes(content)
+    if file == MODEL:
+        shutil.copy(good / CARD, folder / CARD)
+        sealed(folder)
+
+
+@pytest.mark.parametrize(('name', 'file'), CASES)
+def test_mutants_take_little_memory_and_time(name: str, file: str, good: dict[str, Path], tmp_path: Path) -> None:
+    shutil.copytree(good[name], tmp_path, dirs_exist_ok=True)
+    content = (good[name] / file).read_bytes()
+    rng = np.random.default_rng([SEED, CASES.index((name, file))])
+    READERS[name].load(tmp_path)  # what is imported when it is first needed is none of the file's memory
+
+    def work() -> Iterator[Measured]:
+        for number in range(MUTANTS):
+            write_file(tmp_path, file, good[name], mutant(content, file, rng))
+            yield measure(f'{file} {number}', READERS[name], tmp_path)
+
+    found = in_a_child(work)
+    print(
+        f'{name}, {file}: {len(found)} mutants, {sum(m.refused for m in found)} refused, '
+        f'at most {max(m.memory_mb for m in found):.0f} MB and {max(m.cpu_s for m in found):.2f} s'
+    )
+    check(found)
+
+
+@pytest.mark.parametrize(('name', 'file'), [case for case in CASES if case[1] != 'message'])
+def test_a_pipe_a_device_and_a_folder_are_refused_at_once(
+    name: str, file: str, good: dict[str, Path], tmp_path: Path
+) -> None:
+    shutil.copytree(good[name], tmp_path, dirs_exist_ok=True)
+
+    def work() -> Iterator[Measured]:
+        for kind, make in ODD.items():
+            (tmp_path / file).unlink(missing_ok=True)
+            make(tmp_path / file)
+            yield measure(f'{kind} {file}', READERS[name], tmp_path)
+
+    found = in_a_child(work)
+    check(found)
+    # A folder without metadata stands for the bags in it.
+    assert all(measured.refused for measured in found) or file == 'bag/metadata.yaml'
+
+
+ODD: dict[str, Callable[[Path], None]] = {
+    'named pipe': os.mkfifo,
+    'zeros': lambda path: path.symlink_to('/dev/zero'),
+    'terminal': lambda path: path.symlink_to('/dev/tty'),
+    'link to itself': lambda path: path.symlink_to(path.name),
+}
+MB5 = 4_900_000
+NOISE = np.random.default_rng(0).bytes(MB5)
+
+
+def packed_arrays(**arrays: Any) -> bytes:
+    packed = io.BytesIO()
+    np.savez_compressed(packed, **arrays)
+    return packed.getvalue()
+
+
+def array_file(array: Any) -> bytes:
+    packed = io.BytesIO()
+    np.save(packed, array)
+    return packed.getvalue()
+
+
+def model_of_zeros(n_bytes: int, times: int = 1, noise: int = 0) -> Callable[[Path], bytes]:
+    """Return the parts of a model with an array of zeros for each, named by many nodes, and noise beside them."""
+
+    def make(folder: Path) -> bytes:
+        packed = io.BytesIO()
+        with zipfile.ZipFile(folder / MODEL) as source, zipfile.ZipFile(packed, 'w', zipfile.ZIP_DEFLATED) as file:
+            schema = json.loads(source.read('schema.json'))
+            one = next(place for place, key in within(schema) if key == 'file')
+            schema['content'].update({f'more {number}': one for number in range(times)})
+            for name in source.namelist():
+                if name != 'schema.json':
+                    file.writestr(name, array_file(np.zeros(n_bytes, np.uint8)))
+            file.writestr('schema.json', json.dumps(schema))
+            file.writestr('noise', np.random.default_rng(0).bytes(noise))
+        return packed.getvalue()
+
+    return make
+
+
+def small_records(folder: Path) -> bytes:
+    """Return an MCAP file with as many messages as 5 MB hold, behind the schemas and channels of a good one."""
+    content = (folder / 'bag/bag.mcap').read_bytes()
+    at, kept = 8, b''
+    while content[at] != 0x0F:  # the end of the data
+        length = 9 + int.from_bytes(content[at + 1 : at + 9], 'little')
+        if content[at] == 0x06:
+            kept += content[at : at + length]
+        at += length
+    header = 8 + 9 + int.from_bytes(content[9:17], 'little')
+    message = b'\x05' + (22).to_bytes(8, 'little') + b'\x01\x00' + bytes(20)
+    footer = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + b'\x89MCAP0\r\n'
+    return content[:header] + kept + message * (MB5 // len(message)) + footer
+
+
+BOMBS: dict[str, tuple[str, str, Callable[[Path], bytes]]] = {
+    'a card of empty lists': ('model', CARD, lambda _: b'{"recipe": [' + b'[],' * (MB5 // 3) + b'[]]}'),
+    'a card of small objects': ('model', CARD, lambda _: b'{"recipe": [' + b'{"":0},' * (MB5 // 7) + b'0]}'),
+    'a lesson of short windows': (
+        'model', LESSON,
+        lambda _: b'{"format":1,"feature_set":"abcd1234 signal=1000Hz*1","label":"x","exploration_id":"","values":['
+        + b'[0,0,0,0,0,0],' * (MB5 // 14) + b'[0,0,0,0,0,0]]}',
+    ),
+    'a model of 600 MB of zeros': ('model', MODEL, model_of_zeros(100_000_000)),
+    'a model that names an array 2000 times': ('model', MODEL, model_of_zeros(1_000_000, 2000)),
+    'a model of 5 MB with as many zeros as it may': ('model', MODEL, model_of_zeros(1_200_000, noise=MB5)),
+    'support vectors of zeros': ('model of support vectors', MODEL, model_of_zeros(1_000_000, 2000)),
+    'a large recording': ('recording npy', 'good.npy', lambda _: array_file(np.zeros(MB5, np.int8))),
+    'a recording of 600 MB of zeros': (
+        'recording npz', 'good.npz', lambda _: packed_arrays(samples=np.zeros(600_000_000, np.uint8)),
+    ),
+    'a recording as large as may be': (
+        'recording npz', 'good.npz',
+        lambda _: packed_arrays(samples=np.zeros(7_900_000), noise=np.frombuffer(NOISE, np.uint8)),
+    ),
+    'a table of single numbers': ('recording csv', 'good.csv', lambda _: b'1\n' * (MB5 // 2)),
+    'a table of one line': ('recording csv', 'good.csv', lambda _: b'1,' * (MB5 // 2)),
+    'a sound of 5 MB': ('recording wav', 'good.wav', lambda folder: wav(np.zeros(MB5, np.uint8))),
+    'a sound of small chunks': (
+        'recording wav', 'good.wav', lambda _: b'RIFF\xff\xff\xff\x7fWAVE' + (b'abcd' + bytes(4)) * (MB5 // 8),
+    ),
+    'ratings of as many people as textures': (
+        'ratings', 'good.csv',
+        lambda _: b'rater,texture,grade\n' + b''.join(b'%d,%d,1\n' % (n, n) for n in range(60_000)),
+    ),
+    'grades of 5 MB': ('grades', 'good.csv', lambda _: b'texture,grade\n' + b'a,1\n' * (MB5 // 4)),
+    'a line of the vendor': ('vendor recording', 'good.csv', lambda _: b'1;' * (MB5 // 2)),
+    'groups of a launch file': ('launch file', 'good.xml', lambda _: b'<launch>' + b'<group>' * (MB5 // 7)),
+    'settings of 200 kB': ('settings', 'good.yaml', lambda _: b'channels: [' + b'1,' * 99_000 + b']'),
+    'settings of 5 MB': ('settings', 'good.yaml', lambda _: b'- 1\n' * (MB5 // 4)),
+    'a scene of aliases': ('scene', 'good.yaml', lambda _: (LAUGHS + 'surfaces: {x: *j}').encode()),
+    'a checkpoint of small lists': (
+        'checkpoint', 'good.json', lambda _: b'{"format":1,"identity":{},"scores":[' + b'[],' * (MB5 // 3) + b'[]]}',
+    ),
+    'small messages': ('bag', 'bag/bag.mcap', small_records),
+    'metadata of 5 MB': ('bag', 'bag/metadata.yaml', lambda _: b'- 1\n' * (MB5 // 4)),
+    'a data set of zeros': (
+        'NTP data set', 'slides.npz',
+        lambda _: packed_arrays(**{'texture00/speed020/force0.0': np.zeros((20_000_000, 11), np.float32)}),
+    ),
+    'a material of zeros': (
+        'BioTac data set', 'material01.npz',
+        lambda _: packed_arrays(**{'slide01/frame_time': np.zeros(200_000_000, np.float32)}),
+    ),
+}  # fmt: skip
+
+
+def wav(samples: Any) -> bytes:
+    packed = io.BytesIO()
+    wavfile.write(packed, 1000, samples)
+    return packed.getvalue()
+
+
+@pytest.mark.parametrize('what', BOMBS)
+def test_files_that_stand_for_more_than_they_hold_take_little_memory_and_time(
+    what: str, good: dict[str, Path], tmp_path: Path
+) -> None:
+    name, file, bomb = BOMBS[what]
+    shutil.copytree(good[name], tmp_path, dirs_exist_ok=True)
+    READERS[name].load(tmp_path)
+    write_file(tmp_path, file, good[name], bomb(tmp_path))
+    assert (tmp_path / file).stat().st_size <= 5_200_000
+    found = in_a_child(lambda: iter([measure(what, READERS[name], tmp_path)]))
+    print(f'{what}: {found[0]}')
+    check(found)

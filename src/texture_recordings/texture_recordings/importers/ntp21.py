@@ -24,6 +24,7 @@ KEY = re.compile(r'([^/]+)/speed(\d+(?:\.\d+)?)/force(\d+(?:\.\d+)?)')
 TAXELS = 9
 TIME = 10  # column of the time, s; the one between is auxiliary and of unknown meaning: left out
 RATE_HZ = 320.0
+SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would ask for any number of samples
 # The published signal has no unit.
 STREAM = Stream('signal', 'ntp/array', tuple(f'taxel{n}' for n in range(1, TAXELS + 1)), '', RATE_HZ)
 
@@ -49,6 +50,8 @@ def slide(key: str, texture: str, condition: Condition, recorded: AnyArray) -> S
 
 def evenly(samples: Array, duration_s: float) -> Array:
     """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
+    if not 0 < duration_s <= SLOWEST * len(samples) / RATE_HZ:
+        raise ValueError(f'{len(samples)} samples lasted {duration_s:g} s, at {RATE_HZ:g} Hz')
     own = np.linspace(0.0, duration_s, len(samples))
     grid = np.arange(int(duration_s * RATE_HZ) + 1) / RATE_HZ
     values: Array = CubicSpline(own, samples, axis=0)(grid)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from texture_core.arrays import AnyArray
 from texture_core.catalogue import unknown
 from texture_core.errors import InvalidData
@@ -48,12 +50,20 @@ class SlideFile:
                 Path(out) / name,
                 self.stream,
                 (
-                    self.slide(key, name, condition, content[key])
+                    self._slide(key, name, condition, content[key])
                     for condition, key in _chosen(name, found[name], wanted)
                 ),
             )
             for name in (surfaces or sorted(found))
         ]
+
+    def _slide(self, key: str, surface: str, condition: Any, values: AnyArray) -> SteadySlide:
+        try:
+            return self.slide(key, surface, condition, values)
+        except (ValueError, LookupError, ArithmeticError) as error:
+            raise InvalidData(
+                f"'{key}' of '{self.name}' is no slide of this data set: {error}; fetch it anew"
+            ) from error
 
     def _read(self, folder: Path) -> dict[str, AnyArray]:
         file = folder / self.name
@@ -62,9 +72,17 @@ class SlideFile:
         try:
             with open_regular(file) as opened:
                 content = Arrays(opened)
-                return {key: content[key] for key in content.names}
+                return {key: _slide(key, content[key]) for key in content.names}
         except (OSError, ValueError, KeyError) as error:
             raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it anew") from error
+
+
+def _slide(key: str, values: AnyArray) -> AnyArray:
+    if values.ndim != 2 or values.dtype.kind not in 'iuf' or len(values) < 2 or not np.isfinite(values).all():
+        raise ValueError(
+            f"'{key}' has shape {values.shape}, type {values.dtype}; finite (n_samples, n_channels) are needed"
+        )
+    return values
 
 
 def _chosen(surface: str, slides: list[tuple[Any, str]], wanted: frozenset[int] | None) -> list[tuple[Any, str]]:
