@@ -67,7 +67,7 @@ from texture_recordings.slides import find_slides
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))
-MUTANTS = int(os.environ.get('FUZZ_MUTANTS', '30'))  # of each file, in a process that measures
+MUTANTS = int(os.environ.get('FUZZ_MUTANTS', '12'))  # of each file, in a process that measures
 TRIES = int(os.environ.get('FUZZ_TRIES', '4'))  # of each kind of damage to each file; more of both to look for more
 DEADLINE_S = 60  # for a single file: a reader that hangs fails
 MOST_MB = 300
