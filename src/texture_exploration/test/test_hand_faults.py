@@ -212,6 +212,29 @@ def test_a_motor_that_switched_itself_on_after_a_reset_is_not_taken_for_one_that
     until(lambda: bus.motors.tables[5][WATCHDOG] == 15)
 
 
+def test_a_motor_that_falls_silent_while_it_is_taken_in_does_not_end_the_others(bus, hand, monkeypatch):
+    hand.connect()
+    write, refused = bus.motors.write, []
+
+    def falls_silent(motor, address, data):
+        if motor == 5 and len(refused) < 1:
+            refused.append(motor)
+            bus.motors.absent = {5}
+        return write(motor, address, data)
+
+    bus.motors.absent = {5}
+    until(lambda: 'motor 5' in fault_of(hand))
+    monkeypatch.setattr(bus.motors, 'write', falls_silent)
+    monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.TRIES', 2)
+    bus.motors.absent = set()
+    until(lambda: refused)
+    assert "motor 5 ('press' of middle) does not answer" in fault_of(hand)
+    assert bus.motors.tables[1][TORQUE]
+    bus.motors.absent = set()
+    monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.TRIES', 12)
+    until(lambda: fault_of(hand) == '')
+
+
 def test_a_motor_that_is_back_begins_where_it_is_and_not_where_it_was_to_go():
     finger = Finger(LEAP.fingers['index'], LEAP)
     here = {joint.id: Motor(0.0, 0.0, 0.5) for joint in LEAP.fingers['index'].values()}

@@ -46,6 +46,10 @@ class Motor:
     position_rad: float
 
 
+class NoAnswer(DeviceError):
+    """A motor that fell silent while it was told something."""
+
+
 class DynamixelBus:
     """All motors of a profile.
 
@@ -119,12 +123,15 @@ class DynamixelBus:
 
     def look_for(self, motor: int) -> bool:
         """Take a motor in if it answers and is well; return whether that is so."""
-        if not self._prepare(motor):
+        try:
+            if not self._prepare(motor):
+                return False
+            if error := self.hardware_error(motor):
+                self._reasons[motor] = error
+                return False
+            self._energise(motor)
+        except NoAnswer:  # a loose contact: no reason to let the others go
             return False
-        if error := self.hardware_error(motor):
-            self._reasons[motor] = error
-            return False
-        self._energise(motor)
         return True
 
     def why_missing(self, motor: int) -> str:
@@ -309,9 +316,12 @@ class DynamixelBus:
                 result, error = getattr(self._packets, send)(self._port, motor, address, value % (1 << 8 * size))
             if result == SUCCESS:
                 break
+        if result != SUCCESS:
+            why = self._packets.getTxRxResult(result)
+            raise NoAnswer(f"{self._profile.owner(motor)} did not take '{register}': {why}")
         # The highest bit only tells that there is a hardware error, which is asked for by itself.
-        if result != SUCCESS or error & 0x7F:
-            why = self._packets.getTxRxResult(result) if result else self._packets.getRxPacketError(error & 0x7F)
+        if error & 0x7F:
+            why = self._packets.getRxPacketError(error & 0x7F)
             raise DeviceError(f"{self._profile.owner(motor)} did not take '{register}': {why}")
 
     def read_register(self, motor: int, register: str) -> int | None:
