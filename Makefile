@@ -1,6 +1,8 @@
 # The set-up is tools/workspace.py; every target below calls it first, and a finished set-up is recognised in a second.
 PYTHON ?= python3
 RUN := .venv/bin/ros-run
+# Most tests of nodes and devices wait for something, so more of them than cores run side by side.
+TEST_JOBS ?= 4
 # Public recordings for evaluation, if they lie beside the repository or where the user says.
 export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
@@ -18,7 +20,7 @@ lint: setup
 	@$(RUN) mypy
 
 test: setup lint
-	@$(RUN) python -m pytest
+	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile
 
 bench: setup
 	@.venv/bin/texture bench all

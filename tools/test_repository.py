@@ -51,3 +51,25 @@ def test_a_package_has_its_papers(package: Path) -> None:
     assert facts.findtext('license') == 'Apache-2.0'
     assert (package / 'README.md').exists()
     assert (package / 'CHANGELOG.rst').exists()
+
+
+DOMAIN = re.compile(r"(?:LocalGraph\(|DOMAIN = |'ROS_DOMAIN_ID'[:,] ')(\d+)")
+ADDRESS = re.compile(r'127\.0\.0\.(\d+)')
+SHARED_ADDRESSES = {'1', '2'}  # loopback itself, and the default of the emulated robot, which no test binds
+
+
+@pytest.mark.parametrize('pattern', [DOMAIN, ADDRESS], ids=['ROS domain', 'loopback address'])
+def test_no_two_files_of_tests_meet_on_one(pattern: re.Pattern[str]) -> None:
+    """Files of tests run side by side; what one emulates, another must not find."""
+    files: dict[str, set[str]] = {}
+    for path in [*ROOT.glob('src/*/test/*.py'), *ROOT.glob('src/texture_benchmarks/texture_benchmarks/**/*.py')]:
+        for number in pattern.findall(path.read_text()):
+            files.setdefault(number, set()).add(path.name)
+    shared = {number: names for number, names in files.items() if len(names) > 1 and number not in SHARED_ADDRESSES}
+    assert not shared
+
+
+def test_the_domains_of_tests_are_those_that_no_demonstration_takes() -> None:
+    numbers = {int(n) for path in ROOT.glob('src/*/test/*.py') for n in DOMAIN.findall(path.read_text())} - {0}
+    assert numbers
+    assert all(61 <= number <= 100 for number in numbers), numbers

@@ -21,7 +21,7 @@ from texture_launch.child import ChildLauncher  # noqa: E402
 from texture_launch.files import find_launch_file  # noqa: E402
 from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
-DOMAIN = 225
+DOMAIN = 81
 DEADLINE_S = 60.0
 PERIOD_S = 0.02
 SURFACES = ('glass', 'leather')

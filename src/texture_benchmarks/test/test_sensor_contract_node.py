@@ -43,7 +43,7 @@ class Ear:
 
 @pytest.fixture
 def graph() -> Iterator[LocalGraph]:
-    with LocalGraph(24) as graph:
+    with LocalGraph(66) as graph:
         yield graph
 
 

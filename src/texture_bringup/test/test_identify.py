@@ -17,7 +17,7 @@ from texture_evaluation.train import train_from_bags  # noqa: E402
 from texture_launch.child import ChildLauncher  # noqa: E402
 from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
-DOMAIN = 221
+DOMAIN = 79
 DEADLINE_S = 60.0
 PLAN = SlidePlan(slides=8, speed_m_s=0.1, force_n=2.0, slide_s=0.9)
 TEXTURES = ('ridges_x', 'ridges_y')

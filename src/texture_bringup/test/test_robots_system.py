@@ -34,7 +34,7 @@ IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 # finger went. The model knows neither circles nor strokes as slow as in the hand: there only the evidence counts.
 MOTIONS = ((LINEAR, SURFACE), (CIRCULAR, ''), (IN_HAND, ''))
 TOLD = (UrArmParams, SafetyLimits, SignalWatchParams)  # parameters in the example of a file
-ROBOTS = {'ur': 110, 'rails': 111, 'hand': 112}  # and the domain of its nodes
+ROBOTS = {'ur': 73, 'rails': 74, 'hand': 75}  # and the domain of its nodes
 
 
 @pytest.fixture(scope='module')

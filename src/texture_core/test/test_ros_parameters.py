@@ -25,7 +25,7 @@ class Params:
 
 @pytest.fixture
 def make_node() -> Iterator[Any]:
-    with LocalGraph(10) as graph:
+    with LocalGraph(63) as graph:
         yield partial(graph.add, partial(rclpy.create_node, 'n'))
 
 

@@ -40,7 +40,7 @@ class Patient(Node):
 
 @pytest.fixture
 def world():
-    environment = {'ROS_DOMAIN_ID': '115', 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    environment = {'ROS_DOMAIN_ID': '78', 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
     with mock.patch.dict(os.environ, environment):
         rclpy.init()
         node, executor = Patient(), WaitingExecutor()

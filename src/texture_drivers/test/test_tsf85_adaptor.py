@@ -28,7 +28,7 @@ def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[LocalGraph]:
     types = SimpleNamespace(Dynamic=String, Timestamp=Header, StaticData=Int16MultiArray)
     monkeypatch.setitem(sys.modules, 'robotiq_tsf', SimpleNamespace(msg=types))
     monkeypatch.setitem(sys.modules, 'robotiq_tsf.msg', types)
-    with LocalGraph(23) as graph:
+    with LocalGraph(65) as graph:
         yield graph
 
 

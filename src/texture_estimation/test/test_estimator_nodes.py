@@ -65,7 +65,7 @@ class Bench:
 
 @pytest.fixture
 def graph():
-    with LocalGraph(41) as graph:
+    with LocalGraph(72) as graph:
         yield graph
 
 

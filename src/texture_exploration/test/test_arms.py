@@ -19,8 +19,8 @@ from texture_simulation.devices.ur.process import ControllerProcess
 @contextlib.contextmanager
 def ur_controller():
     pytest.importorskip('rtde_control', reason='ur-rtde is not installable here')
-    with ControllerProcess(UrControllerParams(ip='127.0.0.56')):
-        yield {'ip': '127.0.0.56'}
+    with ControllerProcess(UrControllerParams(ip='127.0.0.57')):
+        yield {'ip': '127.0.0.57'}
 
 
 @contextlib.contextmanager

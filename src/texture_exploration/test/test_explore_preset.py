@@ -18,7 +18,7 @@ PRESET = 'motion: linear_slide\nspeed_m_s: 0.1\ndistance_m: 0.02\nvary: {directi
 
 @pytest.fixture
 def graph():
-    with LocalGraph(30, deadline_s=40.0) as graph:
+    with LocalGraph(67, deadline_s=40.0) as graph:
         yield graph
 
 

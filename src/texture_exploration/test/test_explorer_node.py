@@ -110,7 +110,7 @@ class World:
 
 @pytest.fixture
 def ros():
-    with LocalGraph(30):
+    with LocalGraph(68):
         yield
 
 

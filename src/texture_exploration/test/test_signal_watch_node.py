@@ -47,7 +47,7 @@ class Finger:
 @pytest.fixture
 def finger():
     options = [word for name, value in PARAMETERS.items() for word in ('-p', f'{name}:={value}')]
-    with LocalGraph(114) as graph, subprocess.Popen([*EXPLORER, *options]) as process:
+    with LocalGraph(77) as graph, subprocess.Popen([*EXPLORER, *options]) as process:
         yield Finger(graph)
         process.terminate()
 

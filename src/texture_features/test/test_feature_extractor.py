@@ -41,7 +41,7 @@ class Bench:
 
 @pytest.fixture
 def bench():
-    with LocalGraph(40) as graph:
+    with LocalGraph(69) as graph:
         yield Bench(graph)
 
 

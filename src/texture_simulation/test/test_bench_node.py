@@ -46,7 +46,7 @@ class Bed:
 
 @pytest.fixture
 def bed(tmp_path: Path) -> Iterator[Bed]:
-    with LocalGraph(22) as graph:
+    with LocalGraph(64) as graph:
         yield Bed(graph, tmp_path / 'tsf85')
     assert not os.path.lexists(tmp_path / 'tsf85')
 

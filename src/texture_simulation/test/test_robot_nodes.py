@@ -19,7 +19,7 @@ NODES = {'rails': RailsNode, 'leap_hand': LeapHandNode}
 
 @pytest.fixture
 def graph():
-    with LocalGraph(113) as graph:
+    with LocalGraph(76) as graph:
         yield graph
 
 

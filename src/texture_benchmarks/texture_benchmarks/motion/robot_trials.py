@@ -31,7 +31,7 @@ from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
 HEIGHT_M = 0.002
-UR_IP = '127.0.0.61'
+UR_IP = '127.0.0.66'
 LIMITS = SafetyLimits(stale_s=1.0)  # a busy machine is not what is tried here
 DEADLINE_S = 60.0
 GRIP_S = 20.0

@@ -30,7 +30,7 @@ DRIVER_S = 10.0
 BATCH_S = 0.01  # as the sensor node delivers
 SPEED_M_S, FORCE_N = 0.1, 2.0
 SURFACE = 'leather'
-DOMAIN = 59  # of its own: what else runs on the machine must not listen
+DOMAIN = 83  # of its own: what else runs on the machine must not listen
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from texture_launch.node_process import NodeProcess
 SETTLE_S = 3.0
 REPORT_S = 1.5  # until the next report on /diagnostics has come for sure
 READY_WITHIN_S = 60.0
-DOMAIN = 25  # of its own: what else runs on the machine must not listen
+DOMAIN = 82  # of its own: what else runs on the machine must not listen
 
 
 @dataclass(frozen=True)
