@@ -228,6 +228,8 @@ def test_a_motor_that_falls_silent_while_it_is_taken_in_does_not_end_the_others(
     monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.TRIES', 2)
     bus.motors.absent = set()
     until(lambda: refused)
+    told_ns = time.monotonic_ns()
+    until(lambda: hand.state().time_ns > told_ns + 300_000_000)  # the others are read again
     assert "motor 5 ('press' of middle) does not answer" in fault_of(hand)
     assert bus.motors.tables[1][TORQUE]
     bus.motors.absent = set()
