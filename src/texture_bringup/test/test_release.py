@@ -1,8 +1,6 @@
-"""What a release is made of agrees with itself: versions, dependencies, containers, workflows."""
+"""What a release is made of agrees with itself: versions, containers, workflows."""
 
-import ast
 import re
-import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,56 +10,6 @@ import yaml
 ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = sorted(manifest.parent for manifest in ROOT.glob('src/*/package.xml'))
 VERSION = ElementTree.parse(PACKAGES[0] / 'package.xml').findtext('version')
-# Module → key of rosdep. What is imported under the name of its ROS package needs no line.
-KEYS = {
-    'hypothesis': 'python3-hypothesis',
-    'joblib': 'python3-joblib',
-    'aiohttp': 'python3-aiohttp',
-    'matplotlib': 'python3-matplotlib',
-    'numpy': 'python3-numpy',
-    'pytest': 'python3-pytest',
-    'rosbags': 'python3-rosbags-pip',
-    'scipy': 'python3-scipy',
-    'serial': 'python3-serial',
-    'sklearn': 'python3-sklearn',
-    'yaml': 'python3-yaml',
-    'apsw': 'python3-apsw',
-    'lz4': 'python3-lz4',
-}
-# rosdep knows no key for these; docker/requirements.in and tools/requirements.in bring them.
-KEYLESS = {'cobs', 'distributed', 'nltk', 'playwright', 'pymoo', 'pywt', 'skops', 'threadpoolctl'}
-# What comes with Python or another package, and libraries that only tests of robots import.
-OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_receive'}
-
-
-def names(package: Path, *, tests: bool) -> set[str]:
-    """Return the top-level modules that a package's code, or its tests, import from outside Python and itself."""
-    found = set()
-    for path in (package / ('test' if tests else package.name)).rglob('*.py'):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Import):
-                found |= {alias.name.split('.')[0] for alias in node.names}
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                found.add(node.module.split('.')[0])
-    beside = {path.stem for path in (package / 'test').glob('*.py')} if tests else set()
-    return found - set(sys.stdlib_module_names) - {package.name} - KEYLESS - OTHERS - beside
-
-
-def depends(package: Path, *tags: str) -> set[str]:
-    manifest = ElementTree.parse(package / 'package.xml').getroot()
-    return {element.text for tag in tags for element in manifest.iter(tag)}
-
-
-@pytest.mark.parametrize('package', PACKAGES, ids=lambda package: package.name)
-def test_a_manifest_names_what_its_package_imports(package: Path) -> None:
-    needed = {KEYS.get(name, name) for name in names(package, tests=False)}
-    assert needed - depends(package, 'exec_depend', 'depend') == set()
-
-
-@pytest.mark.parametrize('package', PACKAGES, ids=lambda package: package.name)
-def test_a_manifest_names_what_its_tests_import(package: Path) -> None:
-    needed = {KEYS.get(name, name) for name in names(package, tests=True)}
-    assert needed - depends(package, 'exec_depend', 'depend', 'test_depend') == set()
 
 
 @pytest.mark.parametrize('package', PACKAGES, ids=lambda package: package.name)

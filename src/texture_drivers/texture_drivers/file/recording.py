@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import BinaryIO, TextIO
 
 import numpy as np
-from scipy.io import wavfile
 
 from texture_core.arrays import AnyArray, Array, Samples
 from texture_core.errors import InvalidData
@@ -149,6 +148,8 @@ def rate_of(time_s: Array) -> float:
 
 def load_wav(file: BinaryIO) -> Recording:
     """Return a WAV file; whole numbers are scaled so that full scale is 1."""
+    from scipy.io import wavfile  # noqa: PLC0415 – no other recording and no device needs scipy
+
     with warnings.catch_warnings():
         warnings.simplefilter('ignore', wavfile.WavFileWarning)  # chunks of no interest
         rate_hz, samples = wavfile.read(io.BytesIO(take_all(file, MOST_BYTES)))

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from texture_core.arrays import Array, Samples
 
@@ -117,6 +116,8 @@ class FirstOrder:
 
     def update(self, samples: Samples) -> Samples:
         """Return the filtered samples, (n_samples, n_channels)."""
+        from scipy.signal import lfilter  # noqa: PLC0415 – no other sensor needs scipy
+
         if self._state is None:
             self._state = np.zeros((1, samples.shape[1]))
         filtered, self._state = lfilter(self._numerator, self._denominator, samples, axis=0, zi=self._state)

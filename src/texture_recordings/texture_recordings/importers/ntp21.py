@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData
@@ -50,6 +49,8 @@ def slide(key: str, texture: str, condition: Condition, recorded: AnyArray) -> S
 
 def evenly(samples: Array, duration_s: float) -> Array:
     """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 – nothing else in this package needs scipy
+
     if not 0 < duration_s <= SLOWEST * len(samples) / RATE_HZ:
         raise ValueError(f'{len(samples)} samples lasted {duration_s:g} s, at {RATE_HZ:g} Hz')
     own = np.linspace(0.0, duration_s, len(samples))

@@ -1,0 +1,85 @@
+"""A machine that only records needs the messages, the core, the drivers and this package, and no numerical library."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+
+from texture_core.ros.local_graph import LocalGraph
+from texture_recordings.bags import read_bag
+
+pytestmark = pytest.mark.ros
+
+DOMAIN = 52
+STOP_DEADLINE_S = 30.0
+# Runs main() of the module named first, in a Python to which other packages are not installed.
+ALONE = """
+import importlib, sys
+
+SUITE = {'texture_core', 'texture_drivers', 'texture_msgs', 'texture_recordings'}
+ABSENT = {'joblib', 'matplotlib', 'nltk', 'pymoo', 'scipy', 'skops', 'sklearn'}
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        package = name.partition('.')[0]
+        if package in ABSENT or (package.startswith('texture_') and package not in SUITE):
+            raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+
+sys.meta_path.insert(0, Absent())
+importlib.import_module(sys.argv.pop(1)).main()
+"""
+
+
+@contextmanager
+def alone(module: str, log: Path, **parameters: str) -> Iterator[subprocess.Popen]:
+    """Run a node by itself, and end it as Ctrl-C does."""
+    given = [part for name, value in parameters.items() for part in ('-p', f'{name}:={value}')]
+    command = [sys.executable, '-c', ALONE, module, '--ros-args', *given]
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    with log.open('w') as file:
+        process = subprocess.Popen(command, env=environment, stdout=file, stderr=subprocess.STDOUT)
+    try:
+        yield process
+    finally:
+        process.send_signal(2)
+        try:
+            process.wait(STOP_DEADLINE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def recorded(reports: list[DiagnosticArray]) -> int:
+    """Return how many samples the recorder says it has."""
+    values = [value for report in reports for status in report.status for value in status.values]
+    return max((int(value.value) for value in values if value.key == 'samples /signal'), default=0)
+
+
+def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_of_the_suite(tmp_path: Path) -> None:
+    np.savez(tmp_path / 'slide.npz', samples=np.arange(500.0)[:, None], rate_hz=1000.0, channels=['film'])
+    bag, logs = tmp_path / 'bag', (tmp_path / 'record.log', tmp_path / 'sensor.log')
+    source = {'sensor': 'file', 'device': str(tmp_path / 'slide.npz'), 'config': "'{loop: true}'"}
+    with LocalGraph(DOMAIN, deadline_s=60.0) as graph:
+        reports = graph.listen(DiagnosticArray, '/diagnostics')
+        with (
+            alone('texture_recordings.nodes.record', logs[0], out=str(bag)) as record,
+            alone('texture_drivers.nodes.sensor', logs[1], **source) as sensor,
+        ):
+            graph.until(lambda: recorded(reports) > 300 or record.poll() is not None or sensor.poll() is not None)
+        said = '\n'.join(log.read_text() for log in logs)
+    assert (record.returncode, sensor.returncode) == (0, 0), said
+    batches = [batch for _, _, batch in read_bag(bag, ('signal',))]
+    assert sum(len(batch.samples) for batch in batches) > 300
+    assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
+
+
+@pytest.mark.parametrize('module', ['texture_recordings.dataset', 'texture_features.spectra.spectrum', 'scipy.signal'])
+def test_what_is_absent_here_cannot_be_imported(module: str) -> None:
+    done = subprocess.run([sys.executable, '-c', ALONE, module], check=False, capture_output=True, text=True)
+    assert 'ModuleNotFoundError' in done.stderr

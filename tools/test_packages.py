@@ -1,0 +1,243 @@
+"""The packages of src/: what each imports is in its manifest, and dependencies run down the table of layers."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = sorted(manifest.parent for manifest in ROOT.glob('src/*/package.xml'))
+
+# Module → key of rosdep. What is imported under the name of its ROS package needs no line.
+KEYS = {
+    'aiohttp': 'python3-aiohttp',
+    'apsw': 'python3-apsw',
+    'hypothesis': 'python3-hypothesis',
+    'joblib': 'python3-joblib',
+    'lz4': 'python3-lz4',
+    'matplotlib': 'python3-matplotlib',
+    'numpy': 'python3-numpy',
+    'pytest': 'python3-pytest',
+    'rosbags': 'python3-rosbags-pip',
+    'scipy': 'python3-scipy',
+    'serial': 'python3-serial',
+    'sklearn': 'python3-sklearn',
+    'yaml': 'python3-yaml',
+}
+# rosdep knows no key for these; docker/requirements.in and tools/requirements.in bring them.
+KEYLESS = {'cobs', 'distributed', 'nltk', 'playwright', 'pymoo', 'pywt', 'skops', 'threadpoolctl'}
+# What comes with Python or another package, and the libraries of robots that are chosen by name at run time.
+OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_receive'}
+# What launch files need, which no module imports.
+LAUNCHING = {'launch_ros', 'launch_xml', 'ros2launch'}
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What a package may import of the suite, what its tests may beside, and which libraries it must do without."""
+
+    may: frozenset[str]
+    tests: frozenset[str] = frozenset()
+    never: frozenset[str] = frozenset()
+    # Modules that need a library of `never`, in a function and not when they are imported.
+    late: Mapping[str, frozenset[str]] | None = None
+
+
+def of(*short: str) -> frozenset[str]:
+    return frozenset(f'texture_{name}' for name in short)
+
+
+LEARNING = frozenset({'sklearn', 'skops', 'pymoo', 'joblib', 'distributed'})
+DRAWING = frozenset({'matplotlib'})
+SCIPY = frozenset({'scipy'})
+# As in docs/architecture.md. A package stands below all that it may import, so there can be no cycle.
+LAYERS: Mapping[str, Layer] = {
+    'texture_msgs': Layer(of()),
+    'texture_core': Layer(of('msgs'), never=LEARNING | DRAWING | SCIPY),
+    'texture_launch': Layer(of('core'), never=LEARNING | DRAWING | SCIPY | {'numpy', 'rclpy'}),
+    'texture_drivers': Layer(
+        of('msgs', 'core'),
+        never=LEARNING | DRAWING | SCIPY,
+        late={'texture_drivers.file.recording': SCIPY, 'texture_drivers.pvdf.charge_leak': SCIPY},
+    ),
+    'texture_features': Layer(of('msgs', 'core'), never=LEARNING | DRAWING),
+    'texture_estimation': Layer(of('msgs', 'core', 'features'), never=DRAWING | {'rosbags'}),
+    'texture_recordings': Layer(
+        of('msgs', 'core', 'features'),
+        tests=of('launch', 'drivers'),
+        never=LEARNING | DRAWING | SCIPY,
+        late={'texture_recordings.importers.ntp21': SCIPY},
+    ),
+    'texture_simulation': Layer(of('msgs', 'core', 'drivers', 'recordings'), never=LEARNING | DRAWING),
+    'texture_exploration': Layer(of('msgs', 'core'), tests=of('features', 'simulation'), never=LEARNING | DRAWING),
+    'texture_evaluation': Layer(of('msgs', 'core', 'features', 'estimation', 'recordings'), tests=of('simulation')),
+    'texture_bringup': Layer(
+        of(
+            'msgs', 'core', 'launch', 'drivers', 'features', 'estimation', 'recordings', 'simulation', 'exploration',
+            'evaluation',
+        )
+    ),
+    'texture_benchmarks': Layer(
+        of(
+            'msgs', 'core', 'launch', 'drivers', 'features', 'estimation', 'recordings', 'simulation', 'exploration',
+            'evaluation', 'bringup',
+        )
+    ),
+}  # fmt: skip
+
+
+@cache
+def imported(path: Path) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the names of all modules that a file imports: when it is imported itself, and only in its functions."""
+    tree = ast.parse(path.read_text())
+    inner = {
+        node
+        for function in ast.walk(tree)
+        if isinstance(function, (ast.FunctionDef, ast.AsyncFunctionDef))
+        for node in ast.walk(function)
+    }
+    return frozenset(named(set(ast.walk(tree)) - inner)), frozenset(named(inner))
+
+
+def named(nodes: Iterable[ast.AST]) -> set[str]:
+    found = set()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module)
+    return found
+
+
+def top(modules: Iterable[str]) -> set[str]:
+    return {module.partition('.')[0] for module in modules} - set(sys.stdlib_module_names)
+
+
+def imports(package: Path, folder: str) -> set[str]:
+    """Return what the modules in a folder of a package import from outside Python and the package."""
+    files = list((package / folder).rglob('*.py'))
+    beside = {path.stem for path in files} if folder == 'test' else set()
+    return set().union(*(top(at_once | late) for at_once, late in map(imported, files))) - {package.name} - beside
+
+
+def depends(package: Path, *tags: str) -> set[str]:
+    manifest = ElementTree.parse(package / 'package.xml').getroot()
+    return {element.text or '' for tag in tags for element in manifest.iter(tag)}
+
+
+def keys(modules: set[str]) -> set[str]:
+    return {KEYS.get(name, name) for name in modules - KEYLESS - OTHERS}
+
+
+def outside(package: str, modules: set[str], allowed: frozenset[str]) -> set[str]:
+    """Return the packages of the suite among the modules that a package may not import."""
+    return {name for name in modules if name.startswith('texture_')} - allowed - {package}
+
+
+each = pytest.mark.parametrize('package', PACKAGES, ids=lambda package: package.name)
+
+
+@each
+def test_a_manifest_names_what_its_package_imports(package: Path) -> None:
+    assert keys(imports(package, package.name)) - depends(package, 'exec_depend', 'depend') == set()
+
+
+@each
+def test_a_manifest_names_what_its_tests_import(package: Path) -> None:
+    assert keys(imports(package, 'test')) - depends(package, 'exec_depend', 'depend', 'test_depend') == set()
+
+
+@each
+def test_a_manifest_names_no_package_of_the_suite_that_nothing_imports(package: Path) -> None:
+    text = '\n'.join(path.read_text() for path in package.glob('launch/*.xml'))
+    used = imports(package, package.name) | set(re.findall(r'texture_\w+', text))
+    named = {name for name in depends(package, 'exec_depend', 'depend') if name.startswith('texture_')}
+    assert named - used == set()
+    # Tests also start the nodes of others by name.
+    text = '\n'.join(path.read_text() for path in package.glob('test/*.py'))
+    tested = {name for name in depends(package, 'test_depend') if name.startswith('texture_')}
+    assert tested - set(re.findall(r'texture_[a-z]+', text)) == set()
+
+
+def test_what_runs_launch_files_is_named_where_they_are() -> None:
+    for package in PACKAGES:
+        if list(package.glob('launch/*.launch.xml')):
+            assert depends(package, 'exec_depend') >= LAUNCHING, package.name
+
+
+def test_the_table_of_layers_has_every_package_once_and_below_what_it_imports() -> None:
+    assert set(LAYERS) == {package.name for package in PACKAGES}
+    above: set[str] = set()
+    for name, layer in LAYERS.items():
+        assert layer.may <= above, f'{name} may import what stands below it'
+        above.add(name)
+
+
+@each
+def test_a_package_imports_only_what_stands_above_it(package: Path) -> None:
+    layer = LAYERS[package.name]
+    assert outside(package.name, imports(package, package.name), layer.may) == set()
+    assert outside(package.name, imports(package, 'test'), layer.may | layer.tests) == set()
+    declared = depends(package, 'exec_depend', 'depend')
+    assert outside(package.name, declared, layer.may) == set()
+
+
+def test_nothing_that_is_deployed_imports_the_benchmarks() -> None:
+    deployed = [package for package in PACKAGES if package.name != 'texture_benchmarks']
+    for package in deployed:
+        assert 'texture_benchmarks' not in imports(package, package.name) | imports(package, 'test')
+        assert 'texture_benchmarks' not in depends(package, 'exec_depend', 'depend', 'test_depend')
+
+
+@each
+def test_a_package_does_without_the_libraries_that_it_must_not_need(package: Path) -> None:
+    layer = LAYERS[package.name]
+    for path in (package / package.name).rglob('*.py'):
+        at_once, late = imported(path)
+        module = '.'.join(path.relative_to(package).with_suffix('').parts)
+        allowed = (layer.late or {}).get(module, frozenset())
+        assert top(at_once) & layer.never == set(), f'{module} imports it at once'
+        assert top(late) & layer.never <= allowed, f'{module} imports it in a function'
+
+
+def test_the_checks_see_an_import_that_is_not_allowed(tmp_path: Path) -> None:
+    code = tmp_path / 'texture_core' / 'texture_core'
+    code.mkdir(parents=True)
+    (code / 'wrong.py').write_text(
+        'import os\nimport scipy.signal\n\ndef late():\n    from texture_features import a\n'
+    )
+    found = imports(tmp_path / 'texture_core', 'texture_core')
+    assert found == {'scipy', 'texture_features'}
+    assert outside('texture_core', found, LAYERS['texture_core'].may) == {'texture_features'}
+    assert top(imported(code / 'wrong.py')[0]) & LAYERS['texture_core'].never == {'scipy'}
+    assert keys(found) == {'python3-scipy', 'texture_features'}
+
+
+@each
+def test_modules_import_each_other_in_no_circle(package: Path) -> None:
+    files = {
+        '.'.join(path.relative_to(package).with_suffix('').parts).removesuffix('.__init__'): path
+        for path in (package / package.name).rglob('*.py')
+    }
+    graph = {name: within(path, files) - {name} for name, path in files.items()}
+    while leaves := {name for name, needed in graph.items() if not needed}:
+        graph = {name: needed - leaves for name, needed in graph.items() if name not in leaves}
+    assert set(graph) == set()
+
+
+def within(path: Path, files: Mapping[str, Path]) -> set[str]:
+    """Return the modules among `files` that a file imports when it is imported."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module in files:
+            parts = {f'{node.module}.{alias.name}' for alias in node.names} & set(files)
+            found |= parts or {node.module}
+    return found
