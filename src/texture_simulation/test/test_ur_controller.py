@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from texture_simulation.devices.ur.controller import Controller
+from texture_simulation.devices.ur.dashboard import DashboardSession
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.tables import DONE, READY, Command, Safety
 
@@ -138,3 +139,53 @@ def test_driving_hard_into_the_surface_is_a_protective_stop(controller):
     speed_l(controller, 0.0, 0.0, -0.2)
     run(controller, 0.5)
     assert controller.safety is Safety.PROTECTIVE_STOP
+
+
+def test_a_stop_is_acknowledged_late_if_it_is_told_so_but_done_at_once(controller):
+    controller.acknowledge_s = 0.3
+    speed_l(controller, 0.05, 0.0, 0.0)
+    run(controller, 0.2)
+    send(controller, Command.SPEED_STOP, [10.0])
+    run(controller, 0.25)
+    assert not controller.robot.velocity.any()
+    assert state(controller) == READY
+    run(controller, 0.1)
+    assert state(controller) == DONE
+
+
+def test_a_late_acknowledgement_trips_a_watchdog_that_does_not_wait_for_it(controller):
+    controller.acknowledge_s = 0.15
+    send(controller, Command.SET_WATCHDOG, [10.0])
+    run(controller, 0.01)
+    send(controller, Command.NONE)
+    run(controller, 0.01)
+    send(controller, Command.ZERO_FT_SENSOR)
+    run(controller, 0.2)
+    assert not controller.playing
+
+
+def test_zeroing_under_load_hides_the_true_force(controller):
+    controller.robot.pose[2] = controller.robot.surface.origin[2] - 0.0015
+    controller.tick()
+    send(controller, Command.ZERO_FT_SENSOR)
+    run(controller, 0.01)
+    assert controller.robot.pressing_n == pytest.approx(3.0)
+    assert controller.robot.force[2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_program_of_somebody_else_takes_no_commands_and_can_be_paused(controller):
+    dashboard = DashboardSession(controller, lambda seconds: None)
+
+    def ask(line):
+        return dashboard.receive(line.encode() + b'\n').decode().strip()
+
+    assert ask('programState') == 'PLAYING rtde_control'
+    assert [ask('load other.urp'), ask('play')] == ['Loading program: other.urp', 'Starting program']
+    speed_l(controller, 0.05, 0.0, 0.0)
+    run(controller, 0.2)
+    assert not controller.robot.velocity.any()
+    assert [ask('running'), ask('programState')] == ['Program running: true', 'PLAYING other.urp']
+    ask('pause')
+    assert [ask('running'), ask('programState')] == ['Program running: false', 'PAUSED other.urp']
+    ask('stop')
+    assert ask('programState') == 'STOPPED other.urp'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -11,7 +12,7 @@ from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.program import ControlProgram
 from texture_simulation.devices.ur.registers import Registers
 from texture_simulation.devices.ur.robot import Robot
-from texture_simulation.devices.ur.tables import VERSIONS, Safety
+from texture_simulation.devices.ur.tables import CONTROL_SCRIPT, VERSIONS, Safety
 
 STARTING_S = 0.05  # between the upload of a program and its start
 STOP_DECELERATION = 5.0  # of a program that ends, m/s²
@@ -28,6 +29,10 @@ class Controller:
         self.registers = Registers()
         self.robot = Robot(params, rng)
         self.safety = Safety.NORMAL
+        self.acknowledge_s = 0.0  # see `Host`; set from outside
+        self.program_name = CONTROL_SCRIPT  # of the one that runs, or ran last
+        self.loaded = ''  # name of the program that `play` starts
+        self.paused = False
         self._params = params
         self._starts_s: float | None = None  # when an uploaded program starts
         self._program: Iterator[None] | None = None
@@ -42,7 +47,7 @@ class Controller:
     @property
     def playing(self) -> bool:
         """Whether a program runs."""
-        return self._program is not None
+        return self._program is not None and not self.paused
 
     def tick(self) -> None:
         """Do one cycle."""
@@ -51,7 +56,7 @@ class Controller:
             self._start_program()
         if self._watchdog_s and self.time_s - self.registers.fed_s > self._watchdog_s:
             self.stop_program()
-        if self._program is not None and next(self._program, ENDED) is ENDED:
+        if self._program is not None and not self.paused and next(self._program, ENDED) is ENDED:
             self.stop_program()
         self.robot.step(self.step_s)
         if np.linalg.norm(self.robot.force[:3]) > self._params.stop_force_n:
@@ -68,8 +73,18 @@ class Controller:
             self.stop_program()
             self._starts_s = self.time_s + STARTING_S
 
+    def play(self, name: str) -> None:
+        """Run a program that somebody else brought; it takes no commands and does nothing."""
+        self.stop_program()
+        self._program, self.program_name = itertools.repeat(None), name
+
+    def pause(self) -> None:
+        """Let the program wait."""
+        self.paused = self._program is not None
+
     def _start_program(self) -> None:
         self._starts_s = None
+        self.program_name = CONTROL_SCRIPT
         self._program = ControlProgram(self.robot, self.registers, self, self.step_s).cycles()
 
     def stop_program(self) -> None:
@@ -78,6 +93,7 @@ class Controller:
             self.robot.end_force_mode()
             self.robot.motion = Stop(STOP_DECELERATION)
         self._program = None
+        self.paused = False
         self._starts_s = None
         self._watchdog_s = 0.0
 

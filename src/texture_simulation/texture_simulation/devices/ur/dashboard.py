@@ -1,13 +1,15 @@
 """The dashboard server: one line asks, one line answers.
 
-Beside the real commands it obeys the fault switches of the emulator: `emulate protective stop` and
-`emulate offline SECONDS`.
+Beside the real commands it obeys the fault switches of the emulator: `emulate protective stop`,
+`emulate offline SECONDS` and `emulate slow SECONDS`, which lets stops, the end of force control and zeroing be
+acknowledged so much later. `load NAME` and `play` start a program of somebody else, which takes no commands.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from texture_simulation.devices.ur.controller import Controller
 from texture_simulation.devices.ur.tables import SAFETY_NAMES
@@ -56,8 +58,28 @@ class DashboardSession:
         numbers = '.'.join(str(number) for number in self._controller.version.numbers)
         return f'URSoftware {numbers} (emulated)'
 
+    def _load(self, rest: str) -> str:
+        self._controller.loaded = rest
+        return f'Loading program: {rest}'
+
+    def _loaded(self, _rest: str) -> str:
+        loaded = self._controller.loaded
+        return f'Loaded program: {loaded}' if loaded else 'No program loaded'
+
     def _play(self, _rest: str) -> str:
-        return 'Failed to execute: play'  # there is no program from which it could
+        if not self._controller.loaded:
+            return 'Failed to execute: play'
+        self._controller.play(self._controller.loaded)
+        return 'Starting program'
+
+    def _pause(self, _rest: str) -> str:
+        self._controller.pause()
+        return 'Pausing program'
+
+    def _state(self, _rest: str) -> str:
+        controller = self._controller
+        state = 'PAUSED' if controller.paused else 'PLAYING' if controller.playing else 'STOPPED'
+        return f'{state} {controller.program_name}'
 
     def _stop(self, _rest: str) -> str:
         self._controller.stop_program()
@@ -71,14 +93,21 @@ class DashboardSession:
         return f'Safetystatus: {self._safety()}'
 
     def _emulate_offline(self, rest: str) -> str:
+        return self._with_seconds(rest, self._go_offline, 'Going offline')
+
+    def _emulate_slow(self, rest: str) -> str:
+        return self._with_seconds(rest, partial(setattr, self._controller, 'acknowledge_s'), 'Acknowledging late')
+
+    @staticmethod
+    def _with_seconds(rest: str, use: Callable[[float], None], done: str) -> str:
         try:
             seconds = float(rest)
         except ValueError:
             seconds = math.nan
         if not 0 <= seconds < math.inf:
             return f"came '{rest}'; a number of seconds is needed"
-        self._go_offline(seconds)
-        return 'Going offline'
+        use(seconds)
+        return done
 
 
 Answer = Callable[[DashboardSession, str], str]
@@ -97,12 +126,13 @@ ANSWERS: Mapping[str, Answer] = {
     'safetystatus': lambda session, _rest: f'Safetystatus: {session._safety()}',
     'safetymode': lambda session, _rest: f'Safetymode: {session._safety()}',
     'running': lambda session, _rest: f'Program running: {str(session._controller.playing).lower()}',
-    'programstate': lambda session, _rest: f'{"PLAYING" if session._controller.playing else "STOPPED"} rtde_control',
-    'get loaded program': _fixed('No program loaded'),
+    'programstate': DashboardSession._state,
+    'get loaded program': DashboardSession._loaded,
     'isprogramsaved': _fixed('true rtde_control'),
+    'load': DashboardSession._load,
     'play': DashboardSession._play,
     'stop': DashboardSession._stop,
-    'pause': DashboardSession._stop,
+    'pause': DashboardSession._pause,
     'unlock protective stop': DashboardSession._unlock,
     'close safety popup': _fixed('closing safety popup'),
     'close popup': _fixed('closing popup'),
@@ -113,4 +143,5 @@ ANSWERS: Mapping[str, Answer] = {
     'quit': _fixed('Disconnected'),
     'emulate protective stop': DashboardSession._emulate_stop,
     'emulate offline': DashboardSession._emulate_offline,
+    'emulate slow': DashboardSession._emulate_slow,
 }

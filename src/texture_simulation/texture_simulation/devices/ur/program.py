@@ -18,7 +18,7 @@ from texture_core.rotation import rotation_matrix
 from texture_simulation.devices.ur.motions import Line, Servo, Speed, Stop
 from texture_simulation.devices.ur.registers import Registers
 from texture_simulation.devices.ur.robot import ForceMode, Robot
-from texture_simulation.devices.ur.tables import DONE, READY, REALTIME, Command
+from texture_simulation.devices.ur.tables import DONE, READY, REALTIME, SLOW, Command
 
 CONTACT_N = 3.0  # what tool_contact takes for a contact
 RETRACT_STOP = 3.0  # m/s², as in the script
@@ -36,6 +36,10 @@ class Host(Protocol):
 
     def protective_stop(self) -> None:
         """Stop hard."""
+
+    @property
+    def acknowledge_s(self) -> float:
+        """So much later than it is done a stop, the end of force control or a zeroing is acknowledged."""
 
 
 Steps = Iterator[None]
@@ -72,9 +76,15 @@ class ControlProgram:
                 registers.int_out[0] = READY
             elif not executed:
                 yield from self._obey(number)
+                if number in SLOW:
+                    yield from self._wait(self._host.acknowledge_s)
                 registers.int_out[0] = DONE
                 executed = True
             yield from self._look_around()
+            yield
+
+    def _wait(self, seconds: float) -> Steps:
+        for _ in range(round(seconds / self._step_s)):
             yield
 
     def _obey(self, number: int) -> Steps:

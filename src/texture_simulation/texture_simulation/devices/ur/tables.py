@@ -69,7 +69,8 @@ class Safety(enum.IntEnum):
 SAFETY_BITS: Mapping[Safety, int] = {Safety.NORMAL: 1 << 0, Safety.PROTECTIVE_STOP: 1 << 2}
 SAFETY_NAMES: Mapping[Safety, str] = {Safety.NORMAL: 'NORMAL', Safety.PROTECTIVE_STOP: 'PROTECTIVE_STOP'}
 ROBOT_RUNNING = 7  # robot_mode
-PROGRAM_STOPPED, PROGRAM_PLAYING = 1, 2  # runtime_state
+PROGRAM_STOPPED, PROGRAM_PLAYING, PROGRAM_PAUSED = 1, 2, 4  # runtime_state
+CONTROL_SCRIPT = 'rtde_control'  # how the control script of ur-rtde calls itself
 POWER_ON_BIT, PROGRAM_RUNNING_BIT = 1 << 0, 1 << 1  # robot_status_bits
 
 
@@ -102,4 +103,6 @@ class Command(enum.IntEnum):
 
 # The script processes these in every cycle and stays ready; the client does not wait for them.
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
+# What the robot does for some time; a real controller may acknowledge it late.
+SLOW = frozenset({Command.SPEED_STOP, Command.FORCE_MODE_STOP, Command.ZERO_FT_SENSOR, Command.STOP_L})
 READY, DONE = 1, 2  # output_int_register_0

@@ -12,6 +12,7 @@ from texture_simulation.devices.ur.controller import Controller
 from texture_simulation.devices.ur.registers import COUNT
 from texture_simulation.devices.ur.tables import (
     POWER_ON_BIT,
+    PROGRAM_PAUSED,
     PROGRAM_PLAYING,
     PROGRAM_RUNNING_BIT,
     PROGRAM_STOPPED,
@@ -38,6 +39,12 @@ def _status_bits(controller: Controller) -> Sequence[int]:
     return (POWER_ON_BIT | (PROGRAM_RUNNING_BIT if controller.playing else 0),)
 
 
+def _runtime_state(controller: Controller) -> Sequence[int]:
+    if controller.paused:
+        return (PROGRAM_PAUSED,)
+    return (PROGRAM_PLAYING if controller.playing else PROGRAM_STOPPED,)
+
+
 OUTPUTS: Mapping[str, Variable] = {
     'timestamp': ('DOUBLE', lambda controller: (controller.time_s,)),
     'actual_TCP_pose': ('VECTOR6D', lambda controller: controller.robot.pose.tolist()),
@@ -49,10 +56,7 @@ OUTPUTS: Mapping[str, Variable] = {
     'safety_mode': ('INT32', lambda controller: (int(controller.safety),)),
     'safety_status_bits': ('UINT32', lambda controller: (SAFETY_BITS[controller.safety],)),
     'robot_status_bits': ('UINT32', _status_bits),
-    'runtime_state': (
-        'UINT32',
-        lambda controller: (PROGRAM_PLAYING if controller.playing else PROGRAM_STOPPED,),
-    ),
+    'runtime_state': ('UINT32', _runtime_state),
     'robot_mode': ('INT32', _constant(ROBOT_RUNNING)),
     'joint_mode': ('VECTOR6INT32', _constant(*(JOINT_RUNNING,) * 6)),
     'actual_tool_accelerometer': ('VECTOR3D', _constant(0.0, 0.0, -9.81)),
