@@ -151,7 +151,7 @@ def listener(ip, port=30004, serve=None):
 
 
 def answer_version(server):
-    """Answer what the probe asks, as version 10.8, and nothing else."""
+    """Answer what the probe asks, as version 10.10 on which no program runs, and nothing else."""
     kept = []
     with contextlib.suppress(OSError):
         while True:
@@ -164,12 +164,15 @@ def _answer_version(connection):
     with contextlib.suppress(OSError):
         while data := connection.recv(3):
             size, kind = struct.unpack('>HB', data)
-            if size > 3:
-                connection.recv(size - 3)
+            asked = connection.recv(size - 3) if size > 3 else b''
             if kind == 86:
                 connection.sendall(struct.pack('>HBB', 4, 86, 1))
             elif kind == 118:
-                connection.sendall(struct.pack('>HB4I', 19, 118, 10, 8, 0, 0))
+                connection.sendall(struct.pack('>HB4I', 19, 118, 10, 10, 0, 0))
+            elif kind == 79 and asked.endswith(b'runtime_state'):
+                connection.sendall(struct.pack('>HBB6s', 10, 79, 1, b'UINT32'))
+            elif kind == 83:
+                connection.sendall(struct.pack('>HBB', 4, 83, 1) + struct.pack('>HBBI', 8, 85, 1, 1))
 
 
 @needs_ur_rtde

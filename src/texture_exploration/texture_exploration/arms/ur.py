@@ -14,11 +14,13 @@ from texture_exploration.arms.ur_link import WorkerLink
 from texture_exploration.arms.ur_messages import RECOVER, STOP, Report, Wish
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.arms.ur_probe import check_ready, unlock_protective_stop
+from texture_exploration.arms.ur_program import check_program
 from texture_exploration.arms.ur_tables import SAFETY_FAULTS
 
 STANDSTILL = ArmCommand()
 RECOVERY_S = 6.0
 POLL_S = 0.01
+WATCHDOG_S = 0.5  # beside its period, until it has ended a program
 UNSTEADY = (
     'its force sensor could not be zeroed: the force changed all the while the finger rose; see that nothing touches '
     "the finger, and raise 'zero_steady_n' above the noise of the sensor"
@@ -41,9 +43,16 @@ class UrArm:
         self._params = params
         self._frame = SurfaceFrame(params.surface_pose)
         self._link: WorkerLink | None = None
+        self._paused = False  # a stop by the safety system may have left our program paused
 
     def connect(self) -> None:
-        """Reach the controller and start its control program; release a protective stop if the parameters say so."""
+        """Reach the controller and start its control program; release a protective stop if the parameters say so.
+
+        Raises
+        ------
+        DeviceError
+            If it cannot be reached, its arm cannot move, or a program of somebody else is there; see `take_over`.
+        """
         self.close()
         if importlib.util.find_spec('rtde_control') is None:
             raise DeviceError(
@@ -51,7 +60,15 @@ class UrArm:
                 'it exists for Python up to 3.12 on Linux with an x86-64 processor'
             )
         params = self._params
-        check_ready(params.ip, params.probe_timeout_s, params.unlock_protective_stop)
+        version = check_ready(params.ip, params.probe_timeout_s, params.unlock_protective_stop)
+        check_program(
+            params.ip,
+            version,
+            params.probe_timeout_s,
+            take_over=params.take_over,
+            pause_is_ours=self._paused,
+            patience_s=max(params.acknowledge_s, 1.0 / params.watchdog_hz) + WATCHDOG_S,
+        )
         link = WorkerLink(params)
         try:
             link.wait_for_report()
@@ -64,6 +81,7 @@ class UrArm:
         """Stop and end the worker process."""
         link, self._link = self._link, None
         if link is not None:
+            self._paused = link.report is not None and link.report.safety_mode in SAFETY_FAULTS
             link.end()
 
     def state(self) -> ArmState:

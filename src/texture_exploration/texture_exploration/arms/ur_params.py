@@ -58,6 +58,9 @@ class UrArmParams(CommandLimits):
     unlock_protective_stop: bool = param(
         False, 'Release a protective stop when connecting; if not, a person does it on the pendant.'
     )
+    take_over: bool = param(
+        False, 'Stop a program of somebody else that runs or pauses on the controller; if not, connecting is refused.'
+    )
     probe_timeout_s: float = param(1.5, 'The controller must show that it is one within.', unit='s', low=0.1, high=10.0)
     connect_timeout_s: float = param(10.0, 'The arm must be ready to move within.', unit='s', low=0.5, high=60.0)
 

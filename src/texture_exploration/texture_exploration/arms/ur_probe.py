@@ -15,14 +15,21 @@ from texture_exploration.arms.ur_tables import (
     CONTROLLER_VERSION,
     DASHBOARD_BANNER,
     DASHBOARD_PORT,
+    DATA,
     FIRST_WITH_REMOTE_CONTROL,
     FIRST_WITHOUT_DASHBOARD,
+    OLDEST,
     PROTOCOL_VERSION,
     REQUEST_VERSION,
     RTDE_PORT,
+    SETUP_INPUTS,
+    SETUP_OUTPUTS,
+    START,
 )
 
 HEADER = struct.Struct('>HB')
+STATE = struct.Struct('>BI')  # recipe, runtime state
+RUNTIME_HZ = 10.0
 FREE_MODES = ('NORMAL', 'REDUCED')
 UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
 UNLOCK_RETRY_S = 0.25
@@ -105,9 +112,47 @@ def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
     return major, minor
 
 
+def runtime_state(ip: str, timeout_s: float) -> int:
+    """Return the runtime state of the controller: 1 if no program runs or pauses.
+
+    Raises
+    ------
+    DeviceError
+        If it does not answer in time.
+    """
+    with closing(Line(ip, RTDE_PORT, timeout_s)) as line:
+        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
+        _ask(line, SETUP_OUTPUTS, struct.pack('>d', RUNTIME_HZ) + b'runtime_state')
+        _ask(line, START, b'')
+        data = _await(line, DATA)
+    if len(data) != STATE.size:
+        raise DeviceError(f'{ip}:{RTDE_PORT} does not tell whether a program runs; is it a UR controller?')
+    state: int
+    _, state = STATE.unpack(data)
+    return state
+
+
+def claims_register(ip: str, name: str, timeout_s: float) -> bool:
+    """Return whether an input register is free, by claiming it for a moment.
+
+    Raises
+    ------
+    DeviceError
+        If the controller does not answer in time.
+    """
+    with closing(Line(ip, RTDE_PORT, timeout_s)) as line:
+        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
+        return b'IN_USE' not in _ask(line, SETUP_INPUTS, name.encode())
+
+
 def _ask(line: Line, kind: int, payload: bytes) -> bytes:
-    """Send a message and return the payload of the answer of the same type; others, such as texts, are passed over."""
+    """Send a message and return the payload of the answer of the same type."""
     line.send(HEADER.pack(HEADER.size + len(payload), kind) + payload)
+    return _await(line, kind)
+
+
+def _await(line: Line, kind: int) -> bytes:
+    """Return the payload of the next message of a type; others, such as texts, are passed over."""
     while True:
         size, answered = HEADER.unpack(line.read(HEADER.size))
         answer = line.read(max(0, size - HEADER.size))
@@ -134,8 +179,8 @@ class Dashboard(Line):
         return self.read_line()
 
 
-def check_ready(ip: str, timeout_s: float, unlock: bool) -> None:
-    """Return if the controller is there and its arm can move; release a protective stop if `unlock` says so.
+def check_ready(ip: str, timeout_s: float, unlock: bool) -> tuple[int, int]:
+    """Return the version of a controller whose arm can move; release a protective stop if `unlock` says so.
 
     Raises
     ------
@@ -144,8 +189,9 @@ def check_ready(ip: str, timeout_s: float, unlock: bool) -> None:
     """
     end_s = time.monotonic() + timeout_s
     version = rtde_version(ip, timeout_s)
+    _check_version(ip, version)
     if version[0] >= FIRST_WITHOUT_DASHBOARD:
-        return
+        return version
     with closing(Dashboard(ip, max(0.1, end_s - time.monotonic()))) as dashboard:
         mode = dashboard.ask('robotmode')
         if 'RUNNING' not in mode:
@@ -154,13 +200,23 @@ def check_ready(ip: str, timeout_s: float, unlock: bool) -> None:
             raise DeviceError(f'the arm at {ip} is under local control; switch the pendant to remote control')
         safety = _safety(dashboard)
     if safety in FREE_MODES:
-        return
+        return version
     if safety != 'PROTECTIVE_STOP' or not unlock:
         raise DeviceError(
             f'the arm at {ip} is held by its safety system ({safety}); find out why, release it on the pendant, '
             'and ask again'
         )
     unlock_protective_stop(ip, timeout_s)
+    return version
+
+
+def _check_version(ip: str, version: tuple[int, int]) -> None:
+    oldest = OLDEST.get(version[0], min(OLDEST.values()))
+    if version < oldest:
+        raise DeviceError(
+            f'the controller at {ip} has the software {version[0]}.{version[1]}, which is too old for force control, '
+            f'zeroing of the force sensor or the watchdog; update it to {oldest[0]}.{oldest[1]} or newer'
+        )
 
 
 def unlock_protective_stop(ip: str, timeout_s: float) -> None:

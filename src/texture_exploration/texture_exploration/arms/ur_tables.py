@@ -12,12 +12,18 @@ DASHBOARD_PORT = 29999
 DASHBOARD_BANNER = 'Universal Robots Dashboard Server'
 FIRST_WITHOUT_DASHBOARD = 10  # PolyScope X
 FIRST_WITH_REMOTE_CONTROL = (5, 6)
+# Oldest software by series: the oldest CB3 that ur-rtde 1.6.5 is tested with (its README); an e-Series with remote
+# control; a PolyScope X that takes programs on the port where ur-rtde sends its own.
+OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6), 10: (10, 10)}
+CONTROL_SCRIPT = 'rtde_control'  # the program of ur-rtde
+COMMAND_REGISTER = 'input_int_register_0'  # which it obeys; one client only may write it
 
 REQUEST_VERSION = 86  # 'V', types of RTDE messages
 CONTROLLER_VERSION = 118  # 'v'
+SETUP_OUTPUTS, SETUP_INPUTS, START, DATA = 79, 73, 83, 85
 PROTOCOL_VERSION = 2
 
-PROGRAM_PLAYING = 2  # runtime_state
+PROGRAM_STOPPED, PROGRAM_PLAYING = 1, 2  # runtime_state
 
 # safety_mode -> why the arm cannot move; what is not listed lets it move
 SAFETY_FAULTS: Mapping[int, str] = {

@@ -66,8 +66,8 @@ class Watchdog:
     @contextmanager
     def patient(self) -> Iterator[None]:
         """Let the watchdog wait for what is called within, and guard a moving arm again afterwards."""
-        self.armed = False
         took_s = self._set(self._patient_s)
+        self.armed = False
         try:
             yield
         finally:

@@ -154,7 +154,9 @@ class Worker:
         set_alarm(HANGING_S)
         self._feel()
         # What is sent to a controller that does not answer would be obeyed late, when nobody means it any more.
-        if not self._observer.silent and not self._stopped:
+        if self._stopped:
+            self._clear()
+        elif not self._observer.silent:
             self._pilot.cycle(self._wish)
         self._tell()
         self._control.waitPeriod(begin)
@@ -223,10 +225,15 @@ class Worker:
         elif kind == RECOVER:
             self._recover()
 
+    def _clear(self) -> None:
+        """Take the last command back: a program that starts would find it in its register and obey it."""
+        self._control.kickWatchdog()
+
     def _recover(self) -> None:
         """Start the program on the controller anew."""
         set_alarm(RESTART_S + HANGING_S)
         self._wish = None
+        self._clear()
         self._control.reuploadScript()
         end_s = time.monotonic() + RESTART_S
         while not (self._control.isProgramRunning() and self._plays()) and time.monotonic() < end_s:
