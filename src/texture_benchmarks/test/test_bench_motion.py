@@ -27,6 +27,12 @@ def test_force_speed_and_circle_are_kept_and_the_border_is_foretold(tmp_path: Pa
         assert row['overshoot'] <= targets['overshoot']
         assert row['speed_error'] <= targets['speed_error']
         assert row.get('radius_error_m', 0.0) <= targets['radius_error_m']
+    late = [row for rows in numbers['undeclared_lag'].values() for row in rows.values()]
+    assert max(row['overshoot'] for row in late) <= targets['overshoot']
+    for name, by_lag in numbers['hazards'].items():
+        for row in (row for rows in by_lag.values() for row in rows.values()):
+            assert row['success'] == name.startswith(('none', 'soft layer', 'step up')), (name, row)
+            assert row['peak_n'] < 6.0, (name, row)
     assert numbers['border_error'] <= targets['border_error']
     assert min(numbers['margin'].values()) >= targets['margin']
 

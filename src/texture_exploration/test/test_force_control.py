@@ -7,7 +7,7 @@ import pytest
 
 from texture_core.errors import InvalidParameter
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.force_control import ForceController, ForceLoopParams
+from texture_exploration.force_control import Feeling, ForceController, ForceLoop, ForceLoopParams
 from texture_exploration.lag import LagEstimate
 from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import growth
@@ -84,3 +84,15 @@ def test_the_observer_sees_where_a_bend_leads():
     for way in np.arange(40) * 2e-4:
         rise = observer.update(way, 5.0 * way**2, 0.05, noise_m=1e-9)
     assert rise == pytest.approx(0.05 * 2 * 5.0 * (way + ahead_m), rel=0.01)
+
+
+def test_a_finger_at_rest_is_pressed_on_no_faster_than_the_stiffest_base_allows():
+    params = ForceLoopParams(loop_delay_s=0.008, stiffest_n_m=20000.0)
+    loop, height_m, force_n = ForceLoop(params, PERIOD_S), 0.0, 0.05
+    for _ in range(50):
+        feeling = Feeling(height_m, 0.0, force_n)
+        loop.feel(feeling)
+        speed_m_s = loop.velocity_m_s(1.0, feeling, 0.0, PERIOD_S)
+        height_m, force_n = height_m + speed_m_s * PERIOD_S, force_n - 200.0 * speed_m_s * PERIOD_S
+        # 1 N on 20 kN/m within 8 ms and two periods of 4 ms.
+        assert speed_m_s >= -1.0 / 20000.0 / 0.016 - 1e-12

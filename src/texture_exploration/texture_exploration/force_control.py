@@ -52,6 +52,13 @@ class ForceLoopParams:
         0.15, 'The stiffest surface may be met so hard before the arm can react.', unit='N', low=0.01, high=5.0
     )
 
+    press_impact_share: float = param(
+        1.0,
+        'While pressing at rest, the stiffest base under a soft layer may be met with this share of the wanted force.',
+        low=0.05,
+        high=100.0,
+    )
+
     def loop(self, stiffness_n_m: float, period_s: float, gain_m_s_n: float = 0.0) -> Loop:
         """Return the closed loop on a contact."""
         return Loop(stiffness_n_m, gain_m_s_n, self.loop_delay_s, period_s, self.integral_s)
@@ -103,11 +110,14 @@ class ForceController:
         """Forget the past errors."""
         self._sum_ns = 0.0
 
-    def update(self, error_n: float, dt_s: float, feed_forward_m_s: float = 0.0) -> float:
-        """Return the normal velocity, positive away from the surface, for an error of the force, wanted less felt."""
+    def update(self, error_n: float, dt_s: float, feed_forward_m_s: float = 0.0, down_m_s: float = math.inf) -> float:
+        """Return the normal velocity, positive away from the surface, for an error of the force, wanted less felt.
+
+        Towards the surface it is at most `down_m_s`.
+        """
         added = self._sum_ns + error_n * dt_s
         wanted = feed_forward_m_s - self.gain_m_s_n * (error_n + added / self._integral_s)
-        limited = min(self._max_m_s, max(-self._max_m_s, wanted))
+        limited = min(self._max_m_s, max(-min(self._max_m_s, down_m_s), wanted))
         # Anti-windup: an error that only pushes further against the limit is not added up.
         if limited == wanted or (wanted > 0) == (error_n > 0):
             self._sum_ns = added
@@ -185,12 +195,18 @@ class ForceLoop:
         rising = 0.0
         if not math.isnan(felt) and (settled or self._observer.running):
             rising = self._observer.update(feeling.way_m, height_m + force_n / felt, speed_m_s, NOISE_N / felt)
-        return self.controller.update(wanted_n - force_n, dt_s, rising)
+        down_m_s = math.inf if speed_m_s > SLOWEST_M_S else self._pressing_m_s(wanted_n)
+        return self.controller.update(wanted_n - force_n, dt_s, rising, down_m_s)
+
+    def _pressing_m_s(self, wanted_n: float) -> float:
+        """Return how fast the finger may be pressed on: what is soft now may have a hard base."""
+        depth_m = self._params.press_impact_share * wanted_n / self._told.stiffest_n_m
+        return depth_m * self._patience / self._reaction_s(self._params)
 
     def closing_m_s(self, height_m: float) -> float:
         """Return how fast the finger may come down: slowly where the surface may be."""
         params = self._params
-        reaction_s = params.loop_delay_s + REACTION_PERIODS * self._period_s
+        reaction_s = self._reaction_s(params)
         slow = min(params.force_speed_m_s, self._closing_m / reaction_s)
         if self._surface_m is None:
             return slow
@@ -201,13 +217,18 @@ class ForceLoop:
     def _closing_m(self) -> float:
         """How deep the finger may run into the surface before it reacts, m."""
         depth_m = self._told.closing_force_rate
-        if not self._late:
-            return depth_m
-        reactions_s = [params.loop_delay_s + REACTION_PERIODS * self._period_s for params in (self._params, self._told)]
         felt = self.stiffness.value_n_m
-        if not self.stiffness.empty and not math.isnan(felt):
+        if self._late and not self.stiffness.empty and not math.isnan(felt):
             depth_m *= max(1.0, self._told.stiffest_n_m / felt)
-        return depth_m * min(LATE_IMPACT, reactions_s[0] / reactions_s[1])
+        return depth_m * self._patience
+
+    @property
+    def _patience(self) -> float:
+        """How many times harder than declared an arm that is later than declared may meet a surface."""
+        return min(LATE_IMPACT, self._reaction_s(self._params) / self._reaction_s(self._told))
+
+    def _reaction_s(self, params: ForceLoopParams) -> float:
+        return params.loop_delay_s + REACTION_PERIODS * self._period_s
 
     @property
     def _late(self) -> bool:

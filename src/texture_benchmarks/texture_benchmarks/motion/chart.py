@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,52 @@ def surface_table(surfaces: Mapping[str, Mapping[float, Trial]]) -> str:
     stiffnesses = list(next(iter(surfaces.values())))
     rows = [[name, *(_cell(trial.force_rms, 100) for trial in trials.values())] for name, trials in surfaces.items()]
     return _table(['force error, rms (%)', *(f'{stiffness:.0f} N/m' for stiffness in stiffnesses)], rows)
+
+
+def hazard_table(hazards: Mapping[str, Mapping[float, Mapping[float, Trial]]]) -> str:
+    """Return a Markdown table of the highest true force and what became of the slide, by hazard and undeclared lag."""
+    lags = list(next(iter(hazards.values())))
+    rows = [[name, *(_hazard_cell(by_lag[lag].values()) for lag in lags)] for name, by_lag in hazards.items()]
+    return _table(['hazard, over all stiffnesses', *(f'{1e3 * lag:.0f} ms undeclared lag' for lag in lags)], rows)
+
+
+def lag_table(lags: Mapping[float, Mapping[float, Trial]]) -> str:
+    """Return a Markdown table of the overshoot by stiffness and undeclared lag, in percent."""
+    stiffnesses = list(next(iter(lags.values())))
+    rows = [
+        [f'{1e3 * lag:.0f} ms', *(_cell(trial.overshoot, 100) for trial in trials.values())]
+        for lag, trials in lags.items()
+    ]
+    return _table(['overshoot (%), undeclared lag', *(f'{k:.0f} N/m' for k in stiffnesses)], rows)
+
+
+def hazard_chart(
+    lags: Mapping[float, Mapping[float, Trial]],
+    hazards: Mapping[str, Mapping[float, Mapping[float, Trial]]],
+    targets: Mapping[str, float],
+    path: str | Path,
+) -> Path:
+    """Draw the overshoot over the stiffness, a line for each undeclared lag, and the highest force of each hazard."""
+    with chart(
+        path, (11.0, 5.2), 'An arm without a force mode, 1 N at 0.05 m/s: undeclared lag, and hazards'
+    ) as figure:
+        left, right = figure.subplots(1, 2)
+        for (lag, trials), colour, marker in zip(lags.items(), COLOURS, MARKERS, strict=False):
+            kilo = np.array(list(trials)) / 1000
+            shares = [100 * trial.overshoot for trial in trials.values()]
+            left.semilogx(kilo, shares, color=colour, marker=marker, markersize=4, label=f'{1e3 * lag:.0f} ms')
+        left.axhline(100 * targets['overshoot'], color='black', linestyle='--', linewidth=1)
+        left.set(title='overshoot of the force (%)', xlabel='stiffness of the contact (kN/m)')
+        left.set(xticks=TICKS, xticklabels=map(str, TICKS))
+        left.legend(title='undeclared lag', loc='upper left')
+        names = list(hazards)
+        rows = np.arange(len(names))
+        for number, (lag, colour) in enumerate(zip(lags, COLOURS, strict=False)):
+            peaks = [max(trial.peak_n for trial in hazards[name][lag].values()) for name in names]
+            right.barh(rows + 0.2 * (number - 1.5), peaks, height=0.2, color=colour)
+        right.set(title='highest true force, worst stiffness (N)', yticks=rows, yticklabels=names)
+        right.invert_yaxis()
+    return Path(path)
 
 
 def robot_chart(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, float], path: str | Path) -> Path:
@@ -131,6 +177,15 @@ def border_chart(border: Mapping[str, Array], chosen: Array, path: str | Path) -
 def _number(row: Mapping[str, Mapping[str, float]], motions: Sequence[str], number: str) -> float:
     """Return a number of the first of the motions that a robot does, NaN if it does none."""
     return next((row[motion].get(number, np.nan) for motion in motions if motion in row), np.nan)
+
+
+def _hazard_cell(trials: Iterable[Trial]) -> str:
+    tried = list(trials)
+    ended = sum(trial.success for trial in tried)
+    times = [1e3 * trial.noticed_s for trial in tried if not trial.success and np.isfinite(trial.noticed_s)]
+    late = f', at most {max(times):.0f} ms' if times else ''
+    outcome = {len(tried): 'success', 0: f'aborts{late}'}.get(ended, f'{ended} of {len(tried)} succeed{late}')
+    return f'{max(trial.peak_n for trial in tried):.2f} N, {outcome}'
 
 
 def _cell(value: float | None, times: float) -> str:

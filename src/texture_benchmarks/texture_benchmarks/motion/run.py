@@ -10,7 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.motion.chart import border_chart, robot_chart, robot_table, surface_chart, surface_table
+from texture_benchmarks.motion.chart import (
+    border_chart,
+    hazard_chart,
+    hazard_table,
+    lag_table,
+    robot_chart,
+    robot_table,
+    surface_chart,
+    surface_table,
+)
+from texture_benchmarks.motion.hazards import LAGS_S, hazard_trials, lag_trials
 from texture_benchmarks.motion.robot_trials import ROBOTS, typical_trial
 from texture_benchmarks.motion.trial import ARM, CIRCLE, SLIDE, SURFACES, Trial, slide_trial, surface_trials
 from texture_benchmarks.result import Bench, BenchResult
@@ -46,6 +56,8 @@ def run(bench: Bench) -> BenchResult:
     stiffnesses = STIFFNESSES_N_M[1:2] if bench.quick else STIFFNESSES_N_M
     fine = STIFFNESSES_N_M if bench.quick else FINE_STIFFNESSES_N_M
     surfaces = surface_trials(fine)
+    lags_s = LAGS_S[::3] if bench.quick else LAGS_S
+    lags, hazards = lag_trials(fine, lags_s), hazard_trials(lags_s, 2 if bench.quick else None)
     border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if bench.quick else DELAYS_S, _controller)
     robots = {name: _simulated(arm, stiffnesses) for name, arm in SIMULATED.items()}
     here = [name for name, robot in ROBOTS.items() if importlib.util.find_spec(robot.needs)]
@@ -53,7 +65,8 @@ def run(bench: Bench) -> BenchResult:
         robots[name] = _emulated(name, stiffnesses, 1 if bench.quick else REPEATS)
     bench.out.mkdir(parents=True, exist_ok=True)
     table = bench.out / 'motion.md'
-    table.write_text(robot_table(robots, TARGETS) + '\n' + surface_table(surfaces), encoding='utf-8')
+    tables = (robot_table(robots, TARGETS), surface_table(surfaces), lag_table(lags), hazard_table(hazards))
+    table.write_text('\n'.join(tables), encoding='utf-8')
     return BenchResult(
         name='motion',
         measured=(
@@ -68,6 +81,11 @@ def run(bench: Bench) -> BenchResult:
             'targets': TARGETS,
             'robots': robots,
             'surfaces_velocities_only': {name: _rows(trials) for name, trials in surfaces.items()},
+            'undeclared_lag': {_milliseconds(lag): _rows(trials) for lag, trials in lags.items()},
+            'hazards': {
+                name: {_milliseconds(lag): _rows(trials) for lag, trials in by_lag.items()}
+                for name, by_lag in hazards.items()
+            },
             'bump_speed_m_s': {_newtons(k): _bump_speed_m_s(k) for k in stiffnesses},
             'border_error': float(np.abs(border['simulated'] / border['predicted'] - 1).max()),
             'margin': _margins(),
@@ -75,6 +93,7 @@ def run(bench: Bench) -> BenchResult:
         charts=(
             robot_chart(robots, TARGETS, bench.out / 'motion_robots.png'),
             surface_chart(surfaces, TARGETS, bench.out / 'motion_surfaces.png'),
+            hazard_chart(lags, hazards, TARGETS, bench.out / 'motion_hazards.png'),
             border_chart(border, _defaults(border), bench.out / 'motion_stability.png'),
         ),
     )
@@ -112,6 +131,10 @@ def _row(trial: Trial) -> dict[str, Any]:
 
 def _newtons(stiffness_n_m: float) -> str:
     return f'{stiffness_n_m:.0f} N/m'
+
+
+def _milliseconds(time_s: float) -> str:
+    return f'{1e3 * time_s:.0f} ms'
 
 
 def _bump_speed_m_s(stiffness_n_m: float) -> float:

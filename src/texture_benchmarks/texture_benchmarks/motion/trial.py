@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +27,7 @@ ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, stiffest_n_m=20
 TOUCH = TouchParams(approach_stiffness_n_m=20000.0)
 LIMITS = SafetyLimits()
 APART_S = 0.05
+LIFTED = (Phase.LIFT, Phase.ABORTED, Phase.DONE)
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class Trial:
     stayed below. The others are those of the slide: `force_rms`, `speed_error` (the largest), `mean_speed_error`, and
     `radius_error_m`, the largest distance from the circle, NaN if there was none. The speed is that of the finger in
     space: on a slope it is higher than along the level. All are NaN if it did not come to a slide; `message` says why.
+    `peak_n` is the highest force of the whole exploration, and `noticed_s` the time from what was injected until the
+    finger was lifted, or, without that, from the first loss of contact in the slide; NaN if there was none.
     """
 
     success: bool
@@ -46,6 +49,16 @@ class Trial:
     speed_error: float = math.nan
     mean_speed_error: float = math.nan
     radius_error_m: float = math.nan
+    peak_n: float = math.nan
+    noticed_s: float = math.nan
+
+
+@dataclass(frozen=True)
+class Injection:
+    """What happens to a simulated arm, at the third step of a phase."""
+
+    phase: Phase
+    happens: Callable[[SimulatedArm], None]
 
 
 Log = Sequence[tuple[Phase, ArmState]]
@@ -55,10 +68,12 @@ def slide_trial(
     arm: SimulatedArmParams = ARM,
     request: ExplorationRequest = SLIDE,
     touch: TouchParams = TOUCH,
+    injection: Injection | None = None,
 ) -> Trial:
-    """Explore once with a simulated arm, under the real exploration loop."""
+    """Explore once with a simulated arm, under the real exploration loop; judged by the true force."""
     log: list[tuple[Phase, ArmState]] = []
     now_ns = due_ns = 0
+    injected_ns: int | None = None
 
     def clock() -> int:
         return now_ns
@@ -71,24 +86,40 @@ def slide_trial(
     )
 
     def pace() -> None:
-        nonlocal now_ns, due_ns
+        nonlocal now_ns, due_ns, injected_ns
         due_ns += round(PERIOD_S * 1e9)
         while now_ns + ARM_PERIOD_NS <= due_ns:
             now_ns += ARM_PERIOD_NS
             moving.step(ARM_PERIOD_NS * 1e-9)
         log.append((exploration.state.phase, replace(moving.state(), force_n=moving.true_force_n)))
+        if injection and injected_ns is None and [phase for phase, _ in log[-3:]] == [injection.phase] * 3:
+            injected_ns = now_ns
+            injection.happens(moving)
 
     outcome = exploration.run(pace)
     moving.close()
-    return judge(log, request, outcome)
+    log.append((exploration.state.phase, replace(moving.state(), force_n=moving.true_force_n)))
+    return replace(judge(log, request, outcome), noticed_s=_noticed_s(log, injected_ns))
+
+
+def _noticed_s(log: Log, begin_ns: int | None) -> float:
+    """Return how long after `begin_ns`, or the first loss of contact in the slide, the finger was lifted, s."""
+    if begin_ns is None:
+        lost = (state.time_ns for phase, state in log if phase is Phase.SLIDE and state.force_n <= 0.0)
+        begin_ns = next(lost, None)
+    if begin_ns is None:
+        return math.nan
+    lifted = (state.time_ns for phase, state in log if phase in LIFTED and state.time_ns >= begin_ns)
+    return (next(lifted, log[-1][1].time_ns) - begin_ns) * 1e-9
 
 
 def judge(log: Log, request: ExplorationRequest, outcome: Outcome) -> Trial:
     """Return how an exploration went, from the states of the arm in each phase."""
     before = [state.force_n for phase, state in log if phase in (Phase.APPROACH, Phase.CONTACT)]
     sliding = [state for phase, state in log if phase is Phase.SLIDE]
+    peak_n = max((state.force_n for _, state in log), default=math.nan)
     if not sliding:
-        return Trial(outcome.success, outcome.message)
+        return Trial(outcome.success, outcome.message, peak_n=peak_n)
     force = np.array([state.force_n for state in sliding]) / request.force_n
     speed = np.array([math.hypot(*state.velocity) for state in sliding]) / request.speed_m_s
     times_s = np.array([state.time_ns for state in sliding]) * 1e-9
@@ -101,6 +132,7 @@ def judge(log: Log, request: ExplorationRequest, outcome: Outcome) -> Trial:
         speed_error=float(np.abs(speed - 1).max()),
         mean_speed_error=abs(mean_speed_m_s(times_s, places) / request.speed_m_s - 1),
         radius_error_m=radius_error_m(places[:, :2], request.radius_m),
+        peak_n=peak_n,
     )
 
 
