@@ -35,6 +35,8 @@ BATCH_FRAMES = 2
 STATE_BATCHES = 5  # a state every 0.1 s
 LOST_AFTER_S = 0.025  # frame times jitter by up to 8 ms; a larger step is a loss
 PAUSE_NS = NANOSECONDS
+LONGEST_S = 1000.0  # of one slide; frames that are missing are counted, however many
+LAST_EPOCH_S = 2.0**31 - 1e6  # a stamp of ROS has 31 bits for seconds, and all slides follow each other
 DELAY_NS = 100_000  # a batch is logged this long after its last sample
 FIELDS = ('frames', 'frame_time', 'velocity', 'wrench')
 NORMAL_FORCE = 2  # column of `wrench`: y of the tool, the one component that presses whatever the direction of travel
@@ -51,6 +53,16 @@ class Recording:
     velocity: AnyArray  # (m, 4): time s, x, y, z m/s
     wrench: AnyArray  # (k, 7): time s, fx, fy, fz N, tx, ty, tz N m
     epoch: float  # Unix time of the first frame, s
+
+    def __post_init__(self) -> None:
+        columns = {'frames': 44, 'velocity': 4, 'wrench': 7}
+        wrong = [name for name, count in columns.items() if np.shape(getattr(self, name))[1:] != (count,)]
+        if wrong or self.frame_time.shape != (len(self.frames),) or not len(self.frames):
+            raise ValueError(f"the arrays of '{self.slide}' have the shapes of no slide")
+        if not np.isfinite(self.frame_time).all() or np.ptp(self.frame_time) > LONGEST_S:
+            raise ValueError(f"the frames of '{self.slide}' are not within {LONGEST_S:g} s")
+        if not 0 <= self.epoch < LAST_EPOCH_S:
+            raise ValueError(f"'{self.slide}' began at {self.epoch:g} s; Unix time from 0 is needed")
 
 
 def import_biotac20(
