@@ -16,7 +16,7 @@ from texture_recordings.bags import read_bag
 
 pytestmark = pytest.mark.ros
 
-DOMAIN = 52
+DOMAIN = 96
 STOP_DEADLINE_S = 30.0
 # Runs main() of the module named first, in a Python to which other packages are not installed.
 ALONE = """
