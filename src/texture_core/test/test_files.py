@@ -76,6 +76,12 @@ def test_an_array_is_what_numpy_wrote(array: np.ndarray, tmp_path: Path) -> None
     np.testing.assert_array_equal(read, array)
 
 
+def test_texts_of_no_characters_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / 'a.npy', np.full(3, 0x110000, np.uint32).view('<U3'))
+    with open_regular(tmp_path / 'a.npy') as file, pytest.raises(FileRefused, match='no characters'):
+        read_array(file, Budget(1000))
+
+
 HEADERS = {
     'huge': "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000, 30)}",
     'cut off': "{'descr': '<f8', 'fortran_order': False, 'shape': (10, 30)}",

@@ -38,6 +38,7 @@ HEADERS: Mapping[tuple[int, int], Callable[..., tuple[tuple[int, ...], bool, np.
     (2, 0): np.lib.format.read_array_header_2_0,
 }
 MOST_HEADER_CHARACTERS = 10_000
+LAST_CHARACTER = 0x10FFFF  # of Unicode; NumPy keeps 32 bits for each and compares none
 # What NumPy raises at a header that is no literal, is cut off or is nested without end.
 BROKEN_HEADER = (
     ValueError, TypeError, SyntaxError, tokenize.TokenError, EOFError, RecursionError, MemoryError, OverflowError,
@@ -157,6 +158,9 @@ def read_array(file: Readable, budget: Budget) -> AnyArray:
         if not part:
             raise FileRefused(f'it promises an array of shape {shape}, whose values are cut off')
         content += part
+    characters = np.frombuffer(content, np.dtype(np.uint32).newbyteorder(dtype.byteorder)) if dtype.kind == 'U' else ()
+    if np.max(characters, initial=0) > LAST_CHARACTER:
+        raise FileRefused('it promises texts, and holds what are no characters')
     return np.frombuffer(content, dtype).reshape(shape, order='F' if fortran else 'C')
 
 
@@ -283,6 +287,8 @@ def _array_header(file: Readable) -> tuple[tuple[int, ...], bool, np.dtype[Any]]
         raise FileRefused(f'it has no array header that can be read: {type(error).__name__}: {error}') from error
     if dtype.hasobject:
         raise FileRefused('it is an array of Python objects, which would run code; plain numbers or texts are needed')
+    if dtype.kind not in 'biufcUS':
+        raise FileRefused(f'it is an array of {dtype}; plain numbers or texts are needed')
     if not dtype.itemsize or any(type(length) is not int or length < 0 for length in shape):
         raise FileRefused(f'it promises an array of shape {shape} of {dtype}, which there is not')
     return shape, fortran, dtype

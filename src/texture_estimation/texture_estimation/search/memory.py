@@ -79,7 +79,7 @@ class Memory:
         """
         try:
             content = load_json(Path(path).expanduser(), MOST_BYTES)
-            identity = content['identity'] if content['format'] == FORMAT else None
+            identity = dict(content['identity']) if content['format'] == FORMAT else None
             records = {
                 tuple(entry['individual']): Record(np.array(entry['learning'], float), np.array(entry['test'], float))
                 for entry in content['scores']
