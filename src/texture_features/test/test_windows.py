@@ -79,11 +79,17 @@ def test_slide_states_too_far_apart_leave_a_hole():
     assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 1.3]
 
 
-def test_a_state_that_withdraws_the_promise_leaves_a_hole_up_to_the_next_state():
-    lost = [state(1.2), state(1.22), state(1.24)]
-    states = [state(0.0, steady_s=1.5), *lost, state(1.26, steady_s=0.6), state(2.0, Phase.LIFT)]
-    states[0:1] = [state(0.02 * number, steady_s=0.1) for number in range(60)]
+def test_a_state_in_the_air_withdraws_the_promise_and_leaves_a_hole_up_to_the_next_state():
+    sliding = [state(0.02 * number, steady_s=0.1, force_n=1.0) for number in range(60)]
+    lost = [state(at, force_n=0.0) for at in (1.2, 1.22, 1.24)]
+    states = [*sliding, *lost, state(1.26, steady_s=0.6, force_n=1.0), state(2.0, Phase.LIFT)]
     assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 1.3]
+
+
+def test_a_turn_leaves_a_hole_but_keeps_what_was_promised():
+    turning = [state(at, force_n=1.0) for at in (1.0, 1.02, 1.04)]
+    states = [state(0.0, steady_s=1.01, force_n=1.0), *turning, state(1.06, steady_s=0.6, force_n=1.0)]
+    assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 1.1]
 
 
 def test_a_window_comes_with_its_last_sample_and_not_before():

@@ -14,6 +14,7 @@ LINK_NS = NANOSECONDS // 2
 # No promise is believed for longer: a wrong one must not make millions of windows.
 MAX_PROMISE_S = 3600.0
 MAX_STATES = 20_000
+LOST_SHARE = 0.5  # of the mean force; below, a state without promise is one in the air
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,9 @@ class Span:
 class Slide:
     """The covered time of consecutive `slide` states, handed out window by window.
 
-    A state that promises nothing after others that did withdraws their promise: neither what is left of it nor the
-    time up to the next state is covered, as the finger has lost the surface or turns.
+    After a state that promises nothing, though others did, the time up to the next state is not covered: the finger has
+    lost the surface or turns. If its force is far below that of the slide so far, the finger is in the air, and what is
+    left of the promise is not covered either; windows that were already handed out on it are not taken back.
 
     All it says depends on the order of the states alone, never on when they arrived: the mean speed and force of a
     window are those of the shortest beginning of the states that covers it.
@@ -57,6 +59,7 @@ class Slide:
         self._states: deque[tuple[int, int, float, float]] = deque(maxlen=MAX_STATES)
         self._promising = False
         self._withdrawn = False
+        self._force = _Mean()
         self.add(state)
 
     def add(self, state: ExplorationState) -> bool:
@@ -71,8 +74,9 @@ class Slide:
         self._promising |= state.steady_s > 0
         self._cover(start, stamp + _promise_ns(state.steady_s))
         self._withdrawn = self._promising and not state.steady_s > 0
-        if self._withdrawn:
+        if self._withdrawn and state.force_n < LOST_SHARE * self._force.value:
             self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
+        self._force.add(state.force_n, float(state.steady_s > 0))
         self._states.append((stamp, self._intervals[-1][1], state.speed_m_s, state.force_n))
         return True
 
