@@ -91,7 +91,7 @@ def hazard_chart(
         left.axhline(100 * targets['overshoot'], color='black', linestyle='--', linewidth=1)
         left.set(title='overshoot of the force (%)', xlabel='stiffness of the contact (kN/m)')
         left.set(xticks=TICKS, xticklabels=map(str, TICKS))
-        left.legend(title='undeclared lag', loc='upper left')
+        left.legend(title='undeclared lag', loc='center left')
         names = list(hazards)
         rows = np.arange(len(names))
         for number, (lag, colour) in enumerate(zip(lags, COLOURS, strict=False)):
