@@ -28,8 +28,8 @@ BUILD_INCLUDE = re.compile(r'/opt/python/cp\d+-cp\d+/include/python3\.\d+')
 BUILD_SITE_PACKAGES = re.compile(r'/opt/python/cp\d+-cp\d+/lib/python3\.\d+/site-packages')
 # Files of a package that need a new build when they change; Python modules are linked, not copied.
 BUILT = ('package.xml', 'setup.py', 'CMakeLists.txt', '*.msg', '*.srv', '*.action')
-# Behind the suite comes what the user has put there: sensors, motions and features of their own.
-OWN = '"${PYTHONPATH:+:$PYTHONPATH}"'
+# Behind the suite come an overlay that the user has sourced, and sensors, motions and features of their own.
+EXTENDED = ('AMENT_PREFIX_PATH', 'CMAKE_PREFIX_PATH', 'COLCON_PREFIX_PATH', 'LD_LIBRARY_PATH', 'PYTHONPATH')
 # These are linked: only their names matter.
 LISTED = ('nodes/*.py', 'commands/*.py', 'bin/*', 'launch/*', 'config/*', 'config/*/*')
 
@@ -202,16 +202,9 @@ def write_commands(env: dict[str, str]) -> None:
     script = 'source install/local_setup.bash && env -0'
     done = subprocess.run(['bash', '-c', script], cwd=ROOT, env=env, capture_output=True, check=True).stdout.decode()
     after = dict(entry.split('=', 1) for entry in done.split('\0') if '=' in entry)
-    names = (
-        'AMENT_PREFIX_PATH',
-        'CMAKE_PREFIX_PATH',
-        'COLCON_PREFIX_PATH',
-        'LD_LIBRARY_PATH',
-        'PYTHONPATH',
-        '_ROS_WHEELS_BOOTSTRAP_COMPLETE',
-    )
-    exports = [f"export {name}='{after[name]}'" for name in names if name in after]
-    exports = [line + OWN * line.startswith('export PYTHONPATH') for line in exports]
+    names = (*EXTENDED, '_ROS_WHEELS_BOOTSTRAP_COMPLETE')
+    behind = {name: f'"${{{name}:+:${name}}}"' for name in EXTENDED}
+    exports = [f"export {name}='{after[name]}'{behind.get(name, '')}" for name in names if name in after]
     exports += [
         f'export PATH=\'{VENV / "bin"}\':"$PATH"',
         'export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"',

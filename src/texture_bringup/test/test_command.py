@@ -118,3 +118,24 @@ def test_a_scene_is_drawn_and_explained(capsys, tmp_path) -> None:
     assert main(['scene', 'ets_linear', 'grid_1', '--duration', '0.2', '-o', str(tmp_path / 'grid.png')]) == 0
     assert (tmp_path / 'grid.png').read_bytes().startswith(b'\x89PNG')
     assert 'surfaces: ridge_1, ridge_2a, ridge_2b, grid_1' in capsys.readouterr().out
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    assert main(['--version']) == 0
+    assert re.fullmatch(r'texture \d+\.\d+\.\d+\n', capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(('line', 'wanted'), [('texture expl', 'explore'), ('texture explore --surf', '--surface')])
+def test_a_shell_completes_sub_commands_and_options(line, wanted):
+    """As bash asks through argcomplete: by environment variables, the answer on file descriptor 8."""
+    asking = {'_ARGCOMPLETE': '1', 'COMP_LINE': line, 'COMP_POINT': str(len(line)), '_ARGCOMPLETE_IFS': '\n'}
+    shell = f'exec 8>&1 9>/dev/null; {sys.executable} -m texture_bringup.command'
+    done = subprocess.run(
+        ['bash', '-c', shell], env={**os.environ, **asking}, capture_output=True, text=True, check=True
+    )
+    assert wanted in done.stdout.split()
+
+
+def test_an_unknown_motion_is_refused_before_an_explorer_is_waited_for(capsys):
+    assert main(['explore', 'linear_slid']) == 2
+    assert "did you mean 'linear_slide'" in capsys.readouterr().err

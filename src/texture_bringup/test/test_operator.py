@@ -78,3 +78,11 @@ def test_an_operator_at_work_all_day_does_not_grow():
             operator.set_parameters('explorer', {'use_sim_time': False})
             clients.append(len(list(operator._node.clients)))
     assert clients[0] == clients[-1]
+
+
+def test_an_explorer_that_does_not_keep_the_timeout_is_left(monkeypatch):
+    monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
+    with silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:
+        operator.wait_for_explorer(30.0)
+        with pytest.raises(MotionAborted, match='no result within the timeout of 0.2 s; the exploration was cancelled'):
+            operator.explore(ExplorationRequest('linear_slide', timeout_s=0.2))

@@ -10,17 +10,18 @@ import argparse
 import ast
 import importlib.abc
 import importlib.util
+import os
 import signal
 import sys
 from collections.abc import Mapping, Sequence
 from functools import cache, partial
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, entry_points, version
 from typing import Protocol, cast
 
 from texture_core.catalogue import find
 from texture_core.program import run_program
 
-GROUP = 'texture.commands'
+GROUP, PACKAGE = 'texture.commands', 'texture_bringup'
 
 
 class Module(Protocol):
@@ -54,6 +55,8 @@ def summary(command: EntryPoint) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the `texture` command; return its exit code: that of the sub-command or of `run_program`."""
     given = list(sys.argv[1:] if arguments is None else arguments)
+    if '_ARGCOMPLETE' in os.environ:
+        _complete()
     return run_program(partial(_dispatch, given))
 
 
@@ -69,12 +72,29 @@ def _dispatch(given: Sequence[str]) -> int:
     if not given or given[0] in ('-h', '--help', 'help'):
         print(overview())
         return 0
+    if given[0] == '--version':
+        print(f'texture {version(PACKAGE)}')
+        return 0
     name, *rest = given
     command = find(installed(), name, 'sub-command of texture')
     module = cast(Module, command.load())
     parser = argparse.ArgumentParser(prog=f'texture {name}', description=summary(command))
     module.configure(parser)
     return module.run(parser.parse_args(rest))
+
+
+def _complete() -> None:
+    """Answer the shell that asks what may follow a word; only the sub-command that it names is imported."""
+    import argcomplete  # noqa: PLC0415 - only a shell needs it
+
+    parser = argparse.ArgumentParser(prog='texture')
+    parsers = parser.add_subparsers()
+    words = os.environ.get('COMP_LINE', '').split()
+    for name, command in installed().items():
+        own = parsers.add_parser(name)
+        if name in words[1:2]:
+            cast(Module, command.load()).configure(own)
+    argcomplete.autocomplete(parser)
 
 
 def overview() -> str:

@@ -6,6 +6,7 @@ import enum
 import math
 from dataclasses import dataclass
 
+from texture_core.errors import InvalidData
 from texture_core.labels import checked_label
 
 
@@ -46,12 +47,12 @@ class ExplorationState:
 
 @dataclass(frozen=True)
 class ExplorationRequest:
-    """What an operator asks for; a number of 0 means the default of the motion.
+    """What an operator asks for; a number of 0 means the default of the motion, a `timeout_s` of 0 no timeout.
 
     Raises
     ------
     InvalidData
-        If `surface` is no label; see `texture_core.labels`.
+        If `surface` is no label (see `texture_core.labels`), or `timeout_s` is negative or not finite.
     """
 
     motion: str
@@ -64,6 +65,9 @@ class ExplorationRequest:
     direction_rad: float = 0.0
     surface: str = ''
     stop_when_certain: bool = False
+    timeout_s: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'surface', checked_label(self.surface))
+        if not 0.0 <= self.timeout_s < math.inf:
+            raise InvalidData(f'timeout_s is {self.timeout_s}; 0, for none, or a positive number of seconds is needed')

@@ -172,6 +172,8 @@ def test_the_numbers_of_a_refusal_are_unknown_not_zero(world):
         ({'surface': '../../etc/x'}, 'slash'),
         ({'direction_rad': 1e300}, 'direction_rad is 1e+300; allowed is'),
         ({'direction_rad': math.nan}, 'direction_rad is nan; allowed is'),
+        ({'timeout_s': -1.0}, 'timeout_s is -1.0'),
+        ({'timeout_s': math.nan}, 'timeout_s is nan'),
     ],
 )
 def test_a_request_that_cannot_be_meant_is_refused_before_anything_moves(world, request_fields, sentence):
@@ -259,6 +261,14 @@ def test_a_cancelled_action_lifts_the_finger(world):
     result = world.result(goal.get_result_async())
     assert result.status == GoalStatus.STATUS_CANCELED
     assert result.result.message == 'cancelled by the client'
+
+
+def test_an_exploration_that_takes_longer_than_its_timeout_is_aborted_and_lifts(world):
+    response = world.result(world.call(**SLOW, timeout_s=4.0))
+    assert not response.success
+    assert response.message == 'the exploration took longer than its timeout of 4 s'
+    world.until_phase('aborted')
+    assert 'lift' in world.client.phases(response.exploration_id)
 
 
 def test_a_refused_goal_ends_aborted_with_a_sentence(world):

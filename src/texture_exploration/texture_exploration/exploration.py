@@ -97,7 +97,7 @@ class Exploration:
         self._slid = False
         self._entered = False  # the workspace
         self._next_state_ns = 0
-        self._last_ns = self._awake_ns = clock()
+        self._begin_ns = self._last_ns = self._awake_ns = clock()
 
     def run(self, pace: Callable[[], None]) -> Outcome:
         """Go through the whole motion; `pace` returns when the next step is due."""
@@ -128,7 +128,7 @@ class Exploration:
         if trouble:
             self._give_up(f'{trouble}; the finger was not lifted')
             return True
-        reason = self._stop_reason or self._violation(arm) or self._silence(self._awake_ns)
+        reason = self._stop_reason or self._violation(arm) or self._silence(self._awake_ns) or self._overdue(now_ns)
         if reason:
             self._motion.abort(reason)
         if self._finish_reason:
@@ -146,6 +146,12 @@ class Exploration:
         self._entered |= not outside
         frozen = self._force_watch.frozen(arm, self._commanded)
         return self._limits.too_hard(arm) or frozen or (outside if self._entered else '')
+
+    def _overdue(self, now_ns: int) -> str:
+        """Return in a sentence that the exploration takes longer than its caller allows, '' if it does not."""
+        timeout_s = self.request.timeout_s
+        late = timeout_s > 0.0 and (now_ns - self._begin_ns) * 1e-9 > timeout_s
+        return f'the exploration took longer than its timeout of {timeout_s:g} s' if late else ''
 
     def _note_gap(self, now_ns: int) -> None:
         if now_ns - self._last_ns > GAP_NS:

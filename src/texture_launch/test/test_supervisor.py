@@ -21,7 +21,9 @@ class Launched:
     def __init__(self, file: Path, prefix: Path, options: tuple[str, ...] = ()) -> None:
         environment = {**os.environ, 'AMENT_PREFIX_PATH': str(prefix), 'TMPDIR': str(prefix)}
         command = [sys.executable, '-m', 'texture_launch', *options, str(file)]
-        self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(
+            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
         self.lines = []
 
     def wait_for(self, text: str) -> str:
@@ -100,6 +102,17 @@ def test_a_second_ctrl_c_goes_on_to_sigterm_at_once(launch) -> None:
     launched.process.send_signal(signal.SIGINT)
     assert launched.end() == 0
     assert time.monotonic() - begin < 4.0
+
+
+def test_a_python_node_that_is_still_importing_ends_without_a_traceback(launch) -> None:
+    # Python handles SIGINT from its start by an exception, and SIGTERM not at all: as it is while a node imports.
+    program = 'import time; print("ready 1", flush=True); time.sleep(60)'
+    launched = launch({'importing': f"exec {sys.executable} -c '{program}'"})
+    launched.ready()
+    launched.process.send_signal(signal.SIGINT)
+    launched.end()
+    assert not [line for line in launched.lines if 'Traceback' in line or 'KeyboardInterrupt' in line]
+    assert any('importing was killed by SIGTERM' in line for line in launched.lines)
 
 
 def test_a_node_that_dies_is_named_with_its_code_and_the_others_go_on(launch) -> None:

@@ -84,6 +84,25 @@ def send(process: subprocess.Popen[bytes], number: signal.Signals) -> None:
         os.killpg(process.pid, number)
 
 
+def interrupt(process: subprocess.Popen[bytes]) -> None:
+    """Ask a process and its group to end: by SIGINT, or by SIGTERM while it cannot answer to a signal yet.
+
+    A Python program that is still importing would only print a traceback on SIGINT. It has its own handlers for SIGINT
+    and SIGTERM once it runs, and none for SIGTERM before.
+    """
+    send(process, signal.SIGINT if _catches(process.pid, signal.SIGTERM) else signal.SIGTERM)
+
+
+def _catches(pid: int, number: signal.Signals) -> bool:
+    """Return whether a process has a handler for a signal; True where that cannot be found out."""
+    try:
+        status = Path(f'/proc/{pid}/status').read_text(encoding='ascii', errors='replace')
+    except OSError:
+        return True
+    caught = next((line.split()[1] for line in status.splitlines() if line.startswith('SigCgt:')), 'f' * 16)
+    return bool(int(caught, 16) >> (number - 1) & 1)
+
+
 def pipe(stream: IO[bytes] | None) -> IO[bytes]:
     """Return a stream of a process that `start` has given a pipe."""
     assert stream is not None

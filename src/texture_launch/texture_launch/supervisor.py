@@ -144,7 +144,10 @@ class Supervisor:
             if self._running:
                 self._say(f'[launch] {number.name} to {", ".join(running.label for running in self._running)}')
             for running in self._running:
-                process.send(running.process, number)
+                if number == signal.SIGINT:
+                    process.interrupt(running.process)
+                else:
+                    process.send(running.process, number)
 
     def _end(self, running: Running) -> None:
         self._forget(running)

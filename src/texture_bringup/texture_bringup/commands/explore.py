@@ -7,9 +7,11 @@ import sys
 from dataclasses import replace
 
 from texture_bringup.ros.operator import Explored, Operator
+from texture_core.catalogue import find
 from texture_core.errors import MotionRefused
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationRequest, ExplorationState
+from texture_exploration.motions.catalogue import MOTIONS
 
 # Option, field of the request, unit or '', meaning.
 NUMBERS = (
@@ -21,6 +23,7 @@ NUMBERS = (
     ('duration', 'duration_s', 's', 'duration of an in-hand slide'),
 )
 BAR = 24
+TIMEOUT_S = 300.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -41,14 +44,22 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--stop-when-certain', action='store_true', help='end the slide as soon as the texture is certain'
     )
+    parser.add_argument(
+        '--timeout',
+        type=float,
+        default=TIMEOUT_S,
+        help='longest duration of one exploration, s; then the finger is lifted and the exploration aborted '
+        '(default: %(default)g)',
+    )
     parser.add_argument('--namespace', default='', help='namespace of the nodes')
 
 
 def run(options: argparse.Namespace) -> int:
     """Explore once in each direction; return 1 as soon as one was ended early by a fault or a stop."""
+    requests = requests_of(options)
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(deadline_s=10.0)
-        succeeded = all(tell(operator.explore(request, show_progress)) for request in requests_of(options))
+        succeeded = all(tell(operator.explore(request, show_progress)) for request in requests)
     return 0 if succeeded else 1
 
 
@@ -65,10 +76,23 @@ def tell(explored: Explored) -> bool:
 
 
 def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
-    """Return the requests that the options stand for, one for each direction."""
+    """Return the requests that the options stand for, one for each direction.
+
+    Raises
+    ------
+    UnknownName
+        If there is no such motion: said before an explorer is waited for.
+    InvalidData
+        If the surface is no label, or the timeout no number of seconds.
+    """
+    find(MOTIONS, options.motion, 'motion')
     numbers = {field: getattr(options, option) for option, field, _, _ in NUMBERS}
     request = ExplorationRequest(
-        options.motion, surface=options.surface, stop_when_certain=options.stop_when_certain, **numbers
+        options.motion,
+        surface=options.surface,
+        stop_when_certain=options.stop_when_certain,
+        timeout_s=options.timeout,
+        **numbers,
     )
     return [replace(request, direction_rad=direction) for direction in options.direction]
 

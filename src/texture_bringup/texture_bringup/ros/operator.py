@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -150,16 +151,22 @@ class Operator:
         self._wait(accepted.done, ACCEPT_S)
         goal = accepted.result()
         endings = [goal.get_result_async()]
+        deadline_s = time.monotonic() + (request.timeout_s + CANCEL_DEADLINE_S if request.timeout_s else math.inf)
         try:
             self._wait(
-                lambda: any(ending.done() for ending in endings),
+                lambda: any(ending.done() for ending in endings) or time.monotonic() > deadline_s,
                 SILENT_S,
                 lambda: endings.append(goal.get_result_async()),
             )
         except KeyboardInterrupt:
             self._cancel(goal, endings[0])
             raise
-        answer = next(ending.result() for ending in endings if ending.done())
+        answer = next((ending.result() for ending in endings if ending.done()), None)
+        if answer is None:
+            goal.cancel_goal_async()
+            raise MotionAborted(
+                f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
+            )
         if answer.status == GoalStatus.STATUS_UNKNOWN:
             raise MotionAborted('the explorer was started anew and knows of no such exploration; it was broken off')
         result = answer.result
