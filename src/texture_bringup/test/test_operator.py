@@ -84,5 +84,5 @@ def test_an_explorer_that_does_not_keep_the_timeout_is_left(monkeypatch):
     monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
     with silent_explorer(), operators.Operator(domain_id=DOMAIN) as operator:
         operator.wait_for_explorer(30.0)
-        with pytest.raises(MotionAborted, match='no result within the timeout of 0.2 s; the exploration was cancelled'):
+        with pytest.raises(MotionAborted, match=r'no result within the timeout of 0\.2 s; the exploration was'):
             operator.explore(ExplorationRequest('linear_slide', timeout_s=0.2))
