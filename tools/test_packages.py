@@ -19,6 +19,7 @@ PACKAGES = sorted(manifest.parent for manifest in ROOT.glob('src/*/package.xml')
 # Module → key of rosdep. What is imported under the name of its ROS package needs no line.
 KEYS = {
     'aiohttp': 'python3-aiohttp',
+    'argcomplete': 'python3-argcomplete',
     'apsw': 'python3-apsw',
     'hypothesis': 'python3-hypothesis',
     'joblib': 'python3-joblib',
