@@ -37,6 +37,14 @@ KEYS = {
 KEYLESS = {'cobs', 'distributed', 'nltk', 'playwright', 'pymoo', 'pywt', 'skops', 'threadpoolctl'}
 # What comes with Python or another package, and the libraries of robots that are chosen by name at run time.
 OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_receive'}
+# What some modules of a package use and its manifest leaves out, so that colcon builds the rest without it: to record
+# and to read bags is possible with the messages, the core, the drivers and texture_recordings alone.
+OPTIONAL = {
+    'texture_recordings': {
+        'python3-scipy': {'importers.ntp21'},
+        'texture_features': {'commands.segment', 'dataset', 'segment', 'whole_slides'},
+    }
+}
 # What launch files need, which no module imports.
 LAUNCHING = {'launch_ros', 'launch_xml', 'ros2launch'}
 
@@ -73,7 +81,7 @@ LAYERS: Mapping[str, Layer] = {
     'texture_estimation': Layer(of('msgs', 'core', 'features'), never=DRAWING | {'rosbags'}),
     'texture_recordings': Layer(
         of('msgs', 'core', 'features'),
-        tests=of('launch', 'drivers'),
+        tests=of('drivers'),
         never=LEARNING | DRAWING | SCIPY,
         late={'texture_recordings.importers.ntp21': SCIPY},
     ),
@@ -148,7 +156,18 @@ each = pytest.mark.parametrize('package', PACKAGES, ids=lambda package: package.
 
 @each
 def test_a_manifest_names_what_its_package_imports(package: Path) -> None:
-    assert keys(imports(package, package.name)) - depends(package, 'exec_depend', 'depend') == set()
+    optional = set(OPTIONAL.get(package.name, {}))
+    assert keys(imports(package, package.name)) - depends(package, 'exec_depend', 'depend') == optional
+
+
+@pytest.mark.parametrize('name', OPTIONAL)
+def test_what_a_manifest_leaves_out_is_used_in_few_modules(name: str) -> None:
+    package = ROOT / 'src' / name
+    users: dict[str, set[str]] = {key: set() for key in OPTIONAL[name]}
+    for path in (package / name).rglob('*.py'):
+        for key in keys(top(frozenset().union(*imported(path)))) & set(users):
+            users[key].add('.'.join(path.relative_to(package / name).with_suffix('').parts))
+    assert users == OPTIONAL[name]
 
 
 @each

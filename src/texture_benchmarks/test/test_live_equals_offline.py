@@ -13,11 +13,11 @@ import pytest
 from texture_benchmarks.ros.graph import Graph
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
+from texture_core.node_process import NodeProcess
 from texture_core.ros.conversions import to_msg
 from texture_estimation.model import Model, load_model
 from texture_evaluation.evaluate import judge
 from texture_evaluation.train import train_from_bags
-from texture_launch.node_process import NodeProcess
 from texture_recordings.dataset import cut_slides
 from texture_recordings.importers.biotac20 import import_biotac20
 from texture_recordings.slides import find_slides

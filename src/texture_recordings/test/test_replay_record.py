@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from texture_core.exploration import ExplorationState, Phase
+from texture_core.node_process import NodeProcess
 from texture_core.signal import TactileSignal
-from texture_launch.node_process import NodeProcess
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import read_bag
 

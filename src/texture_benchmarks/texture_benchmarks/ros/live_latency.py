@@ -17,10 +17,10 @@ from texture_benchmarks.ros.stream import Streamer, Timed
 from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState
+from texture_core.node_process import NodeProcess
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.model import load_model
 from texture_features.windowing.stream import INDEX_TOLERANCE
-from texture_launch.node_process import NodeProcess
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
 

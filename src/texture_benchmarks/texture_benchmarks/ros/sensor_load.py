@@ -12,8 +12,8 @@ from texture_msgs import msg
 
 from texture_benchmarks.load.rig import Rig
 from texture_benchmarks.ros.graph import Graph
+from texture_core.node_process import NodeProcess
 from texture_core.ros.qos import SENSOR_QOS
-from texture_launch.node_process import NodeProcess
 
 SETTLE_S = 3.0
 REPORT_S = 1.5  # until the next report on /diagnostics has come for sure
