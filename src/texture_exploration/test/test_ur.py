@@ -201,8 +201,8 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(bench, rec
     places_m = np.array([finger.x_m for finger in slide])
     forces_n = np.array([finger.force_n for finger in slide])
     speed_m_s = np.polyfit(times_s - times_s[0], places_m, 1)[0]
-    record_property('speed_m_s', speed_m_s)
-    record_property('force_n', forces_n.mean())
+    record_property('speed_m_s', float(speed_m_s))
+    record_property('force_n', float(forces_n.mean()))
     record_property('counts', dict(counts))
     assert speed_m_s == pytest.approx(0.02, rel=0.02)
     assert np.all(np.abs(forces_n - 2.0) <= 0.1)
