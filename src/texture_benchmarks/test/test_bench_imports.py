@@ -47,7 +47,7 @@ def test_a_part_is_imported_for_itself_and_so_is_what_one_benchmark_needs_alone(
     assert asked == [('felt', '', ()), ('felt', '1-3', ('b',)), ('felt', '', ())]
 
 
-def test_what_is_missing_is_told_by_the_benchmark_that_needs_it(asked, tmp_path: Path) -> None:
+def test_what_is_missing_is_reported_by_the_benchmark_that_needs_it(asked, tmp_path: Path) -> None:
     for data in (tmp_path, None):
         with (
             importing_once(Bench(tmp_path, data), ('cork',)) as bench,

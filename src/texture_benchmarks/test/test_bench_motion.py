@@ -10,7 +10,7 @@ from texture_benchmarks.motion.trial import radius_error_m
 from texture_benchmarks.result import Bench
 
 
-def test_force_speed_and_circle_are_kept_and_the_border_is_foretold(tmp_path: Path) -> None:
+def test_force_speed_and_circle_are_kept_and_the_limit_is_foretold(tmp_path: Path) -> None:
     result, path = run_bench('motion', Bench(tmp_path, quick=True))
     numbers, targets = result.numbers, result.numbers['targets']
     assert path.is_file()

@@ -73,7 +73,7 @@ def test_another_rate_keeps_a_tone_and_its_losses() -> None:
         np.testing.assert_allclose(middle, np.sin(2 * np.pi * 0.1 * np.arange(100, 400)), atol=0.01)
 
 
-def test_recipes_are_compared_on_windows_of_one_length_without_what_the_session_tells() -> None:
+def test_recipes_are_compared_on_windows_of_one_length_without_what_the_session_reports() -> None:
     linear = comparable(load_recipe('ets-linear-svm'), 1000.0, of_motion=False)
     assert linear.feature_set.as_mapping()['inputs']['signal'].keys() == {'features'}
     vote = comparable(load_recipe('ets-linear-svm-vote'), 1000.0, of_motion=True)

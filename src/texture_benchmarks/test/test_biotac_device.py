@@ -65,15 +65,15 @@ def test_a_reset_of_the_device_is_an_interruption(make: Make) -> None:
     assert (after[-1].first_sample - before[0].first_sample) / 2200 == pytest.approx(elapsed_s, abs=0.03)
 
 
-def test_the_serial_number_is_told_and_a_mute_bridge_is_an_error_with_advice(make: Make) -> None:
+def test_the_serial_number_is_reported_and_a_silent_bridge_is_an_error_with_advice(make: Make) -> None:
     rig = make()
     rig.signal_s(1.5)
     assert rig.sensor.details['serial of finger 0'] == 'BT-0'
-    rig.set(mute=True)
+    rig.set(silent=True)
     assert 'sends no whole frames' in rig.fault()
 
 
-def test_the_wrong_kind_of_biotac_is_told(make: Make) -> None:
+def test_the_wrong_kind_of_biotac_is_reported(make: Make) -> None:
     assert '44 slots' in make(layout=LAYOUTS['biotac_sp']).fault()
 
 

@@ -11,7 +11,7 @@ DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
-def test_decisions_on_a_few_recorded_slides_are_told_in_figures_and_charts(tmp_path: Path) -> None:
+def test_decisions_on_a_few_recorded_slides_are_reported_in_figures_and_charts(tmp_path: Path) -> None:
     result, path = run_bench('decisions', Bench(out=tmp_path, quick=True, data=DATA))
     assert path.is_file()
     assert {chart.name for chart in result.charts} == {

@@ -30,7 +30,7 @@ def clouds(labels=('cork', 'felt', 'wood'), slides=6, windows=6):
     )
 
 
-def test_a_course_of_lessons_ends_as_good_as_training_anew(tmp_path: Path) -> None:
+def test_a_course_of_lessons_ends_as_good_as_training_again(tmp_path: Path) -> None:
     course = try_course(load_recipe('default'), clouds(), ['wood'], taught=4, stages=(1, 4), path=tmp_path / 'm')
     assert course.taught[4].windows > course.trained[4].windows - 0.15
     assert course.old[4].windows > course.before.windows - 0.15

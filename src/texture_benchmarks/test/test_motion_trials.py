@@ -6,7 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from texture_benchmarks.motion.trial import ARM, CIRCLE, SURFACES, slide_trial, surface_trials
+from texture_benchmarks.motion.trial import (
+    ARM,
+    CIRCLE,
+    SURFACES,
+    simulate_force_controlled_slide,
+    simulate_slides_on_surfaces,
+)
 from texture_exploration.arms.simulated_surface import SimulatedSurface
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.stiffness import StiffnessEstimate
@@ -16,7 +22,7 @@ TILT = math.radians(10)
 
 def slide(stiffness, **surface):
     """Return overshoot, root mean square and speed error of a slide with 1 N, as shares."""
-    trial = slide_trial(replace(ARM, stiffness_n_m=stiffness, **surface))
+    trial = simulate_force_controlled_slide(replace(ARM, stiffness_n_m=stiffness, **surface))
     assert trial.success, trial.message
     return trial.overshoot, trial.force_rms, trial.speed_error
 
@@ -54,7 +60,7 @@ def test_a_bump_of_two_millimetres_is_followed():
 # The overshoot asked for, 20 %, holds within 20 % of the true stiffness. Felt 40 % too stiff, part of the steepest
 # slope is not fed forward while the finger gains speed: the force rises higher then, but settles before the slide.
 @pytest.mark.parametrize(('share', 'most'), [(0.7, 0.2), (0.8, 0.2), (1.2, 0.2), (1.4, 0.35)])
-def test_a_stiffness_that_was_felt_wrongly_does_no_harm(share, most, monkeypatch):
+def test_a_stiffness_that_was_measured_wrongly_does_no_harm(share, most, monkeypatch):
     felt = StiffnessEstimate._slope
     monkeypatch.setattr(StiffnessEstimate, '_slope', lambda self: share * felt(self))
     overshoot, rms, _ = slide(20000.0, tilt_rad=TILT)
@@ -84,7 +90,7 @@ def test_a_noisy_force_does_not_shake_the_finger(monkeypatch):
 
 @pytest.mark.parametrize('stiffness', [200.0, 20000.0])
 def test_a_circle_keeps_its_radius(stiffness):
-    trial = slide_trial(replace(ARM, stiffness_n_m=stiffness), CIRCLE)
+    trial = simulate_force_controlled_slide(replace(ARM, stiffness_n_m=stiffness), CIRCLE)
     assert trial.success, trial.message
     assert trial.radius_error_m < 0.001
     assert trial.force_rms < 0.05
@@ -98,13 +104,13 @@ def test_a_sticky_surface_neither_holds_the_finger_nor_sets_it_swinging():
 
 
 def test_a_trial_without_a_surface_says_why():
-    trial = slide_trial(replace(ARM, stiffness_n_m=0.0), touch=TouchParams(approach_travel_m=0.003))
+    trial = simulate_force_controlled_slide(replace(ARM, stiffness_n_m=0.0), touch=TouchParams(approach_travel_m=0.003))
     assert not trial.success
     assert 'no surface' in trial.message
     assert math.isnan(trial.force_rms)
 
 
 def test_the_trials_cover_all_surfaces():
-    trials = surface_trials([2000.0])
+    trials = simulate_slides_on_surfaces([2000.0])
     assert set(trials) == set(SURFACES)
     assert all(trial[2000.0].success for trial in trials.values())

@@ -21,7 +21,7 @@ def test_every_way_to_choose_is_judged_after_every_slide(tmp_path: Path) -> None
     assert accuracy['informed'][-1] >= 0.6
 
 
-def test_trials_are_recognised_once_a_motion_tells_the_textures_apart() -> None:
+def test_trials_are_recognised_once_a_motion_reports_the_textures_apart() -> None:
     scene, features, motions = load_scene('oriented'), load_recipe('fast').feature_set, MOTIONS[:1]
     values = np.zeros((1, len(scene.surfaces), 4, 2))
     values[..., 0] = 100.0 * np.arange(len(scene.surfaces))[:, None]

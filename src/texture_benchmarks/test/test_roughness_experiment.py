@@ -19,7 +19,7 @@ def outcome(tmp_path_factory):
     return result, out
 
 
-def test_ours_grades_textures_never_felt_better_than_the_papers_heads_and_than_always_three(outcome) -> None:
+def test_ours_grades_textures_never_measured_better_than_the_papers_heads_and_than_always_three(outcome) -> None:
     numbers = outcome[0].numbers
     errors = {name: parts['unseen']['error'] for name, parts in numbers['heads'].items()}
     assert min(errors, key=errors.get) == 'ours'

@@ -35,7 +35,7 @@ def make(tmp_path: Path) -> Iterator[Make]:
 
 def test_the_channels_keep_their_order(make: Make) -> None:
     def feed(device: Any, first: int, ticks: int) -> None:
-        device.feel(np.outer(np.arange(first, first + ticks) % 30_000, [1, 0, 0, 0, 0, 0, 0, -1]).astype(np.int16))
+        device.sample(np.outer(np.arange(first, first + ticks) % 30_000, [1, 0, 0, 0, 0, 0, 0, -1]).astype(np.int16))
 
     last = make(feed=feed).signal_s(0.5)[-1]
     assert last.samples[0, 0] > 0
@@ -58,7 +58,7 @@ def test_frames_sent_twice_are_counted_and_no_others(make: Make) -> None:
     assert rig.sensor.counts['bogus'] == rig.sensor.counts['left out by the device'] == 0
 
 
-def test_a_brown_out_is_survived_and_the_gap_is_told(make: Make) -> None:
+def test_a_brown_out_is_survived_and_the_gap_is_reported(make: Make) -> None:
     rig = make()
     batches = rig.signal_s(0.5)
     rig.do(rig.device.reset)
@@ -70,11 +70,11 @@ def test_a_brown_out_is_survived_and_the_gap_is_told(make: Make) -> None:
     assert (last.first_sample - first.first_sample) / 2500 == pytest.approx(elapsed_s, abs=0.05)
 
 
-def test_a_silent_device_and_a_babbling_one_are_told_apart(make: Make) -> None:
+def test_a_silent_device_and_a_babbling_one_are_reported_apart(make: Make) -> None:
     rig = make()
-    rig.set(mute=True)
+    rig.set(silent=True)
     assert 'sends nothing' in rig.fault()
-    rig.set(mute=False, faults=ByteFaults(flip=0.2))
+    rig.set(silent=False, faults=ByteFaults(flip=0.2))
     rig.sensor.open()
     assert 'no valid frame' in (babble := rig.fault())
     assert 'baud' in babble
@@ -88,7 +88,7 @@ def swing(device: Any, first: int, ticks: int) -> None:
     """Feed a film that swings at 50 Hz, and a force that rises."""
     numbers = np.arange(first, first + ticks)
     film = 1000 * np.sin(2 * np.pi * 50 / 4096 * numbers)
-    device.feel(film.astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 3000).astype(np.int16))
+    device.sample(film.astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 3000).astype(np.int16))
 
 
 SWING: dict[str, Feed] = {'feed': swing}

@@ -19,7 +19,7 @@ def test_the_benchmark_finds_strong_slides_and_says_how_well(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize('scene', ['ets_linear', 'jamali', 'kaboli', 'hu'])
-def test_each_kind_of_sensor_tells_start_and_end(scene: str) -> None:
+def test_each_kind_of_sensor_reports_start_and_end(scene: str) -> None:
     table = load_scene(scene)
     surface = next(iter(table.surfaces)) if scene != 'kaboli' else 'rough_ball'
     trials = [try_slide(table, surface, 0.15, 1.0, np.random.default_rng(seed)) for seed in range(3)]

@@ -87,12 +87,12 @@ def test_replugged_under_another_name_it_goes_on_at_the_index_of_the_time(make: 
     rig = make(name)
     rig.sensor.open()
     last, first_name = rig.signal_s(0.3)[-1], rig.link.readlink()
-    rig.do(rig.device.unplug)
+    rig.run_locked(rig.device.unplug)
     assert rig.fault()
     with pytest.raises(DeviceError, match=str(rig.link)):
         rig.sensor.open()
     taken = give_away(first_name)
-    rig.do(rig.device.plug)
+    rig.run_locked(rig.device.plug)
     assert rig.link.readlink() != first_name
     first = rig.signal_s(0.3)[0]
     for end in taken:
@@ -115,14 +115,14 @@ def test_a_second_program_is_refused_and_the_first_is_not_disturbed(make: Make, 
 
 
 @pytest.mark.parametrize('name', CASES)
-def test_a_device_that_opens_and_stays_silent_is_told_by_its_path(make: Make, name: str) -> None:
+def test_a_device_that_opens_and_stays_silent_is_reported_by_its_path(make: Make, name: str) -> None:
     rig = make(name)
-    rig.set(mute=True)
+    rig.set(silent=True)
     rig.sensor.open()
     began_s = time.monotonic()
     assert str(rig.link) in rig.fault()
     assert time.monotonic() - began_s < 10.0
-    rig.set(mute=False)
+    rig.set(silent=False)
     assert rig.signal_s(0.1)
 
 
@@ -184,7 +184,7 @@ def test_a_stall_of_the_line_delays_and_loses_nothing(make: Make, name: str) -> 
 
 
 @pytest.mark.parametrize('name', FAMILIES)
-def test_a_clock_that_drifts_is_followed_and_told(make: Make, name: str) -> None:
+def test_a_clock_that_drifts_is_followed_and_reported(make: Make, name: str) -> None:
     rig = make(name, pace=1.004)
     rig.sensor.open()
     batches = rig.signal_s(4.0)

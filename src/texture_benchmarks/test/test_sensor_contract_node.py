@@ -83,13 +83,13 @@ def test_the_level_falls_with_each_fault_and_rises_again(make: Any) -> None:
     assert 'samples lost' in ear.level(WARN).message
     rig.set(frame_faults=FrameFaults())
     ear.level(OK)
-    rig.do(rig.device.unplug)
+    rig.run_locked(rig.device.unplug)
     assert str(rig.link) in ear.level(ERROR).message
-    rig.do(rig.device.plug)
+    rig.run_locked(rig.device.plug)
     ear.level(OK)
-    rig.set(mute=True)
+    rig.set(silent=True)
     ear.level(ERROR)
-    rig.set(mute=False)
+    rig.set(silent=False)
     values = {value.key: value.value for value in ear.level(OK).values}
     assert int(values['reopened']) >= 1
     assert abs(float(values['device clock slow by [ppm]'])) < 5000

@@ -4,7 +4,7 @@ from texture_benchmarks.catalogue import run_bench
 from texture_benchmarks.result import Bench
 
 
-def test_the_default_is_stable_with_margin_and_borders_lie_where_predicted(tmp_path: Path) -> None:
+def test_the_default_is_stable_with_margin_and_limits_lie_where_predicted(tmp_path: Path) -> None:
     result, written = run_bench('stick_slip', Bench(tmp_path, quick=True))
     numbers = result.numbers
     assert written.is_file()

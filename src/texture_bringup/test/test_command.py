@@ -43,7 +43,7 @@ def prefix() -> Path:
 
 def test_the_command_is_on_the_path_of_a_shell_that_has_sourced_the_workspace() -> None:
     clean = {'HOME': os.environ.get('HOME', '/'), 'PATH': '/usr/bin:/bin'}
-    script = f'source {prefix()}/setup.bash && cd / && texture launch bench --show-args'
+    script = f'source {prefix()}/setup.bash && cd / && texture launch emulator --show-args'
     done = subprocess.run(['bash', '-c', script], check=False, capture_output=True, text=True, env=clean)
     assert 'surface:=glass' in done.stdout, done.stderr
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from texture_bringup.dashboard.feed import BINS, POINTS, Feed
-from texture_bringup.dashboard.history import MOST_EXPLORATIONS, MOST_FRAMES, History
-from texture_bringup.dashboard.lights import MOST_LIGHTS, SILENT_S, Lights
+from texture_bringup.dashboard.history import MAX_EXPLORATIONS, MAX_FRAMES, History
+from texture_bringup.dashboard.lights import MAX_LIGHTS, SILENT_S, Lights
 from texture_bringup.dashboard.motions import DEFAULTS, offered
 from texture_bringup.dashboard.ring import Ring, envelope, spectrum_db
 from texture_bringup.dashboard.taxels import places_of
@@ -118,13 +118,13 @@ def test_a_past_exploration_is_replayed_in_the_frames_that_were_shown() -> None:
 
 def test_the_history_is_bounded_however_many_and_however_long_the_explorations_are() -> None:
     history = History()
-    for number in range(3 * MOST_EXPLORATIONS):
+    for number in range(3 * MAX_EXPLORATIONS):
         history.add(f'e{number}', {}, '{}')
-    for frame in range(5 * MOST_FRAMES):
+    for frame in range(5 * MAX_FRAMES):
         history.add('long', {}, str(frame))
-    assert len(history.listed()) == MOST_EXPLORATIONS
+    assert len(history.listed()) == MAX_EXPLORATIONS
     replay = json.loads(history.replay('long'))
-    assert len(replay['frames']) <= MOST_FRAMES
+    assert len(replay['frames']) <= MAX_FRAMES
     assert set(np.diff(replay['frames'])) == {replay['stride']}
 
 
@@ -136,7 +136,7 @@ def test_a_failing_node_and_a_silent_one_are_red() -> None:
     assert {light['colour'] for light in lights.shown(SILENT_S + 1)} == {'red'}
     for number in range(200):
         lights.update(f'node{number}', 'OK', 'x' * 10_000, 2.0)
-    assert len(lights.shown(2.0)) == MOST_LIGHTS
+    assert len(lights.shown(2.0)) == MAX_LIGHTS
 
 
 @pytest.mark.parametrize('motion', MOTIONS)

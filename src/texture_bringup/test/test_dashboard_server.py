@@ -8,7 +8,7 @@ from aiohttp import ClientSession, WSMsgType, web
 from aiohttp.test_utils import TestClient, TestServer
 
 from texture_bringup.dashboard.access import Access
-from texture_bringup.dashboard.server import MOST_BODY_BYTES, MOST_MESSAGE_BYTES, MOST_VIEWERS, VIEWERS, make_app
+from texture_bringup.dashboard.server import MAX_BODY_BYTES, MAX_MESSAGE_BYTES, MAX_VIEWERS, VIEWERS, make_app
 from texture_bringup.dashboard.serving import Serving
 from texture_core.errors import InvalidParameter, LaunchFailed, MotionRefused
 
@@ -80,7 +80,7 @@ def test_an_unknown_path_is_not_found(path) -> None:
     with_client(story)
 
 
-def test_a_command_is_passed_on_and_a_refusal_is_told() -> None:
+def test_a_command_is_passed_on_and_a_refusal_is_reported() -> None:
     async def story(client, nodes):
         assert (await post(client, body='{"on": true}'))[0] == 200
         assert nodes.asked == [{'on': True}]
@@ -96,7 +96,7 @@ def test_a_command_is_passed_on_and_a_refusal_is_told() -> None:
 @pytest.mark.parametrize(
     ('body', 'headers', 'status'),
     [
-        ('x' * (MOST_BODY_BYTES + 1), {}, 413),
+        ('x' * (MAX_BODY_BYTES + 1), {}, 413),
         ('{', {}, 400),
         ('[]', {}, 400),
         ('{}', {'Content-Type': 'text/plain'}, 415),
@@ -168,7 +168,7 @@ def test_whether_anybody_looks_is_known_so_that_no_frames_are_made_for_nobody() 
 def test_an_oversized_message_closes_its_own_socket_alone() -> None:
     async def story(client, _nodes):
         async with client.ws_connect('/ws') as talker, client.ws_connect('/ws') as listener:
-            await talker.send_str('x' * (MOST_MESSAGE_BYTES + 1))
+            await talker.send_str('x' * (MAX_MESSAGE_BYTES + 1))
             closed = await talker.receive()
             assert (closed.type, closed.data) == (WSMsgType.CLOSE, 1009)
             client.app[VIEWERS].show('{}')
@@ -192,7 +192,7 @@ def test_a_page_that_does_not_read_misses_frames_and_keeps_nobody_waiting() -> N
 
 def test_only_so_many_pages_are_open_at_once() -> None:
     async def story(client, _nodes):
-        sockets = [await client.ws_connect('/ws') for _ in range(MOST_VIEWERS)]
+        sockets = [await client.ws_connect('/ws') for _ in range(MAX_VIEWERS)]
         assert (await client.get('/ws')).status == 503
         for socket in sockets:
             await socket.close()
@@ -243,7 +243,7 @@ def test_beyond_loopback_there_is_no_page_without_a_good_token(token) -> None:
         Access('0.0.0.0', token)
 
 
-def test_a_port_in_use_is_told_and_nothing_is_left_running() -> None:
+def test_a_port_in_use_is_reported_and_nothing_is_left_running() -> None:
     first = Serving(make_app(Nodes(), Access('127.0.0.1'), PAGE), '127.0.0.1', 0)
     try:
         with pytest.raises(LaunchFailed, match='choose another port'):

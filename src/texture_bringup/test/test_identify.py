@@ -1,4 +1,4 @@
-"""The emulated bench is explored with motions that are chosen one by one."""
+"""The emulator is explored with motions that are chosen one by one."""
 
 import math
 import os
@@ -57,7 +57,7 @@ def bench(tmp_path, monkeypatch):
         yield launcher
 
 
-def test_the_slide_that_tells_the_textures_apart_is_made_and_recognises_them(model, bench, capsys) -> None:
+def test_the_slide_that_reports_the_textures_apart_is_made_and_recognises_them(model, bench, capsys) -> None:
     assert main(['identify', model, '--slides', '4', '--sure', '0.99']) == 0
     said = capsys.readouterr().out
     assert 'slide 1: linear_slide, direction 0 rad, 0.1 m/s, 2 N' in said

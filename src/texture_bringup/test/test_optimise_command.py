@@ -16,7 +16,9 @@ def test_the_bar_says_how_far_how_good_and_how_long() -> None:
     assert said == ('cork – felt: [####................] 6/30  best 87.65 %  110 tried, 7 remembered, 640 halves  12 s')
 
 
-def test_a_recipe_is_tuned_from_the_command_line_and_the_search_is_told_line_by_line(tmp_path: Path, capsys) -> None:
+def test_a_recipe_is_tuned_from_the_command_line_and_the_search_is_reported_line_by_line(
+    tmp_path: Path, capsys
+) -> None:
     bags, out = tmp_path / 'bags', tmp_path / 'best.yaml'
     write_simulated(bags, SlidePlan(slides=4, slide_s=0.8), np.random.default_rng(0), surfaces=('glass', 'leather'))
     size = ['--population', '4', '--generations', '2', '--halves', '2', '--jobs', '1']

@@ -4,7 +4,7 @@ from texture_bringup.dashboard.recorder import Recorder
 from texture_core.errors import InvalidParameter
 
 
-def test_what_cannot_be_recorded_is_told_and_nothing_is_left_to_end(tmp_path):
+def test_what_cannot_be_recorded_is_reported_and_nothing_is_left_to_end(tmp_path):
     (tmp_path / 'file').touch()
     recorder = Recorder(tmp_path / 'file', '/')
     with pytest.raises(InvalidParameter, match='nothing can be recorded in'):

@@ -31,7 +31,7 @@ def test_lines_follow_the_angle_between_way_and_ridges() -> None:
     assert lines_hz(grid, 0.14, math.pi / 6) == pytest.approx([50.0, 50.0 * math.sqrt(3)])
 
 
-def test_the_skin_feels_less_than_the_surface_has() -> None:
+def test_the_skin_senses_less_than_the_surface_has() -> None:
     seen = shown('ets_fine', 'scratched_plastic')
     assert seen.felt_m.std() < 0.9 * seen.sharp_m.std()
 

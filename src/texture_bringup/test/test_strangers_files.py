@@ -70,8 +70,8 @@ SEED = int(os.environ.get('FUZZ_SEED', '0'))
 MUTANTS = int(os.environ.get('FUZZ_MUTANTS', '12'))  # of each file, in a process that measures
 TRIES = int(os.environ.get('FUZZ_TRIES', '4'))  # of each kind of damage to each file; more of both to look for more
 DEADLINE_S = 60  # for a single file: a reader that hangs fails
-MOST_MB = 300
-MOST_CPU_S = 5.0  # of computing time: the machine may be busy
+MAX_MB = 300
+MAX_CPU_S = 5.0  # of computing time: the machine may be busy
 STRANGE = (
     None, True, -1, 0, 0.5, 10**9, 10**30, 1e308, -1e308, float('nan'), float('inf'), '', 'x', 'antigravity:fly',
     'numpy:zeros', 'x' * 5000, [], [[]], [None], [1e9] * 3, {}, {'x': 1}, {'': {}},
@@ -282,14 +282,16 @@ READERS = {
     'search space': text_file(
         'texture_estimation', 'config/search/mlp.yaml', lambda path: RecipeSpace.load(path, load_recipe('default'))
     ),
-    'scene': text_file('texture_simulation', 'config/scenes/bench.yaml', load_scene),
+    'scene': text_file('texture_simulation', 'config/scenes/twelve_textures.yaml', load_scene),
     'hand profile': text_file('texture_exploration', 'config/hands/leap.yaml', load_profile),
     'preset': text_file('texture_exploration', 'config/presets/ets-linear.yaml', load_preset),
     'settings': text_file('texture_drivers', 'config/sensors/daq.yaml', load_daq),
     'grades': text_file('texture_simulation', 'config/grades/ets_roughness.csv', read_grades),
     'ratings': Reader(make_ratings, lambda folder: read_ratings(folder / 'good.csv'), ('good.csv',)),
     'plain bag': Reader(make_plain_bag, read_slides, ('bag/bag.mcap',)),
-    'launch file': text_file('texture_bringup', 'launch/bench.launch.xml', lambda path: all_arguments(Path(path), {})),
+    'launch file': text_file(
+        'texture_bringup', 'launch/emulator.launch.xml', lambda path: all_arguments(Path(path), {})
+    ),
     'vendor recording': Reader(make_vendor_csv, lambda folder: load_vendor_csv(folder / 'good.csv'), ('good.csv',)),
     'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
     'checkpoint': Reader(
@@ -551,7 +553,7 @@ def test_what_is_made_to_do_harm_is_refused_and_runs_nothing(
         nonlocal refused
         refused = answer(READERS[name], tmp_path)
 
-    assert peak_mb(read) < MOST_MB
+    assert peak_mb(read) < MAX_MB
     assert refused
     assert not (tmp_path / 'trapped').exists()
 
@@ -650,7 +652,7 @@ def in_a_child(work: Callable[[], Iterator[Measured]]) -> list[Measured]:
 def check(found: list[Measured]) -> None:
     """Fail if reading one of the files was not refused or done in time, within memory, or by a sentence."""
     assert [measured for measured in found if measured.fault] == []
-    assert [measured for measured in found if measured.memory_mb > MOST_MB or measured.cpu_s > MOST_CPU_S] == []
+    assert [measured for measured in found if measured.memory_mb > MAX_MB or measured.cpu_s > MAX_CPU_S] == []
 
 
 def write_file(folder: Path, file: str, good: Path, content: bytes) -> None:

@@ -12,7 +12,7 @@ from texture_simulation.scene_view import SceneView, ViewPlan
 MM, UM = 1e3, 1e6
 SHOWN_S = 0.25
 WIDE = 2.5  # times as wide as high
-LEAST_DENSITY = 1e-6  # of the highest: what lies below is not shown
+MIN_DENSITY = 1e-6  # of the highest: what lies below is not shown
 RELIEF_COLOURS = 'cividis'
 
 
@@ -105,4 +105,4 @@ def _spectrum(axes: Any, view: SceneView) -> None:
     axes.set_xlim(0, view.frequency_hz[-1])
     highest = view.density[1:].max()
     if highest > 0:
-        axes.set_ylim(max(view.density[1:].min() / 2, LEAST_DENSITY * highest), 3 * highest)
+        axes.set_ylim(max(view.density[1:].min() / 2, MIN_DENSITY * highest), 3 * highest)

@@ -43,7 +43,7 @@ def test_a_value_survives_the_wire(value: object) -> None:
 
 
 def test_a_request_is_the_same_for_action_and_service() -> None:
-    request = ExplorationRequest('linear_slide', 0.05, 1.0, surface='felt', stop_when_certain=True)
+    request = ExplorationRequest('linear_slide', 0.05, 1.0, surface='felt', early_stopping=True)
     assert request_from_msg(request_to_msg(request)) == request
     assert request_from_msg(request_to_msg(request, Explore.Request)) == request
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from texture_core.errors import MOST_CHARACTERS, InvalidData
+from texture_core.errors import MAX_CHARACTERS, InvalidData
 
 
 def test_an_error_is_one_line_whatever_others_said() -> None:
@@ -9,4 +9,4 @@ def test_an_error_is_one_line_whatever_others_said() -> None:
 
 def test_a_long_error_is_its_beginning() -> None:
     text = str(InvalidData('came ' + 'x' * 10_000))
-    assert text.startswith('came xxx') and text.endswith('…') and len(text) == MOST_CHARACTERS
+    assert text.startswith('came xxx') and text.endswith('…') and len(text) == MAX_CHARACTERS

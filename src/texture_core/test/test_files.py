@@ -96,7 +96,7 @@ HEADERS = {
 
 
 @pytest.mark.parametrize('what', HEADERS)
-def test_an_array_header_that_promises_or_means_harm_is_refused(what: str) -> None:
+def test_an_array_header_that_guarantees_or_means_harm_is_refused(what: str) -> None:
     header = HEADERS[what].encode() + b'\n'
     with pytest.raises(FileRefused, match=r'^it '):
         read_array(io.BytesIO(b'\x93NUMPY\x01\x00' + len(header).to_bytes(2, 'little') + header), Budget(10**6))

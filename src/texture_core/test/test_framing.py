@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from texture_core.framing import CRC_START, Deframer, Frame, WrappingCounter, pack
+from texture_core.framing import CRC_START, CounterUnwrapper, Frame, FrameDecoder, pack
 
 BODIES = st.lists(st.binary(max_size=40), min_size=2, max_size=8)
 
@@ -34,19 +34,19 @@ def test_a_frame_worked_by_hand_is_read_and_written():
     # distance to the next zero before each run without one.
     assert bitwise_crc(bytes.fromhex('42 01 0700 E8030000 01 02 001100')) == 0x03B4
     by_hand = bytes.fromhex('04 420107  03 E803  01  03 0102  02 11  03 B403  00')
-    assert Deframer().feed(by_hand) == [frame]
+    assert FrameDecoder().feed(by_hand) == [frame]
     assert pack(frame) == by_hand
 
 
 def test_frames_come_out_the_same_however_the_stream_is_cut():
     frames = [numbered(i, bytes([i, 0, 255 - i])) for i in range(20)]
-    deframer = Deframer()
+    deframer = FrameDecoder()
     stream = b''.join(map(pack, frames))
     assert [frame for byte in stream for frame in deframer.feed(bytes([byte]))] == frames
 
 
 def test_missing_numbers_are_counted_for_each_kind_over_the_wrap():
-    deframer = Deframer()
+    deframer = FrameDecoder()
     sent = [(1, 65534), (2, 9), (1, 1), (2, 10), (1, 2)]  # of kind 1 are missing 65535 and 0
     frames = deframer.feed(b''.join(pack(numbered(sequence, kind=kind)) for kind, sequence in sent))
     assert [frame.lost for frame in frames] == [0, 0, 2, 0, 0]
@@ -54,13 +54,13 @@ def test_missing_numbers_are_counted_for_each_kind_over_the_wrap():
 
 
 def test_a_frame_that_comes_twice_is_given_once():
-    deframer = Deframer()
+    deframer = FrameDecoder()
     assert len(deframer.feed(pack(numbered(5)) * 2 + pack(numbered(6)))) == 2
     assert (deframer.repeated, deframer.lost, deframer.bad_frames) == (1, 0, 0)
 
 
-def test_numbers_that_go_back_are_a_device_that_began_anew_and_no_loss():
-    deframer = Deframer()
+def test_numbers_that_go_back_are_a_device_that_began_again_and_no_loss():
+    deframer = FrameDecoder()
     deframer.feed(b''.join(pack(numbered(i)) for i in (300, 301, 0, 1)))
     assert (deframer.renumbered, deframer.lost, deframer.frames) == (1, 0, 4)
 
@@ -70,20 +70,20 @@ def test_every_flipped_bit_is_noticed():
     for position in range(8 * (len(good) - 1)):
         damaged = bytearray(good)
         damaged[position // 8] ^= 1 << position % 8
-        deframer = Deframer()
+        deframer = FrameDecoder()
         deframer.feed(b'\x00')
         assert deframer.feed(bytes(damaged)) == []
         assert deframer.bad_frames >= 1
 
 
 def test_joining_in_the_middle_of_a_frame_is_no_fault():
-    deframer = Deframer()
+    deframer = FrameDecoder()
     assert len(deframer.feed(pack(numbered(1, b'half'))[3:] + pack(numbered(2, b'whole')))) == 1
     assert (deframer.bad_frames, deframer.lost) == (0, 0)
 
 
 def test_after_a_restart_numbers_may_begin_anywhere():
-    deframer = Deframer()
+    deframer = FrameDecoder()
     deframer.feed(pack(numbered(500)) + b'\x07unfinished')
     deframer.restart()
     assert len(deframer.feed(pack(numbered(0)))) == 1
@@ -91,39 +91,39 @@ def test_after_a_restart_numbers_may_begin_anywhere():
 
 
 def test_a_line_without_zeros_needs_no_more_memory_than_one_frame():
-    deframer = Deframer(max_frame_bytes=100)
+    deframer = FrameDecoder(max_frame_bytes=100)
     for _ in range(1000):
         deframer.feed(b'\xff' * 50)
-        assert len(deframer._rest) <= 101
+        assert len(deframer._unfinished) <= 101
     assert deframer.feed(b'\x00' + pack(numbered(1, b'again')))[0].body == b'again'
 
 
 @pytest.mark.parametrize('size', [0, 1, 240, 241, 242, 243, 2000])
 def test_long_bodies_survive(size):
     body = bytes(i % 251 + 1 for i in range(size))
-    assert Deframer().feed(pack(numbered(3, body)))[0].body == body
+    assert FrameDecoder().feed(pack(numbered(3, body)))[0].body == body
 
 
 @settings(deadline=None)  # a busy machine is slow
 @given(st.lists(st.binary(max_size=300), max_size=20))
-def test_arbitrary_bytes_never_raise(pieces):
-    deframer = Deframer(max_frame_bytes=200)
-    for piece in pieces:
-        deframer.feed(piece)
-        assert len(deframer._rest) <= 201
+def test_arbitrary_bytes_never_raise(segments):
+    deframer = FrameDecoder(max_frame_bytes=200)
+    for segment in segments:
+        deframer.feed(segment)
+        assert len(deframer._unfinished) <= 201
 
 
 @settings(deadline=None)
 @given(noise=st.binary(max_size=200), bodies=BODIES)
 def test_after_any_noise_at_most_one_frame_is_lost(noise, bodies):
-    frames = Deframer().feed(noise + b''.join(pack(numbered(i, body)) for i, body in enumerate(bodies)))
+    frames = FrameDecoder().feed(noise + b''.join(pack(numbered(i, body)) for i, body in enumerate(bodies)))
     assert [frame.body for frame in frames][-(len(bodies) - 1) :] == bodies[1:]
 
 
 @settings(deadline=None)
 @given(bodies=BODIES, dropped=st.integers(0, 10_000))
 def test_a_dropped_byte_costs_at_most_two_frames_and_the_loss_is_counted(bodies, dropped):
-    deframer = Deframer()
+    deframer = FrameDecoder()
     deframer.feed(pack(numbered(0)))
     stream = b''.join(pack(numbered(i + 1, body)) for i, body in enumerate(bodies))
     position = dropped % len(stream)
@@ -135,7 +135,7 @@ def test_a_dropped_byte_costs_at_most_two_frames_and_the_loss_is_counted(bodies,
 @settings(deadline=None)
 @given(st.lists(st.integers(-(2**15), 2**15 - 1), max_size=50))
 def test_a_wrapping_counter_is_followed_forwards_and_back(steps):
-    counter, truth = WrappingCounter(16), 2**20
+    counter, truth = CounterUnwrapper(16), 2**20
     counter.advance(truth % 2**16)
     offset = truth - (counter.value or 0)
     for step in steps:
@@ -145,5 +145,5 @@ def test_a_wrapping_counter_is_followed_forwards_and_back(steps):
 
 
 def test_microseconds_in_32_bits_run_on_over_their_wrap():
-    counter = WrappingCounter(32)
+    counter = CounterUnwrapper(32)
     assert [counter.advance(reading) for reading in (2**32 - 5, 5, 15)] == [2**32 - 5, 2**32 + 5, 2**32 + 15]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_core.plain_data import MOST_CHARACTERS, load_card, load_yaml, parse_json, parse_yaml, shown
+from texture_core.plain_data import MAX_CHARACTERS, load_card, load_yaml, parse_json, parse_yaml, safe_repr
 
 LAUGHS = 'a: &a [x, x, x, x, x, x, x, x, x]\n' + ''.join(
     f'{b}: &{b} [{", ".join([f"*{a}"] * 9)}]\n' for a, b in zip('abcdefghi', 'bcdefghij', strict=True)
@@ -20,7 +20,7 @@ BAD = {
     'a mapping within itself': 'a: &a {b: *a}',
     'deep nesting': '[' * 100_000,
     'deep and closed': '[' * 5000 + ']' * 5000,
-    'too much': 'x' * (MOST_CHARACTERS + 1),
+    'too much': 'x' * (MAX_CHARACTERS + 1),
     'a Python object': '!!python/object/apply:os.system [exit 1]',
     'a Python name': 'a: !!python/name:os.system',
     'no date': 'a: 2024-99-99',
@@ -72,6 +72,6 @@ def test_what_is_nested_too_deeply_to_be_shown_is_called_so() -> None:
     deep: list = []
     for _ in range(100_000):
         deep = [deep]
-    assert shown(deep) == 'something nested too deeply'
+    assert safe_repr(deep) == 'something nested too deeply'
     while deep:  # taken apart step by step: Python itself takes such a thing apart by recursion
         deep = deep.pop()

@@ -26,11 +26,11 @@ def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
     if ':' in name:
         return cast(T, _import(name, kind))
     if name not in catalogue:
-        raise unknown(name, catalogue, kind)
+        raise unknown_name(name, catalogue, kind)
     return catalogue[name]
 
 
-def unknown(name: str, known: Iterable[str], kind: str) -> UnknownName:
+def unknown_name(name: str, known: Iterable[str], kind: str) -> UnknownName:
     """Return the error for a name that is not among the known ones, with the nearest of them."""
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-MOST_CHARACTERS = 1000
+MAX_CHARACTERS = 1000
 
 
 class TextureError(Exception):
@@ -10,7 +10,7 @@ class TextureError(Exception):
 
     def __init__(self, sentence: str = '') -> None:
         line = ' '.join(sentence.split())  # what came, and what others said about it, may be many lines or long ones
-        super().__init__(line if len(line) <= MOST_CHARACTERS else f'{line[: MOST_CHARACTERS - 1]}…')
+        super().__init__(line if len(line) <= MAX_CHARACTERS else f'{line[: MAX_CHARACTERS - 1]}…')
 
 
 class UnknownName(TextureError):

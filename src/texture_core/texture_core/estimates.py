@@ -1,4 +1,4 @@
-"""What the suite concludes from touching a surface."""
+"""Estimates of texture and roughness."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class TextureEstimate:
-    """What surface is being felt; label '' and no probabilities while there is no evidence.
+    """Which surface is being touched; label '' and no probabilities while there is no evidence.
 
     A label of '' with probabilities: the evidence speaks for several surfaces alike, it is unclassified.
     """
@@ -20,8 +20,8 @@ class TextureEstimate:
     confidence: float = math.nan
     labels: tuple[str, ...] = ()
     probabilities: tuple[float, ...] = ()
-    certain: bool = False
-    candidates: tuple[str, ...] = ()
+    decided: bool = False
+    prediction_set: tuple[str, ...] = ()
     windows: int = 0
     evidence_s: float = 0.0
     final: bool = False
@@ -32,7 +32,7 @@ class TextureEstimate:
 
 @dataclass(frozen=True)
 class RoughnessEstimate:
-    """How rough the surface feels, 1 (smooth) to 5 (rough); not valid while there is no grade."""
+    """How rough the surface is, 1 (smooth) to 5 (rough); not valid while there is no grade."""
 
     stamp_ns: int
     exploration_id: str

@@ -29,8 +29,8 @@ ENDED = frozenset({Phase.IDLE, Phase.DONE, Phase.ABORTED})
 class ExplorationState:
     """What the finger is doing from `stamp_ns` on; unknown numbers are NaN, unknown names ''.
 
-    `steady_s` is a promise: phase, speed and force hold at least so long after the stamp. It lets a window be used
-    the moment its last sample arrives, without waiting for the next state.
+    `steady_s` guarantees that phase, speed and force hold at least that long after the stamp. A window can be used as
+    soon as its last sample arrives, without waiting for the next state.
     """
 
     stamp_ns: int
@@ -64,7 +64,7 @@ class ExplorationRequest:
     duration_s: float = 0.0
     direction_rad: float = 0.0
     surface: str = ''
-    stop_when_certain: bool = False
+    early_stopping: bool = False
     timeout_s: float = 0.0
 
     def __post_init__(self) -> None:

@@ -25,7 +25,7 @@ MB = 1_000_000
 # What compressed content may unpack to: 16 MB, and ten times the size of the file. Models and data sets reach 4 times.
 UNPACKED_BYTES = 16 * MB
 UNPACKED_TIMES = 10
-MOST_MEMBERS = 20_000
+MAX_MEMBERS = 20_000
 BLOCK_BYTES = 1 << 18
 KINDS: Mapping[str, Callable[[int], bool]] = {
     'a folder': stat.S_ISDIR,
@@ -37,7 +37,7 @@ HEADERS: Mapping[tuple[int, int], Callable[..., tuple[tuple[int, ...], bool, np.
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
 }
-MOST_HEADER_CHARACTERS = 10_000
+MAX_HEADER_CHARACTERS = 10_000
 LAST_CHARACTER = 0x10FFFF  # of Unicode; NumPy keeps 32 bits for each and compares none
 # What NumPy raises at a header that is no literal, is cut off or is nested without end.
 BROKEN_HEADER = (
@@ -189,8 +189,8 @@ class Archive:
         except (*BROKEN_ARCHIVE, ValueError) as error:
             raise FileRefused(f'it is no archive that can be read: {error}') from error
         members = self._zip.infolist()
-        if len(members) > MOST_MEMBERS:
-            raise FileRefused(f'it has {len(members)} members; {MOST_MEMBERS} are allowed')
+        if len(members) > MAX_MEMBERS:
+            raise FileRefused(f'it has {len(members)} members; {MAX_MEMBERS} are allowed')
         self.names = tuple(dict.fromkeys(member.filename for member in members))
 
     def __enter__(self) -> Archive:
@@ -280,7 +280,7 @@ def _array_header(file: Readable) -> tuple[tuple[int, ...], bool, np.dtype[Any]]
         version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
         if version not in HEADERS:
             raise FileRefused(f'it is an array of format {version}; {", ".join(map(str, HEADERS))} are known')
-        shape, fortran, dtype = HEADERS[version](file, max_header_size=MOST_HEADER_CHARACTERS)
+        shape, fortran, dtype = HEADERS[version](file, max_header_size=MAX_HEADER_CHARACTERS)
     except FileRefused:
         raise
     except BROKEN_HEADER as error:

@@ -40,8 +40,8 @@ class Frame(NamedTuple):
     lost: int = 0  # frames of this kind missing just before it
 
 
-class Deframer:
-    """Turn a byte stream into frames, whatever is lost or added on the way.
+class FrameDecoder:
+    """Decode frames from a byte stream with lost, added or damaged bytes.
 
     Parameters
     ----------
@@ -54,36 +54,36 @@ class Deframer:
         self.bad_frames = 0  # too short or long, wrongly stuffed, or of a wrong checksum
         self.lost = 0  # frames whose number never came
         self.repeated = 0  # came twice; the second is left out
-        self.renumbered = 0  # numbers went back: the device began anew
+        self.renumbered = 0  # numbers went back: the device restarted
         self._max_bytes = max_frame_bytes
         self.restart()
 
     def restart(self) -> None:
-        """Forget what is unfinished and the numbers expected: the line was opened anew. The totals go on."""
-        self._rest = b''
-        self._in_step = False
+        """Drop the unfinished frame and the expected numbers: the line was opened again. The totals are kept."""
+        self._unfinished = b''
+        self._synchronised = False
         self._last: dict[int, int] = {}
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return the frames completed by `data`; never raises."""
-        *pieces, rest = (self._rest + data).split(DELIMITER)
+        *segments, unfinished = (self._unfinished + data).split(DELIMITER)
         # One byte more than allowed is enough to refuse the frame when its end comes.
-        self._rest = rest[: self._max_bytes + 1]
-        frames = [frame for piece in pieces if (frame := self._take(piece)) is not None]
+        self._unfinished = unfinished[: self._max_bytes + 1]
+        frames = [frame for segment in segments if (frame := self._decode(segment)) is not None]
         self.frames += len(frames)
         return frames
 
-    def _take(self, piece: bytes) -> Frame | None:
+    def _decode(self, segment: bytes) -> Frame | None:
         """Return the frame in what stood between two zero bytes, unless it is damaged or came before."""
-        in_step, self._in_step = self._in_step, True
-        frame = unpack(piece) if len(piece) <= self._max_bytes else None
+        synchronised, self._synchronised = self._synchronised, True
+        frame = unpack(segment) if len(segment) <= self._max_bytes else None
         if frame is not None:
-            return self._number(frame)
+            return self._check_sequence(frame)
         # A line is joined in the middle of a frame, and a sender may add zeros at any time: both are no fault.
-        self.bad_frames += bool(piece) and in_step
+        self.bad_frames += bool(segment) and synchronised
         return None
 
-    def _number(self, frame: Frame) -> Frame | None:
+    def _check_sequence(self, frame: Frame) -> Frame | None:
         range_ = 1 << SEQUENCE_BITS
         step = (frame.sequence - self._last.get(frame.kind, frame.sequence - 1)) % range_
         self._last[frame.kind] = frame.sequence
@@ -97,10 +97,10 @@ class Deframer:
         return frame._replace(lost=step - 1) if step > 1 else frame
 
 
-def unpack(piece: bytes) -> Frame | None:
+def unpack(segment: bytes) -> Frame | None:
     """Return the frame in what stood between two zero bytes, or None if it is damaged."""
     try:
-        raw = cobs.decode(piece)
+        raw = cobs.decode(segment)
     except cobs.DecodeError:
         return None
     if len(raw) < HEADER.size + CRC.size:
@@ -120,8 +120,8 @@ def pack(frame: Frame) -> bytes:
     return bytes(cobs.encode(checked + CRC.pack(crc_hqx(checked, CRC_START)))) + DELIMITER
 
 
-class WrappingCounter:
-    """Follow a counter of few bits beyond its wrapping.
+class CounterUnwrapper:
+    """Unwrap a counter of few bits.
 
     Parameters
     ----------

@@ -11,9 +11,9 @@ import typing
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidParameter, UnknownName
-from texture_core.plain_data import shown
+from texture_core.plain_data import safe_repr
 
 T = TypeVar('T')
 NOUNS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text'}
@@ -75,14 +75,14 @@ class Parameter:
         if self.type is float and isinstance(value, int) and not isinstance(value, bool):
             value = float(value)
         if not isinstance(value, self.type) or (self.type is not bool and isinstance(value, bool)):
-            raise InvalidParameter(f"parameter '{self.name}' is {shown(value)}; {NOUNS[self.type]} is needed")
+            raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(value)}; {NOUNS[self.type]} is needed")
         self._check_range(value)
         return value
 
     def _check_list(self, values: Any) -> list[Any]:
         [kind] = typing.get_args(self.type)
         if isinstance(values, (str, Mapping)) or not isinstance(values, Iterable):
-            raise InvalidParameter(f"parameter '{self.name}' is {shown(values)}; a list is needed")
+            raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(values)}; a list is needed")
         each = dataclasses.replace(self, type=kind)
         return [each.check(value) for value in values]
 
@@ -92,7 +92,7 @@ class Parameter:
         unlisted = bool(self.choices) and value not in self.choices
         if below or above or unlisted or (isinstance(value, float) and math.isnan(value)):
             allowed = self.range_text or 'a number that is not NaN'
-            raise InvalidParameter(f"parameter '{self.name}' is {shown(value)}; allowed is {allowed}")
+            raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(value)}; allowed is {allowed}")
 
 
 def parameters_of(cls: type) -> list[Parameter]:
@@ -119,11 +119,11 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
     known = {parameter.name: parameter for parameter in parameters_of(cls)}
     place = f'{where}: ' if where else ''
     if not isinstance(values, Mapping):
-        raise InvalidParameter(f'{place}came {shown(values)}; a mapping of parameter names to values is needed')
+        raise InvalidParameter(f'{place}came {safe_repr(values)}; a mapping of parameter names to values is needed')
     checked = {}
     for name, value in values.items():
         if name not in known:
-            raise InvalidParameter(f'{place}{unknown(str(name), known, "parameter")}')
+            raise InvalidParameter(f'{place}{unknown_name(str(name), known, "parameter")}')
         try:
             checked[name] = known[name].check(value)
         except (InvalidParameter, UnknownName) as error:

@@ -15,14 +15,14 @@ from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidParameter
 from texture_core.files import MB, FileRefused, read_text
 
-MOST_CHARACTERS = 200_000  # of YAML; the longest settings in use have a tenth
-MOST_VALUES = 200_000  # with every alias written out
-MOST_DEPTH = 50  # of lists and mappings within each other, in YAML and JSON
-MOST_CARD_BYTES = 5 * MB
-MOST_JSON_VALUES = 5_000_000
+MAX_CHARACTERS = 200_000  # of YAML; the longest settings in use have a tenth
+MAX_VALUES = 200_000  # with every alias written out
+MAX_DEPTH = 50  # of lists and mappings within each other, in YAML and JSON
+MAX_CARD_BYTES = 5 * MB
+MAX_JSON_VALUES = 5_000_000
 JSON_STRING = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
 # What the parsers raise, depending on what is wrong; a value such as 2024-99-99 or !!bool x is no YAMLError.
-BROKEN = (
+PARSE_ERRORS = (
     yaml.YAMLError, OSError, ValueError, LookupError, AttributeError, TypeError, OverflowError, RecursionError,
 )  # fmt: skip
 
@@ -36,8 +36,8 @@ def load_yaml(path: Path, what: str) -> Any:
         If it cannot be read, is no YAML, or holds more than a file of settings does.
     """
     try:
-        return parse_yaml(read_text(path, 4 * MOST_CHARACTERS))
-    except BROKEN as error:
+        return parse_yaml(read_text(path, 4 * MAX_CHARACTERS))
+    except PARSE_ERRORS as error:
         raise InvalidParameter(f"{what} '{path}' is no YAML that can be read: {error}") from error
 
 
@@ -50,22 +50,22 @@ def load_card(path: Path) -> Any:
         If it cannot be read as such.
     """
     try:
-        return load_json(path, MOST_CARD_BYTES).get('recipe')
-    except BROKEN as error:
+        return load_json(path, MAX_CARD_BYTES).get('recipe')
+    except PARSE_ERRORS as error:
         raise InvalidParameter(f"model card '{path}' cannot be read: {error}") from error
 
 
 def parse_yaml(text: str) -> Any:
-    """Return the plain values in a text; one of `BROKEN` is raised if it is no YAML, or too much of it."""
-    if len(text) > MOST_CHARACTERS:
-        raise ValueError(f'it has {len(text)} characters; {MOST_CHARACTERS} are allowed')
+    """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it."""
+    if len(text) > MAX_CHARACTERS:
+        raise ValueError(f'it has {len(text)} characters; {MAX_CHARACTERS} are allowed')
     loader = _BoundedLoader(text)
     try:
         node = loader.get_single_node()
         if node is None:
             return None
-        if _weight(node, {}) > MOST_VALUES:
-            raise ValueError(f'its aliases stand for more than {MOST_VALUES} values; write less')
+        if _count_values(node, {}) > MAX_VALUES:
+            raise ValueError(f'its aliases stand for more than {MAX_VALUES} values; write less')
         return loader.construct_document(node)
     finally:
         loader.dispose()
@@ -86,18 +86,18 @@ def parse_json(text: str) -> Any:
     """Return the plain values in a text; ValueError if it is no JSON, or one with too many or too deep values."""
     marks = np.frombuffer(JSON_STRING.sub('', text).encode('utf-8', 'replace'), np.uint8)
     depth = int(_among(marks, b'[{').sum(initial=0)) and int(np.cumsum(_steps(marks)).max(initial=0))
-    if depth > MOST_DEPTH:
-        raise FileRefused(f'it is nested {depth} deep; {MOST_DEPTH} is allowed')
+    if depth > MAX_DEPTH:
+        raise FileRefused(f'it is nested {depth} deep; {MAX_DEPTH} is allowed')
     n_values = int(_among(marks, b'[{,:').sum())
-    if n_values > MOST_JSON_VALUES:
-        raise FileRefused(f'it has {n_values} values; {MOST_JSON_VALUES} are allowed')
+    if n_values > MAX_JSON_VALUES:
+        raise FileRefused(f'it has {n_values} values; {MAX_JSON_VALUES} are allowed')
     try:
         return json.loads(text)
     except RecursionError as error:
         raise ValueError('it is nested too deeply') from error
 
 
-def shown(value: Any) -> str:
+def safe_repr(value: Any) -> str:
     """Return a value as a sentence shows it, however it is nested."""
     try:
         return repr(value)
@@ -114,8 +114,8 @@ class _BoundedLoader(yaml.SafeLoader):
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         self._depth += 1
-        if self._depth > MOST_DEPTH:
-            raise FileRefused(f'it is nested more than {MOST_DEPTH} deep')
+        if self._depth > MAX_DEPTH:
+            raise FileRefused(f'it is nested more than {MAX_DEPTH} deep')
         node = super().compose_node(parent, index)
         self._depth -= 1
         return node
@@ -130,11 +130,11 @@ def _steps(marks: AnyArray) -> AnyArray:
     return _among(marks, b'[{').astype(np.int32) - _among(marks, b']}')
 
 
-def _weight(node: yaml.Node, known: dict[int, float]) -> float:
+def _count_values(node: yaml.Node, known: dict[int, float]) -> float:
     """Return how many values a node stands for, each alias counted; infinite if it contains itself."""
     if id(node) not in known:
         known[id(node)] = math.inf
         parts = node.value if isinstance(node, yaml.CollectionNode) else ()
         children = [child for part in parts for child in (part if isinstance(part, tuple) else (part,))]
-        known[id(node)] = 1 + sum(_weight(child, known) for child in children)
+        known[id(node)] = 1 + sum(_count_values(child, known) for child in children)
     return known[id(node)]

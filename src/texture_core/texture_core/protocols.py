@@ -14,7 +14,7 @@ class Sensor(Protocol):
     `read` blocks for about one batch and returns what arrived, keyed by topic ('signal', 'signal_static');
     it may return nothing. A device that is gone raises DeviceError from `open` or `read`; the caller closes and
     opens again. `counts` are running totals of this sensor object, kept over reopening. A sensor may also have
-    `details`: what it tells of itself, such as its 'serial number', by name, for the diagnostics.
+    `details`: what it reports about itself, such as its 'serial number', by name, for the diagnostics.
     """
 
     def open(self) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 
 SOURCE_TREE = Path(__file__).resolve().parents[2]
 
@@ -33,5 +33,5 @@ def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix
         return path
     shipped = {item.stem: item for item in folder(package, subfolder).glob(f'*{suffix}')}
     if name_or_path not in shipped:
-        raise unknown(name_or_path, shipped, kind)
+        raise unknown_name(name_or_path, shipped, kind)
     return shipped[name_or_path]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from texture_core.errors import InvalidData
 
 NANOSECONDS = 1_000_000_000
-MOST_HZ = 1e6  # seconds of samples are kept: a rate from nowhere would take all memory
+MAX_HZ = 1e6  # seconds of samples are kept: a rate from nowhere would take all memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +55,10 @@ class TactileSignal:
                 f"signal of '{self.sensor}' has samples of shape {self.samples.shape}; "
                 f'(n_samples, {len(self.channels)}) is needed for its channels {list(self.channels)}'
             )
-        if not 0 < self.sampling_rate_hz <= MOST_HZ:
+        if not 0 < self.sampling_rate_hz <= MAX_HZ:
             raise InvalidData(
                 f"signal of '{self.sensor}' has a sampling rate of {self.sampling_rate_hz} Hz; "
-                f'give one above 0, at most {MOST_HZ:g}'
+                f'give one above 0, at most {MAX_HZ:g}'
             )
         if self.first_sample < 0:
             raise InvalidData(f"signal of '{self.sensor}' starts at sample {self.first_sample}; 0 is the first")

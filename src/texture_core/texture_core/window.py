@@ -1,4 +1,4 @@
-"""A piece of sliding, ready to be described."""
+"""One window of a signal, from which features are computed."""
 
 from __future__ import annotations
 

@@ -66,11 +66,11 @@ def test_messages_of_another_driver_become_signals_and_faults_are_reported(graph
     assert {value.key: value.value for value in status.values}['refused messages'] == '1'
 
 
-def test_a_message_package_that_is_missing_is_told_in_one_sentence(graph: LocalGraph) -> None:
+def test_a_message_package_that_is_missing_is_reported_in_one_sentence(graph: LocalGraph) -> None:
     with pytest.raises(InvalidParameter, match=r'cannot be imported .*build the package'):
         graph.add(BiotacAdaptor, message_type='no_such_msgs/msg/BioTacHand')
 
 
-def test_a_message_of_unknown_layout_is_told_with_the_known_ones(graph: LocalGraph) -> None:
+def test_a_message_of_unknown_layout_is_reported_with_the_known_ones(graph: LocalGraph) -> None:
     with pytest.raises(UnknownName, match='BioTacHand, BiotacAll'):
         graph.add(BiotacAdaptor, message_type='biotac_sensors/msg/BioTacFoot')

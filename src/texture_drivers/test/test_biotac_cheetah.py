@@ -164,7 +164,7 @@ def test_without_the_vendors_module_the_sentence_says_what_to_do(monkeypatch: py
         Cheetah(BIOTAC).open()
 
 
-def test_an_adapter_in_use_or_failing_is_told(api: StandIn) -> None:
+def test_an_adapter_in_use_or_failing_is_reported(api: StandIn) -> None:
     link = Cheetah(BIOTAC)
     link.open()
     api.status = -8

@@ -8,7 +8,7 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_core.signal import NANOSECONDS, TactileSignal, lost_samples
-from texture_drivers.biotac.messages import MESSAGES, MessageStream
+from texture_drivers.biotac.messages import MESSAGES, BioTacMessageConverter
 
 START_NS = 1_700_000_000_000_000_000
 HAND, ALL = MESSAGES['BioTacHand'], MESSAGES['BiotacAll']
@@ -46,7 +46,7 @@ def biotac_all(stamp_ns: int, n_pac: int) -> SimpleNamespace:
     return SimpleNamespace(header=header(stamp_ns), tactiles=[finger] * 5)
 
 
-def run(stream: MessageStream, messages: list[Any]) -> dict[str, list[TactileSignal]]:
+def run(stream: BioTacMessageConverter, messages: list[Any]) -> dict[str, list[TactileSignal]]:
     topics: dict[str, list[TactileSignal]] = {'signal': [], 'signal_static': []}
     for message in messages:
         for topic, batch in stream.update(message).items():
@@ -55,7 +55,7 @@ def run(stream: MessageStream, messages: list[Any]) -> dict[str, list[TactileSig
 
 
 def test_biotac_hand_gives_pac_with_the_times_of_its_slots() -> None:
-    stream = MessageStream(HAND, finger=2, frame_id='tip')
+    stream = BioTacMessageConverter(HAND, finger=2, frame_id='tip')
     topics = run(stream, [hand(START_NS + n * 10_000_000) for n in range(50)])
     pac, slow = topics['signal'][-1], topics['signal_static'][-1]
     frame_start_ns = START_NS + 48 * 10_000_000  # the stamp of a message is the end of its frame
@@ -72,14 +72,14 @@ def test_biotac_hand_gives_pac_with_the_times_of_its_slots() -> None:
 def test_jitter_of_the_host_makes_no_losses_and_hardly_moves_the_times() -> None:
     rng = np.random.default_rng(0)
     late_ns = rng.integers(0, 4_000_000, 300)
-    topics = run(MessageStream(HAND), [hand(START_NS + n * 10_000_000 + int(late_ns[n])) for n in range(300)])
+    topics = run(BioTacMessageConverter(HAND), [hand(START_NS + n * 10_000_000 + int(late_ns[n])) for n in range(300)])
     assert lost_samples(topics['signal']) == 0
     stamps = np.array([batch.stamp_ns for batch in topics['signal']][100:])
     assert np.ptp(stamps - 10_000_000 * np.arange(len(stamps))) < 1_000_000
 
 
 def test_a_gap_in_the_stamps_is_a_loss() -> None:
-    stream = MessageStream(HAND)
+    stream = BioTacMessageConverter(HAND)
     topics = run(stream, [hand(START_NS + n * 10_000_000) for n in range(60) if not 30 <= n < 34])
     assert lost_samples(topics['signal']) == stream.lost == 4 * 22
     assert lost_samples(topics['signal_static']) == 4
@@ -90,7 +90,7 @@ def test_biotac_all_may_hold_any_number_of_pac_samples(period_ns: int) -> None:
     # Two samples a millisecond, published at 111 or 100 Hz.
     stamps = [START_NS + n * period_ns for n in range(100)]
     counts = [period_ns // 500_000 + (1, -1, 0)[n % 3] for n in range(100)]
-    topics = run(MessageStream(ALL), [biotac_all(*item) for item in zip(stamps, counts, strict=True)])
+    topics = run(BioTacMessageConverter(ALL), [biotac_all(*item) for item in zip(stamps, counts, strict=True)])
     pac = topics['signal']
     assert [len(batch.samples) for batch in pac] == counts[-len(pac) :]
     assert lost_samples(pac) == 0
@@ -110,4 +110,4 @@ def test_biotac_all_may_hold_any_number_of_pac_samples(period_ns: int) -> None:
 )
 def test_a_message_that_does_not_fit_is_refused_in_one_sentence(message: Any, finger: int, sentence: str) -> None:
     with pytest.raises(InvalidData, match=sentence):
-        MessageStream(HAND, finger).update(message)
+        BioTacMessageConverter(HAND, finger).update(message)

@@ -8,10 +8,10 @@ import pytest
 from texture_core.errors import DeviceError
 from texture_core.framing import Frame
 from texture_core.signal import TactileSignal, lost_samples
-from texture_drivers.biotac.bridge import REPLY, Run
+from texture_drivers.biotac.bridge import REPLY, FrameTracker
 from texture_drivers.biotac.link import SpiFrame
 from texture_drivers.biotac.sensor import BioTac
-from texture_drivers.biotac.tables import LAYOUTS, Layout
+from texture_drivers.biotac.tables import LAYOUTS, BioTacLayout
 from texture_drivers.params import SensorParams
 
 BIOTAC = LAYOUTS['biotac']
@@ -28,7 +28,7 @@ def word(value: int | None) -> bytes:
     return bytes(2) if value is ABSENT else bytes([odd(value >> 5 << 1), odd((value & 31) << 3)])
 
 
-def reply(layout: Layout = BIOTAC, *, fingers: Sequence[int | None] = (0,), step: int = 0) -> bytes:
+def reply(layout: BioTacLayout = BIOTAC, *, fingers: Sequence[int | None] = (0,), step: int = 0) -> bytes:
     """Each slot holds its number times `step`, plus a number that tells the finger."""
     values = [
         [ABSENT if base is ABSENT else base + step * slot for base in fingers] for slot in range(len(layout.slots))
@@ -136,18 +136,18 @@ def test_a_finger_is_chosen_by_its_place() -> None:
     assert (topics['signal'][-1].samples == 9).all()
 
 
-def test_a_place_without_a_biotac_is_told_and_sends_nothing() -> None:
+def test_a_place_without_a_biotac_is_reported_and_sends_nothing() -> None:
     sensor = opened(FakeLink(numbered(range(200), reply(fingers=(7, ABSENT)), fingers=2)), finger=1)
     with pytest.raises(DeviceError, match='no BioTac answers as finger 1'):
         assert not any(run(sensor, 200).values())
 
 
-def test_a_place_that_the_board_lacks_is_told() -> None:
+def test_a_place_that_the_board_lacks_is_reported() -> None:
     with pytest.raises(DeviceError, match='places 0 to 0'):
         run(opened(FakeLink(numbered(range(2), reply())), finger=1), 1)
 
 
-def test_a_silent_board_is_told() -> None:
+def test_a_silent_board_is_reported() -> None:
     with pytest.raises(DeviceError, match='sends no whole frames'):
         run(opened(FakeLink([])), 200)
 
@@ -171,7 +171,7 @@ def bridge_frame(sequence: int, time_us: int) -> Frame:
 
 
 def test_numbers_and_time_go_on_over_their_wrapping() -> None:
-    run_ = Run(BIOTAC)
+    run_ = FrameTracker(BIOTAC)
     first_us = 2**32 - 15_000
     frames = [run_.place(bridge_frame(65_534 + n, first_us + 10_000 * n)) for n in range(4)]
     assert [frame.number for frame in frames] == [65_534, 65_535, 65_536, 65_537]
@@ -179,8 +179,8 @@ def test_numbers_and_time_go_on_over_their_wrapping() -> None:
     assert run_.restarts == 0
 
 
-def test_a_device_that_begins_anew_or_pauses_begins_another_epoch() -> None:
-    run_ = Run(BIOTAC)
+def test_a_device_that_begins_again_or_pauses_begins_another_epoch() -> None:
+    run_ = FrameTracker(BIOTAC)
     epochs = [
         run_.place(bridge_frame(number, time_us)).epoch
         for number, time_us in [(100, 10**6), (101, 1_010_000), (0, 0), (1, 10_000), (5, 50_000), (6, 300_000)]
@@ -189,12 +189,12 @@ def test_a_device_that_begins_anew_or_pauses_begins_another_epoch() -> None:
     assert run_.restarts == 2
 
 
-def test_a_bridge_of_another_pace_is_told() -> None:
-    run_ = Run(BIOTAC)
+def test_a_bridge_of_another_pace_is_reported() -> None:
+    run_ = FrameTracker(BIOTAC)
     with pytest.raises(DeviceError, match=r'takes 10\.40 ms for a frame, and 10\.00 ms are needed'):
         for number in range(120):
             run_.place(bridge_frame(number, 10_400 * number))
-    steady = Run(BIOTAC)
+    steady = FrameTracker(BIOTAC)
     jitter_us = (0, 2000, -2000)
     for number in range(500):
         steady.place(bridge_frame(number, 10_050 * number + jitter_us[number % 3]))

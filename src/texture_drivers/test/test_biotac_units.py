@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_drivers.biotac.units import Scales, to_physical
+from texture_drivers.biotac.units import BioTacScales, to_physical
 
 
 def test_pressures_and_voltages_come_from_counts_by_the_nominal_scales() -> None:
@@ -13,6 +13,6 @@ def test_pressures_and_voltages_come_from_counts_by_the_nominal_scales() -> None
 
 
 def test_scales_are_the_users_to_set_and_bad_samples_stay_bad() -> None:
-    values, _ = to_physical(np.array([[10.0], [np.nan]]), ('pdc',), Scales(pdc_pa=25.0, pdc_rest=8.0))
+    values, _ = to_physical(np.array([[10.0], [np.nan]]), ('pdc',), BioTacScales(pdc_pa=25.0, pdc_baseline=8.0))
     assert values[0, 0] == 50.0
     assert np.isnan(values[1, 0])

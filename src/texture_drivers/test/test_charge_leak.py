@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_drivers.pvdf.charge_leak import ChargeLeak, LeakingFilm, Restorer
+from texture_drivers.pvdf.charge_leak import ChargeLeak, ForceReconstructor, LeakingFilm
 
 RATE_HZ = 4096.0
 LEAK = ChargeLeak(resistance_ohm=1e8, capacitance_f=1.06e-9)  # T = 0.106 s, corner 1.5 Hz
@@ -41,13 +41,13 @@ def test_at_the_corner_the_response_is_down_by_three_decibels():
 @pytest.mark.parametrize('frequency_hz', [2.0, 10.0, 100.0, 1000.0])
 def test_what_leaked_is_restored_in_the_pass_band(frequency_hz):
     force = sine(frequency_hz)
-    restored = Restorer(LEAK, RATE_HZ, from_hz=0.1).update(LeakingFilm(LEAK, RATE_HZ).update(force))
+    restored = ForceReconstructor(LEAK, RATE_HZ, from_hz=0.1).update(LeakingFilm(LEAK, RATE_HZ).update(force))
     late = slice(len(force) // 2, None)
     assert np.abs(restored - force)[late].max() < 1.3 * 0.1 / frequency_hz + 0.001
 
 
 def test_an_offset_of_the_amplifier_does_not_add_up_for_ever():
-    restored = Restorer(LEAK, RATE_HZ, from_hz=0.1).update(np.full((200_000, 1), 1e-12))
+    restored = ForceReconstructor(LEAK, RATE_HZ, from_hz=0.1).update(np.full((200_000, 1), 1e-12))
     assert restored[-1, 0] == pytest.approx(1e-12 / 21e-12 * LEAK.corner_hz / 0.1, rel=0.01)
 
 
@@ -59,7 +59,7 @@ def test_batches_give_the_same_as_the_whole():
 
 
 def test_after_a_gap_the_restorer_begins_at_rest():
-    restorer = Restorer(LEAK, RATE_HZ, from_hz=0.1)
+    restorer = ForceReconstructor(LEAK, RATE_HZ, from_hz=0.1)
     charge = np.random.default_rng(0).standard_normal((100, 1))
     first = restorer.update(charge)
     restorer.restart()

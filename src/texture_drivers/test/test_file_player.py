@@ -72,7 +72,7 @@ def test_a_loop_goes_on_with_index_and_stamps(params):
     assert batches[-1].end_ns == 250_000_000
 
 
-def test_after_opening_again_it_begins_anew_and_the_index_tells_the_pause(params):
+def test_after_opening_again_it_begins_again_and_the_index_reports_the_pause(params):
     clock = Clock(0.0)
     player = FilePlayer(params, clock)
     player.open()

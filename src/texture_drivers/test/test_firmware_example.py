@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.framing import Deframer
+from texture_core.framing import FrameDecoder
 
 PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'sensors' / 'daq.md'
 COMPILER = shutil.which('g++')
@@ -35,7 +35,7 @@ def test_the_example_makes_frames_that_the_driver_takes(tmp_path: Path) -> None:
     samples = rng.integers(-3, 300, (200, 8)).astype('<i2')  # many zero bytes
     samples[100:] = rng.integers(1, 256, (100, 8)).astype('<i2') * 257  # none at all
     line = subprocess.run([program], input=samples.tobytes(), capture_output=True, check=True).stdout
-    deframer = Deframer()
+    deframer = FrameDecoder()
     frames = deframer.feed(line)
     assert b''.join(frame.body for frame in frames) == samples.tobytes()
     assert [frame.sequence for frame in frames] == [(65530 + i) % 65536 for i in range(20)]

@@ -17,7 +17,7 @@ from texture_core.errors import InvalidParameter
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import SENSOR_QOS
 from texture_drivers.nodes.tsf85_adaptor import Tsf85Adaptor
-from texture_drivers.tsf85.messages import MessageStream
+from texture_drivers.tsf85.messages import Tsf85MessageConverter
 
 pytestmark = pytest.mark.ros
 
@@ -65,7 +65,7 @@ def test_a_message_is_handed_over_with_the_time_at_which_it_was_sent(
     graph: LocalGraph, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     taken: list[tuple[str, int]] = []
-    monkeypatch.setattr(MessageStream, 'take', lambda _, topic, message, ns: taken.append((topic, ns)))
+    monkeypatch.setattr(Tsf85MessageConverter, 'take', lambda _, topic, message, ns: taken.append((topic, ns)))
     graph.add(Tsf85Adaptor)
     sender = graph.peer.create_publisher(String, 'TactileSensor/Dynamic', SENSOR_QOS)
 
@@ -78,6 +78,6 @@ def test_a_message_is_handed_over_with_the_time_at_which_it_was_sent(
     assert abs(time.time_ns() - taken[0][1]) < 5e9
 
 
-def test_a_package_that_is_missing_is_told_in_one_sentence(graph: LocalGraph) -> None:
+def test_a_package_that_is_missing_is_reported_in_one_sentence(graph: LocalGraph) -> None:
     with pytest.raises(InvalidParameter, match=r"'package' .*no_such_msgs.* cannot be imported"):
         graph.add(Tsf85Adaptor, package='no_such_msgs')

@@ -178,7 +178,7 @@ def test_an_image_that_has_not_come_for_long_is_not_published(feeder: Feeder) ->
     assert len(feeder.static) < 25
 
 
-def test_unplugging_is_told_and_the_gap_counted_by_the_host_clock(feeder: Feeder) -> None:
+def test_unplugging_is_reported_and_the_gap_counted_by_the_host_clock(feeder: Feeder) -> None:
     feeder.run(300)
     feeder.wire.unplug()
     with pytest.raises(DeviceError, match='plugged in'):
@@ -321,7 +321,7 @@ def test_a_third_finger_is_refused_with_a_sentence() -> None:
         Tsf85(SensorParams(finger=2))
 
 
-def test_bytes_that_are_no_packets_are_told_from_silence(wire: Wire, clock: Clock) -> None:
+def test_bytes_that_are_no_packets_are_reported_from_silence(wire: Wire, clock: Clock) -> None:
     sensor = Tsf85(SensorParams(device=str(wire.link), batch_s=0.1), clock)
     sensor.open()
     deadline = time.monotonic() + DEADLINE_S
@@ -332,7 +332,7 @@ def test_bytes_that_are_no_packets_are_told_from_silence(wire: Wire, clock: Cloc
     sensor.close()
 
 
-def test_the_drift_of_the_device_is_told(feeder: Feeder) -> None:
+def test_the_drift_of_the_device_is_reported(feeder: Feeder) -> None:
     assert feeder.sensor.details == {'device clock slow by [ppm]': 0.0}
 
 

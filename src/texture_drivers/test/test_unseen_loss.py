@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from texture_drivers.tsf85.finger import SIGNAL, Finger
-from texture_drivers.tsf85.sets import Set
+from texture_drivers.tsf85.finger_stream import SIGNAL, FingerStream
+from texture_drivers.tsf85.sample_frames import SampleFrame
 from texture_drivers.unseen_loss import UnseenLoss
 
 MS = 1_000_000
@@ -20,10 +20,12 @@ def follow(seconds, lost, *, drift=0.0, stamped=False, seed=1, late_ms=0.0):
     `lost` tells of each true millisecond whether it is lost; arrivals jitter by up to some ms, as on USB.
     """
     rng = np.random.default_rng(seed)
-    finger, errors = Finger(), []
+    finger, errors = FingerStream(), []
     for first in range(0, round(seconds * 1000), BATCH):
         sets = [
-            Set(ms if stamped else None, ms % 30_000) for ms in range(first, first + BATCH) if not lost[ms % len(lost)]
+            SampleFrame(ms if stamped else None, ms % 30_000)
+            for ms in range(first, first + BATCH)
+            if not lost[ms % len(lost)]
         ]
         jitter_ns = round(rng.exponential(2 * MS) + late_ms * MS * (2.0 < first / 1000 < 2.4))
         arrival_ns = START + round((first + BATCH) * MS * (1 + drift)) + jitter_ns
@@ -76,7 +78,7 @@ def test_where_there_are_stamps_they_alone_count():
     assert np.abs(errors[errors[:, 0] > 1.0, 1]).max() < 2e-3
 
 
-def test_a_loss_is_told_when_all_of_half_a_second_was_late():
+def test_a_loss_is_reported_when_all_of_half_a_second_was_late():
     losses = UnseenLoss(rate_hz=1000.0)
     told = [losses.lost(20 * MS, at * 10 * MS) for at in range(100)]
     assert [at for at, samples in enumerate(told) if samples][:1] == [50]

@@ -21,22 +21,22 @@ class Arrival(NamedTuple):
 
 
 @dataclass
-class Line:
-    """Delay of the stream's clock against the host's: base + drift · elapsed, and a deviation that runs out."""
+class DelayModel:
+    """Delay of the stream's clock against the host's: offset + drift · elapsed, and a residual that is slewed to 0."""
 
-    since_ns: float = 0.0
-    base_ns: float = 0.0
+    start_ns: float = 0.0
+    offset_ns: float = 0.0
     drift: float = 0.0
-    deviation_ns: float = 0.0  # at since_ns
+    residual_ns: float = 0.0  # at since_ns
 
-    def below(self, elapsed_ns: float) -> float:
-        """Return the line itself, without the deviation."""
-        return self.base_ns + self.drift * elapsed_ns
+    def trend_ns(self, elapsed_ns: float) -> float:
+        """Return the linear part of the delay, without the residual."""
+        return self.offset_ns + self.drift * elapsed_ns
 
-    def at(self, elapsed_ns: float, bend: float) -> float:
-        """Return the line with what is left of the deviation, which shrinks by `bend` per time."""
-        left = max(0.0, abs(self.deviation_ns) - bend * max(0.0, elapsed_ns - self.since_ns))
-        return self.below(elapsed_ns) + math.copysign(left, self.deviation_ns)
+    def delay_ns_at(self, elapsed_ns: float, slew_rate: float) -> float:
+        """Return the delay with the remaining residual, which shrinks by `slew_rate` per time."""
+        remaining = max(0.0, abs(self.residual_ns) - slew_rate * max(0.0, elapsed_ns - self.start_ns))
+        return self.trend_ns(elapsed_ns) + math.copysign(remaining, self.residual_ns)
 
 
 class StreamClock:
@@ -57,9 +57,9 @@ class StreamClock:
     memory_s
         How long arrivals count; over this time the drift is taken as constant.
     drift_after_s
-        How long arrivals are watched before a drift is believed.
+        How long arrivals are observed before a drift is estimated.
     max_drift
-        Largest drift believed; the internal oscillator of a microcontroller on USB is right to 0.25 %.
+        Largest drift accepted; the internal oscillator of a microcontroller on USB is right to 0.25 %.
     bend
         Largest correction per time.
     step_s
@@ -76,7 +76,7 @@ class StreamClock:
         memory_s: float = 60.0,
         drift_after_s: float = 2.0,
         max_drift: float = 5e-3,
-        bend: float = 0.02,
+        slew_rate: float = 0.02,
         step_s: float = 0.5,
     ) -> None:
         self.steps = 0
@@ -85,7 +85,7 @@ class StreamClock:
         self._memory_ns = memory_s * NANOSECONDS
         self._drift_after_ns = drift_after_s * NANOSECONDS
         self._max_drift = max_drift
-        self._bend = bend
+        self._slew_rate = slew_rate
         self._step_ns = step_s * NANOSECONDS
         self._drift = 0.0
         self.restart()
@@ -98,7 +98,7 @@ class StreamClock:
         self._width_ns = FIRST_BIN_NS
         self._last_index = 0
         self._late_since_ns: int | None = None
-        self._before = self._now = Line(drift=self._drift)
+        self._before = self._now = DelayModel(drift=self._drift)
 
     def skip(self, samples: int) -> None:
         """Take the samples of this stream for later ones by so many: their times stay, their indices do not."""
@@ -124,7 +124,7 @@ class StreamClock:
             self.settled = True
             arrival = Arrival(0.0, 0.0)
         self._last_index = index
-        self._remember(arrival)
+        self._store(arrival)
         # By both clocks: what was kept back arrives in one burst, and tells nothing of when it was taken.
         watched_ns = min(arrival.elapsed_ns, arrival_ns - self._origin[1])
         self.settled = self.settled or watched_ns >= self._settle_ns
@@ -133,16 +133,16 @@ class StreamClock:
         """Return the host time of a sample."""
         first_index, first_ns = self._origin or (0, 0)
         elapsed_ns = (index - first_index) * self._period_ns
-        line = self._now if elapsed_ns >= self._now.since_ns else self._before
-        return first_ns + round(elapsed_ns + line.at(elapsed_ns, self._bend))
+        line = self._now if elapsed_ns >= self._now.start_ns else self._before
+        return first_ns + round(elapsed_ns + line.delay_ns_at(elapsed_ns, self._slew_rate))
 
     def index_at(self, time_ns: int) -> float:
         """Return the (fractional) index of the sample taken at a host time, now or to come."""
         first_index, first_ns = self._origin or (0, 0)
         reached_ns = float(time_ns - first_ns)
-        elapsed_ns = (reached_ns - self._now.base_ns) / (1 + self._now.drift)
-        left_ns = self._now.at(elapsed_ns, self._bend) - self._now.below(elapsed_ns)
-        return first_index + (elapsed_ns - left_ns) / self._period_ns
+        elapsed_ns = (reached_ns - self._now.offset_ns) / (1 + self._now.drift)
+        remaining_ns = self._now.delay_ns_at(elapsed_ns, self._slew_rate) - self._now.trend_ns(elapsed_ns)
+        return first_index + (elapsed_ns - remaining_ns) / self._period_ns
 
     def _arrival(self, index: int, arrival_ns: int) -> Arrival:
         first_index, first_ns = self._origin or (index, arrival_ns)
@@ -153,7 +153,7 @@ class StreamClock:
         """Return whether the stream or the host's clock cannot be the one of before."""
         if not self._bins:
             return False
-        late_ns = arrival.delay_ns - self._now.below(arrival.elapsed_ns)
+        late_ns = arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
         if late_ns <= self._step_ns:
             self._late_since_ns = None
             return index < self._last_index or late_ns < -self._step_ns
@@ -161,23 +161,23 @@ class StreamClock:
             self._late_since_ns = arrival_ns
         return index < self._last_index or arrival_ns - self._late_since_ns > NANOSECONDS
 
-    def _remember(self, arrival: Arrival) -> None:
-        late_ns = arrival.delay_ns - self._now.below(arrival.elapsed_ns)
+    def _store(self, arrival: Arrival) -> None:
+        late_ns = arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
         if not self._bins or late_ns < 0:
-            self._turn_to(arrival.elapsed_ns, self._now.base_ns + late_ns)
+            self._switch_to(arrival.elapsed_ns, self._now.offset_ns + late_ns)
         if not self._bins:
             self._bins.append(arrival)
         elif arrival.elapsed_ns // self._width_ns == self._bins[-1].elapsed_ns // self._width_ns:
-            self._bins[-1] = min(self._bins[-1], arrival, key=self._lateness)
+            self._bins[-1] = min(self._bins[-1], arrival, key=self._excess_delay_ns)
         else:
             self._fit(arrival.elapsed_ns)
             self._bins.append(arrival)
-            self._forget(arrival.elapsed_ns)
+            self._prune(arrival.elapsed_ns)
 
-    def _lateness(self, arrival: Arrival) -> float:
-        return arrival.delay_ns - self._now.below(arrival.elapsed_ns)
+    def _excess_delay_ns(self, arrival: Arrival) -> float:
+        return arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
 
-    def _forget(self, elapsed_ns: float) -> None:
+    def _prune(self, elapsed_ns: float) -> None:
         """Drop what is too old, but keep one from before a long gap; make the bins wider when there are too many."""
         while len(self._bins) > 2 and elapsed_ns - self._bins[1].elapsed_ns > self._memory_ns:
             self._bins.popleft()
@@ -187,23 +187,23 @@ class StreamClock:
         wider: dict[float, Arrival] = {}
         for arrival in self._bins:
             number = arrival.elapsed_ns // self._width_ns
-            wider[number] = min(wider.get(number, arrival), arrival, key=self._lateness)
+            wider[number] = min(wider.get(number, arrival), arrival, key=self._excess_delay_ns)
         self._bins = deque(wider.values())
 
     def _fit(self, elapsed_ns: float) -> None:
-        """Lay the line anew below the closed bins."""
+        """Lay the line again below the closed bins."""
         if self._bins[-1].elapsed_ns - self._bins[0].elapsed_ns >= self._drift_after_ns:
             slope = supporting_slope(self._bins)
             self._drift = min(max(slope, -self._max_drift), self._max_drift)
-        base_ns = min(arrival.delay_ns - self._drift * arrival.elapsed_ns for arrival in self._bins)
-        self._turn_to(elapsed_ns, base_ns)
+        offset_ns = min(arrival.delay_ns - self._drift * arrival.elapsed_ns for arrival in self._bins)
+        self._switch_to(elapsed_ns, offset_ns)
 
-    def _turn_to(self, elapsed_ns: float, base_ns: float) -> None:
+    def _switch_to(self, elapsed_ns: float, offset_ns: float) -> None:
         """Go over to another line from `elapsed_ns` on, without a jump once the clock has been read."""
-        line = Line(elapsed_ns, base_ns, self._drift)
+        line = DelayModel(elapsed_ns, offset_ns, self._drift)
         if self.settled:
-            line.deviation_ns = self._now.at(elapsed_ns, self._bend) - line.below(elapsed_ns)
-            if elapsed_ns > self._now.since_ns:
+            line.residual_ns = self._now.delay_ns_at(elapsed_ns, self._slew_rate) - line.trend_ns(elapsed_ns)
+            if elapsed_ns > self._now.start_ns:
                 self._before = self._now
         else:
             self._before = line
@@ -228,5 +228,5 @@ def supporting_slope(points: Sequence[Arrival]) -> float:
     return _slope(hull[right - 1], hull[right])
 
 
-def _slope(left: Arrival, right: Arrival) -> float:
-    return (right.delay_ns - left.delay_ns) / (right.elapsed_ns - left.elapsed_ns)
+def _slope(remaining: Arrival, right: Arrival) -> float:
+    return (right.delay_ns - remaining.delay_ns) / (right.elapsed_ns - remaining.elapsed_ns)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from texture_core.errors import DeviceError
 from texture_core.signal import TactileSignal
 from texture_drivers.params import SensorParams
-from texture_drivers.sample_line import SampleLine, Stream
 from texture_drivers.serial_port import SerialPort
+from texture_drivers.stream_decoder import FramedStream, StreamDecoder
 
 PPM = 1e6
 SILENCE_S = 1.0  # the device sends without being asked; opening the port again has woken many a one
@@ -31,13 +31,13 @@ class FramedSensor:
     """
 
     def __init__(
-        self, params: SensorParams, now_ns: Callable[[], int], streams: Sequence[Stream], baud: int = 115200
+        self, params: SensorParams, now_ns: Callable[[], int], streams: Sequence[FramedStream], baud: int = 115200
     ) -> None:
         self._params = params
         self._now_ns = now_ns
         self._streams = streams
         self._baud = baud
-        self._line = SampleLine(streams, params.frame_id)
+        self._line = StreamDecoder(streams, params.frame_id)
         self._port: SerialPort | None = None
         self._opened = 0
         self._silent_s = 0.0
@@ -71,14 +71,14 @@ class FramedSensor:
     @property
     def counts(self) -> Mapping[str, int]:
         """Totals: samples published and lost, frames refused or passed over, and new beginnings."""
-        line, tracks = self._line, self._line.tracks.values()
+        line, trackers = self._line, self._line.trackers.values()
         return {
-            'samples': sum(track.samples for track in tracks),
-            'lost': sum(track.lost for track in tracks),
-            'left out by the device': sum(track.overrun for track in tracks),
+            'samples': sum(tracker.samples for tracker in trackers),
+            'lost': sum(tracker.lost for tracker in trackers),
+            'left out by the device': sum(tracker.overrun for tracker in trackers),
             'bogus': line.deframer.bad_frames + line.malformed,
             'repeated frames': line.deframer.repeated,
-            'other frames': line.foreign,
+            'other frames': line.other_frames,
             'device restarts': line.restarts,
             'reopened': max(0, self._opened - 1),
             'clock_steps': line.clock.steps,

@@ -12,8 +12,8 @@ import serial
 from texture_core.errors import DeviceError
 
 # An unplugged port raises termios.error from tcflush, which is no OSError.
-FAULTS = (serial.SerialException, OSError, termios.error)
-MOST_BYTES = 65536  # at once
+PORT_ERRORS = (serial.SerialException, OSError, termios.error)
+MAX_BYTES = 65536  # at once
 MODEM_SETTLE_S = 0.2  # the vendor's pause between raising DTR and the first command
 
 
@@ -48,7 +48,7 @@ class SerialPort:
         data = b''
         with self._faults():
             # The kernel hands over 4 kB at once and holds more behind them; what comes meanwhile is for the next time.
-            while (waiting := self._serial.in_waiting) and len(data) < MOST_BYTES:
+            while (waiting := self._serial.in_waiting) and len(data) < MAX_BYTES:
                 data += self._serial.read(waiting)
         return data
 
@@ -59,14 +59,14 @@ class SerialPort:
 
     def close(self) -> None:
         """Close; never raises."""
-        with contextlib.suppress(*FAULTS):
+        with contextlib.suppress(*PORT_ERRORS):
             self._serial.close()
 
     @contextlib.contextmanager
     def _faults(self) -> Iterator[None]:
         try:
             yield
-        except FAULTS as error:
+        except PORT_ERRORS as error:
             raise DeviceError(
                 f"device '{self._device}' cannot be used ({error}); check that it is plugged in, that you may open it, "
                 'and that no other program has it open'

@@ -1,4 +1,4 @@
-"""Settings of one kind of sensor, beyond what every sensor is told: from a YAML file, or written in place."""
+"""Settings of one kind of sensor, beside those of every sensor: from a YAML file, or written in place."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping
-from texture_core.plain_data import BROKEN, load_yaml, parse_yaml, shown
+from texture_core.plain_data import PARSE_ERRORS, load_yaml, parse_yaml, safe_repr
 from texture_core.resources import find_file
 
 T = TypeVar('T')
@@ -39,12 +39,12 @@ def read_settings(config: str) -> dict[str, Any]:
     else:
         content = load_yaml(find_file(config, 'texture_drivers', 'config/sensors', 'settings'), 'settings')
     if not isinstance(content, dict):
-        raise InvalidParameter(f'settings {config} hold {shown(content)}; a mapping of names to values is needed')
+        raise InvalidParameter(f'settings {config} hold {safe_repr(content)}; a mapping of names to values is needed')
     return content
 
 
 def _in_place(text: str) -> Any:
     try:
         return parse_yaml(text)
-    except BROKEN as error:
+    except PARSE_ERRORS as error:
         raise InvalidParameter(f'settings {text} are no YAML: {error}') from error

@@ -23,10 +23,10 @@ class Port(Protocol):
     serial_number: str | None
 
 
-List = Callable[[], Iterable[Port]]
+ListPorts = Callable[[], Iterable[Port]]
 
 
-def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: List = list_ports.comports) -> str:
+def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts = list_ports.comports) -> str:
     """Return the path that is meant: `device` itself, or for 'auto' that of the only port with one of the numbers.
 
     Raises
@@ -52,7 +52,7 @@ def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: List = list
     )
 
 
-def serial_number(device: str, ports: List = list_ports.comports) -> str:
+def serial_number(device: str, ports: ListPorts = list_ports.comports) -> str:
     """Return the serial number of the USB device behind a path, '' if it tells none."""
     path = str(Path(device).resolve())
     return next((port.serial_number or '' for port in ports() if port.device == path), '')

@@ -146,7 +146,7 @@ def test_broken_messages_are_counted_and_survived(graph, case):
     assert bench.report()[2]['broken_messages'] == 1
 
 
-def test_vectors_that_do_not_come_are_counted_and_a_new_extractor_begins_anew(graph, case):
+def test_vectors_that_do_not_come_are_counted_and_a_new_extractor_begins_again(graph, case):
     kind, path, vectors = case
     bench = Bench(graph, kind, path)
     numbered = [dataclasses.replace(vector, number=7 + k) for k, vector in enumerate(vectors)]
@@ -199,7 +199,7 @@ def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, 
     bench = Bench(graph, Classifier, path)
     moved = [dataclasses.replace(v, values=v.values + (0.0 if v.last else 9.0), exploration_id='e7') for v in felt]
     assert bench.ask(moved)[-1].label != 'silk'
-    answer = bench.call(srv.LearnTexture, 'learn', label='silk')
+    answer = bench.call(srv.AddTexture, 'add_texture', label='silk')
     assert (answer.success, answer.examples) == (True, len(felt) - 1)
     assert '5 textures known' in answer.message
     assert bench.ask(moved)[-1].label == 'silk'
@@ -214,9 +214,9 @@ def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, 
 
 def test_what_cannot_be_learnt_is_answered_with_a_sentence(graph, model, tmp_path):
     bench = Bench(graph, Classifier)
-    assert 'no model is loaded' in bench.call(srv.LearnTexture, 'learn', label='silk').message
+    assert 'no model is loaded' in bench.call(srv.AddTexture, 'add_texture', label='silk').message
     bench.set_model(model.save(tmp_path / 'm'))
-    answer = bench.call(srv.LearnTexture, 'learn', label='silk', exploration_id='e1')
+    answer = bench.call(srv.AddTexture, 'add_texture', label='silk', exploration_id='e1')
     assert not answer.success
     assert 'explore first' in answer.message
     bench.set_model(dataclasses.replace(model, examples=None).save(tmp_path / 'old'))

@@ -65,7 +65,7 @@ def test_the_same_windows_further_apart_are_worth_more(model, make_examples):
     )
 
 
-def test_a_new_exploration_begins_anew_even_without_an_end(model, examples):
+def test_a_new_exploration_begins_again_even_without_an_end(model, examples):
     first = vectors(examples, 'felt')[:4]
     second = vectors(examples, 'wood', name='e2')
     estimates = judge(model, first + second)
@@ -73,7 +73,7 @@ def test_a_new_exploration_begins_anew_even_without_an_end(model, examples):
     assert estimates[-1].label == 'wood'
 
 
-def test_after_the_end_the_same_id_begins_anew(model, examples):
+def test_after_the_end_the_same_id_begins_again(model, examples):
     estimates = judge(model, vectors(examples) + vectors(examples))
     assert estimates[len(vectors(examples))].windows == 1
 

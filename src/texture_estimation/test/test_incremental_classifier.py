@@ -66,7 +66,7 @@ def test_what_was_taught_survives_a_restart_and_can_be_undone(model, examples, s
         later.undo()
 
 
-def test_a_trained_model_that_was_saved_anew_keeps_its_lessons_but_other_features_do_not(model, silk, tmp_path):
+def test_a_trained_model_that_was_saved_again_keeps_its_lessons_but_other_features_do_not(model, silk, tmp_path):
     path = model.save(tmp_path / 'm')
     pupil = Pupil(load_model(path), path)
     felt(pupil, silk)

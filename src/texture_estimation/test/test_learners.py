@@ -92,7 +92,7 @@ def test_the_unit_of_the_features_does_not_matter(learnt, name, examples, factor
     [lambda values: values, lambda values: np.full_like(values, 0.1), lambda values: 1e6 + 1e-9 * values],
     ids=['duplicated', 'constant', 'almost constant'],
 )
-def test_features_that_tell_nothing_new_do_no_harm(name, make_examples, more):
+def test_features_that_report_nothing_new_do_no_harm(name, make_examples, more):
     def widened(examples):
         values = np.concatenate((examples.values, more(examples.values)), axis=1)
         return dataclasses.replace(examples, values=values, names=tuple(map(str, range(values.shape[1]))))
@@ -102,7 +102,7 @@ def test_features_that_tell_nothing_new_do_no_harm(name, make_examples, more):
     assert accuracy(model, fresh) > (0.5 if name == 'em_mixture' else 0.85)  # clusters are found without labels
 
 
-def test_features_that_tell_nothing_at_all_give_finite_answers(name, examples):
+def test_features_that_report_nothing_at_all_give_finite_answers(name, examples):
     model = learn(name, dataclasses.replace(examples, values=np.ones_like(examples.values)))
     assert np.isfinite(model.predict_log_proba(np.ones((3, 6)))).all()
 
@@ -116,7 +116,7 @@ def test_one_or_two_windows_of_a_label_are_enough_to_answer(name, make_examples,
 
 
 @pytest.mark.parametrize('n_labels', [2, 3])
-def test_few_labels_are_told_apart_in_the_right_direction(name, make_examples, n_labels):
+def test_few_labels_are_reported_apart_in_the_right_direction(name, make_examples, n_labels):
     labels = ('cork', 'felt', 'wood')[:n_labels]
     assert accuracy(learn(name, make_examples(labels=labels)), make_examples(seed=1, labels=labels)) > 0.85
 
@@ -186,7 +186,7 @@ def test_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
     np.testing.assert_allclose(answers, expected.predict_log_proba(scaler.transform(fresh)), atol=1e-6)
 
 
-def test_counted_naive_bayes_tells_labels_of_one_mean_and_width_apart_that_normal_distributions_cannot():
+def test_counted_naive_bayes_reports_labels_of_one_mean_and_width_apart_that_normal_distributions_cannot():
     rng = np.random.default_rng(0)
     flat, forked = rng.uniform(-1.0, 1.0, (300, 1)), rng.choice([-0.577, 0.577], (300, 1))  # variance 1/3 both
     values, codes = np.concatenate((flat, forked)), np.repeat([0, 1], 300)

@@ -42,7 +42,7 @@ def test_the_only_direction_in_which_two_textures_differ_is_chosen_though_it_is_
 
 
 @pytest.mark.parametrize('seed', [None, 1])
-def test_equal_textures_tell_nothing_and_the_shortest_motion_is_chosen(seed: int | None) -> None:
+def test_equal_textures_report_nothing_and_the_shortest_motion_is_chosen(seed: int | None) -> None:
     learnt = slides({ACROSS: LIKE, SHORT: LIKE, ALONG: LIKE})
     rng = None if seed is None else np.random.default_rng(seed)
     motion, information = learnt.best(learnt.ignorance, [ACROSS, SHORT, ALONG], rng)
@@ -127,7 +127,7 @@ def test_slides_that_cannot_be_learnt_from_are_refused(
 
 
 @pytest.mark.parametrize('seed', range(3))
-def test_what_lies_apart_by_chance_tells_nothing(seed: int) -> None:
+def test_what_lies_apart_by_chance_reports_nothing(seed: int) -> None:
     """Three slides of each texture on 40 features: their means are far apart, their distributions the same."""
     rng = np.random.default_rng(seed)
     values = rng.standard_normal((60, 40))

@@ -146,7 +146,7 @@ def learnt(recipe):
 
 
 @pytest.mark.parametrize('factor', [1e6, 1e-6])
-def test_in_other_units_a_recipe_learns_to_tell_as_much(recipe, learnt, factor):
+def test_in_other_units_a_recipe_learns_to_report_as_much(recipe, learnt, factor):
     strange = train(recipe, windows_of(recipe, factor))
     told = accuracy(strange, windows_of(recipe, factor, seed=1))
     as_much = told > accuracy(learnt, windows_of(recipe, seed=1)) - 0.1

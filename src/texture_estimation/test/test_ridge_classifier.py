@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_estimation.incremental.ridge_classifier import MOST_EXAMPLES, TaughtHead, spread
+from texture_estimation.incremental.ridge_classifier import MAX_EXAMPLES, TaughtHead, spread
 from texture_estimation.log_probabilities import log_softmax
 
 
@@ -87,6 +87,6 @@ def test_constant_and_doubled_features_do_no_harm():
 
 def test_examples_are_thinned_evenly():
     assert spread(3).tolist() == [0, 1, 2]
-    assert len(spread(10 * MOST_EXAMPLES)) == MOST_EXAMPLES
+    assert len(spread(10 * MAX_EXAMPLES)) == MAX_EXAMPLES
     assert spread(1001, 3).tolist() == [0, 500, 1000]
     assert spread(0).tolist() == []

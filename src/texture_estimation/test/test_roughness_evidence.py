@@ -108,7 +108,7 @@ def test_unusable_input_gives_no_grade_and_says_why(model, window, sentence) -> 
     assert evidence.unusable + evidence.refused == 1
 
 
-def test_a_slide_too_short_and_a_missing_model_are_told() -> None:
+def test_a_slide_too_short_and_a_missing_model_are_reported() -> None:
     assert RoughnessEvidence(None).update(last()).message == NO_MODEL
     model = train_grades(recipe(), *graded())
     assert RoughnessEvidence(model).update(last()).message == NO_WINDOW
@@ -131,7 +131,7 @@ def test_where_no_head_fires_there_is_no_grade() -> None:
     assert (estimate.valid, estimate.message, evidence.silent) == (False, SILENT, 1)
 
 
-def test_intervals_hold_as_often_as_they_claim_on_textures_never_felt() -> None:
+def test_intervals_hold_as_often_as_they_claim_on_textures_never_measured() -> None:
     inside = []
     for seed in range(12):
         model = train_grades(recipe(), *graded(seed))
@@ -175,7 +175,7 @@ def test_a_saved_model_grades_alike_and_holds_no_code(model, tmp_path) -> None:
     assert card['grades'].keys() == model.grades.keys()
 
 
-def test_models_of_the_other_kind_are_told_apart(model, examples, tmp_path) -> None:
+def test_models_of_the_other_kind_are_reported_apart(model, examples, tmp_path) -> None:
     model.save(tmp_path / 'rough')
     train(load_recipe('default'), examples).save(tmp_path / 'names')
     with pytest.raises(ModelMismatch, match='roughness_estimator takes it'):

@@ -110,7 +110,7 @@ def test_the_start_of_a_slide_counts_as_often_as_asked_and_is_judged_once(exampl
     assert not np.array_equal(once.predict_log_proba(examples.values), often.predict_log_proba(examples.values))
 
 
-def test_unknown_surfaces_are_told_only_if_asked_for(make_examples):
+def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
     examples = make_examples()
     trusting, strict = (
         dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejections=share))

@@ -14,12 +14,12 @@ from typing import Any
 
 from texture_core.errors import ModelMismatch, TextureError
 from texture_core.files import MB, Archive, FileRefused, read_bounded
-from texture_core.plain_data import MOST_CARD_BYTES, load_json, parse_json
+from texture_core.plain_data import MAX_CARD_BYTES, load_json, parse_json
 from texture_estimation.plain_parts import SCHEMA, plain_parts
 
 FORMAT = 1
-MOST_BYTES = 200 * MB  # of a file of parts; ensembles of networks over many features come to 20 MB
-MOST_SCHEMA_BYTES = 2 * MB  # each node in it becomes objects of 2 kB
+MAX_BYTES = 200 * MB  # of a file of parts; ensembles of networks over many features come to 20 MB
+MAX_SCHEMA_BYTES = 2 * MB  # each node in it becomes objects of 2 kB
 NODES = ('DictNode', 'ListNode', 'TupleNode', 'JsonNode', 'NdArrayNode', 'TypeNode', 'ObjectNode')
 # What unpacking, and using what came out, raises at files that are damaged or made to do harm, found by trying.
 BROKEN = (
@@ -85,7 +85,7 @@ def _check_parts(file: Archive, trusted: Sequence[str]) -> None:
     A member may be named by many nodes, each of which makes an array of its own; and some kinds of node would read
     archives within the archive, or call functions.
     """
-    schema = parse_json(file.read(SCHEMA, MOST_SCHEMA_BYTES).decode())
+    schema = parse_json(file.read(SCHEMA, MAX_SCHEMA_BYTES).decode())
     for node in _nodes(schema):
         kind, name = str(node['__loader__']), f'{node.get("__module__")}.{node.get("__class__")}'
         if kind not in NODES or (kind == 'ObjectNode' and name not in trusted):
@@ -115,7 +115,7 @@ def replace(path: Path, content: bytes) -> None:
 
 def _read_card(path: Path) -> dict[str, Any]:
     try:
-        card = load_json(path, MOST_CARD_BYTES)
+        card = load_json(path, MAX_CARD_BYTES)
     except (OSError, ValueError) as error:
         raise ModelMismatch(f"model card '{path}' cannot be read: {error}; give the path of a trained model") from error
     if not isinstance(card, dict) or card.get('format') != FORMAT or not isinstance(card.get('recipe'), dict):
@@ -125,7 +125,7 @@ def _read_card(path: Path) -> dict[str, Any]:
 
 def _read_parts(path: Path, digest: str) -> bytes:
     try:
-        content = read_bounded(path, MOST_BYTES)
+        content = read_bounded(path, MAX_BYTES)
     except (OSError, FileRefused) as error:
         raise ModelMismatch(f"model file '{path}' cannot be read: {error}; it belongs beside its card") from error
     if hashlib.sha256(content).hexdigest() != digest:

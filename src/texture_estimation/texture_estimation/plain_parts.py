@@ -14,7 +14,7 @@ from texture_core.plain_data import parse_json
 
 Node = Mapping[str, Any]
 SCHEMA = 'schema.json'
-MOST_SCHEMA_BYTES = 5_000_000
+MAX_SCHEMA_BYTES = 5_000_000
 
 
 class NotPlain(Exception):
@@ -24,7 +24,7 @@ class NotPlain(Exception):
 def plain_parts(file: Archive) -> dict[str, Any] | None:
     """Return what a file holds; None if that is not plain."""
     try:
-        parts = _build(parse_json(file.read(SCHEMA, MOST_SCHEMA_BYTES).decode()), file)
+        parts = _build(parse_json(file.read(SCHEMA, MAX_SCHEMA_BYTES).decode()), file)
     except (NotPlain, KeyError, TypeError, UnicodeDecodeError):
         return None
     return parts if isinstance(parts, dict) else None

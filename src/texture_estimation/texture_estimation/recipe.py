@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
 from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, EvidenceRule
@@ -85,7 +85,7 @@ class Recipe:
         where = f"recipe '{name}'"
         for key in content:
             if key not in KEYS:
-                raise InvalidParameter(f'{where}: {unknown(str(key), KEYS, "key")}')
+                raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
         learner = choose(LEARNERS, content.get('learner', 'svm_rbf'), 'learner', where)
         evidence = choose(EVIDENCE_RULES, content.get('evidence', 'soft_vote'), 'evidence rule', where)
         return cls(

@@ -13,7 +13,7 @@ def slide(
     sure = confidences or (0.5,) * len(decisions)
     estimates = [
         TextureEstimate(
-            0, 'e', label, known, sure[k], certain=k >= certain_from, windows=k + 1, evidence_s=0.5 + 0.1 * k
+            0, 'e', label, known, sure[k], decided=k >= certain_from, windows=k + 1, evidence_s=0.5 + 0.1 * k
         )
         for k, label in enumerate(decisions)
     ]
@@ -90,6 +90,6 @@ def test_confidence_that_is_right_as_often_as_it_says_has_no_calibration_error()
 
 
 def test_candidates_are_counted_at_the_end_where_there_are_any() -> None:
-    ends = [TextureEstimate(0, 'e', 'a', candidates=names) for names in (('a',), ('b', 'a'), ('b',), ())]
+    ends = [TextureEstimate(0, 'e', 'a', prediction_set=names) for names in (('a',), ('b', 'a'), ('b',), ())]
     results = [SlideResult('a', [], [end]) for end in ends]
     assert metrics.candidates(results) == {'coverage': pytest.approx(2 / 3), 'mean_size': pytest.approx(4 / 3)}

@@ -20,7 +20,7 @@ LATER = replace(SLIDE, stamp_ns=2 * SECOND)
 LIFT = ExplorationState(3 * SECOND, 'id', 'linear_slide', Phase.LIFT)
 
 
-def test_a_slide_lasts_from_its_first_state_to_the_lift_or_as_long_as_was_promised() -> None:
+def test_a_slide_lasts_from_its_first_state_to_the_lift_or_as_long_as_was_guaranteed() -> None:
     assert motion_made([TOUCH, SLIDE, LATER, LIFT]) == Motion('linear_slide', 0.7, 0.1, 2.0, 2.0)
     assert motion_made([TOUCH, SLIDE, LATER]) == Motion('linear_slide', 0.7, 0.1, 2.0, 1.5)
 
@@ -41,7 +41,7 @@ def test_a_slide_of_which_too_little_is_known_or_that_turns_is_no_motion(states:
     assert motion_made(states) is None
 
 
-def test_slides_in_bags_tell_how_they_were_made(tmp_path) -> None:
+def test_slides_in_bags_report_how_they_were_made(tmp_path) -> None:
     plan = SlidePlan(slides=2, slide_s=0.6, speed_m_s=0.05, force_n=1.5, direction_rad=0.5)
     bags = write_simulated(tmp_path, plan, np.random.default_rng(0), surfaces=['glass'])
     examples = describe(bags, load_recipe('fast').feature_set)

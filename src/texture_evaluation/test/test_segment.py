@@ -26,7 +26,7 @@ def slides_of(path):
     return [next(state for state in begun if state.exploration_id == name) for name in ids], states
 
 
-def test_the_slides_found_are_those_that_the_explorer_told(bag, tmp_path):
+def test_the_slides_found_are_those_that_the_explorer_reported(bag, tmp_path):
     [(path, count)] = segment_bags([bag], tmp_path / 'found', SegmentParams()).items()
     (told, _), (found, _) = slides_of(bag), slides_of(path)
     assert count == len(found) == len(told) == 3

@@ -26,7 +26,7 @@ def test_bags_and_grades_make_a_model_whose_card_says_from_what(simulated, tmp_p
     assert card['training']['slides'] == 12
 
 
-def test_both_files_of_a_model_tell_the_extractor_how_to_describe(simulated, tmp_path) -> None:
+def test_both_files_of_a_model_report_the_extractor_how_to_describe(simulated, tmp_path) -> None:
     train_grades_from_bags('roughness', [simulated], table(tmp_path, GRADES), '1-2', tmp_path / 'rough')
     by_card, by_model = (read_recipe(str(tmp_path / name))[1] for name in ('rough.json', 'rough.skops'))
     assert by_card == by_model

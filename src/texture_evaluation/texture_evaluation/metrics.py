@@ -50,7 +50,7 @@ class SlideResult:
 
     def early(self) -> TextureEstimate:
         """Return the first estimate that is certain of a known texture, else the last one."""
-        return next((e for e in self.estimates if e.certain and e.known), self.estimates[-1])
+        return next((e for e in self.estimates if e.decided and e.known), self.estimates[-1])
 
 
 def window_accuracy(results: Sequence[SlideResult]) -> float:
@@ -127,7 +127,7 @@ def calibration_error(results: Sequence[SlideResult]) -> float:
 
 def candidates(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
     """Return how often the true texture is among the candidates at the end, and how many these are on average."""
-    ends = [(result.surface, result.end.candidates) for result in results]
+    ends = [(result.surface, result.end.prediction_set) for result in results]
     named = [(surface, names) for surface, names in ends if names]
     if not named:
         return {'coverage': None, 'mean_size': None}

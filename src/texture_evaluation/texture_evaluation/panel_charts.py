@@ -11,7 +11,7 @@ from texture_core.arrays import AnyArray
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.ratings import GRADES, Ratings
 
-LEAST_SHARE = 4 / 30  # the paper leaves out grades that got fewer than 4 of 30 votes
+MIN_SHARE = 4 / 30  # the paper leaves out grades that got fewer than 4 of 30 votes
 MANY = 40  # more textures than this: small names
 LARGEST_DOT = 220.0
 
@@ -20,7 +20,7 @@ def votes_chart(ratings: Ratings, path: str | Path) -> Path:
     """Draw how many people gave each texture each grade, textures from smooth to rough (the paper's Fig. 3)."""
     order = np.argsort(ratings.means, kind='stable')
     votes = ratings.votes[order]
-    least = max(1, round(LEAST_SHARE * len(ratings.raters)))
+    least = max(1, round(MIN_SHARE * len(ratings.raters)))
     with chart(path, _size(ratings)) as figure:
         axes = figure.subplots()
         texture, grade = np.nonzero(votes >= least)

@@ -17,8 +17,8 @@ from texture_core.files import MB, read_text
 
 SMOOTH, ROUGH = 1.0, 5.0
 GRADES = np.arange(1, 6)
-MOST_BYTES = 1 * MB
-MOST_CELLS = 1_000_000  # people × textures
+MAX_BYTES = 1 * MB
+MAX_CELLS = 1_000_000  # people × textures
 COLUMNS = ('rater', 'texture', 'grade')
 SYNONYMS = {'rating': 'grade'}
 
@@ -76,9 +76,9 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
     rows = _read_rows(Path(path))
     raters = tuple(dict.fromkeys(row['rater'] for _, row in rows))
     textures = tuple(dict.fromkeys(row['texture'] for _, row in rows))
-    if len(raters) * len(textures) > MOST_CELLS:
+    if len(raters) * len(textures) > MAX_CELLS:
         raise InvalidData(
-            f"'{path}' has {len(raters)} raters and {len(textures)} textures; their product may be {MOST_CELLS}"
+            f"'{path}' has {len(raters)} raters and {len(textures)} textures; their product may be {MAX_CELLS}"
         )
     rater_at = {name: index for index, name in enumerate(raters)}
     texture_at = {name: index for index, name in enumerate(textures)}
@@ -99,7 +99,7 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
 def _read_rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
     """Return number and columns of each line."""
     try:
-        reader = csv.DictReader(io.StringIO(read_text(path, MOST_BYTES, 'utf-8-sig'), newline=''))
+        reader = csv.DictReader(io.StringIO(read_text(path, MAX_BYTES, 'utf-8-sig'), newline=''))
         names = [SYNONYMS.get(name.strip().lower(), name.strip().lower()) for name in reader.fieldnames or ()]
         reader.fieldnames = names
         rows: list[tuple[int, Mapping[str, str]]] = [(reader.line_num, row) for row in reader]

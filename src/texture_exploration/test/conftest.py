@@ -6,7 +6,7 @@ import pytest
 
 from texture_core.exploration import ExplorationRequest
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.exploration import Exploration, hear_nothing
+from texture_exploration.exploration import Exploration, no_signal_watch
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
@@ -33,7 +33,7 @@ class Table:
         self.exploration = None
         self.asleep_ns = 0
         self.late_ns = 0  # delay of what the arm tells
-        self.silence = hear_nothing
+        self.signal_fault = no_signal_watch
         self.when = {}  # what to do at the third state of a phase
 
     def sleep(self):
@@ -58,7 +58,7 @@ class Table:
             limits=self.limits,
             clock=lambda: self.now_ns + self.late_ns,
             on_state=self.on_state,
-            silence=self.silence,
+            signal_fault=self.signal_fault,
         )
         return self.exploration.run(self.pace)
 

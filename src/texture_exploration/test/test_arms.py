@@ -90,7 +90,7 @@ def test_a_command_out_of_range_is_refused_and_the_arm_stands_still(arm):
     assert arm.state().fault == ''
 
 
-def test_closing_twice_and_connecting_again_is_no_trouble(arm):
+def test_closing_twice_and_connecting_again_is_no_fault(arm):
     arm.close()
     arm.close()
     arm.connect()

@@ -5,7 +5,7 @@ import pytest
 from texture_core.errors import MotionRefused
 from texture_core.exploration import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.motions.circular import Circle, circular
+from texture_exploration.motions.circular import CircularPath, circular
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -20,11 +20,11 @@ class LateArm(SimulatedArm):
         self._coming = []
 
     def step(self, dt_s):
-        self._coming.append(self._order)
-        newest = self._order
-        self._order = self._coming.pop(0) if len(self._coming) > 2 else self._coming[0]
+        self._coming.append(self._last_command)
+        newest = self._last_command
+        self._last_command = self._coming.pop(0) if len(self._coming) > 2 else self._coming[0]
         super().step(dt_s)
-        self._order = newest
+        self._last_command = newest
 
 
 def sliding(table):
@@ -52,7 +52,7 @@ def test_the_slide_begins_at_the_start_angle_and_makes_its_turns(table, degrees)
 
 
 def test_the_path_is_a_circle_and_its_direction_the_tangent():
-    circle = Circle(0.02, 1.0, 0.0)
+    circle = CircularPath(0.02, 1.0, 0.0)
     assert circle.length_m == pytest.approx(0.04 * math.pi)
     assert circle.place(circle.length_m / 4) == pytest.approx((-0.02, 0.02))
     assert math.cos(circle.direction_rad(circle.length_m / 4)) == pytest.approx(-1.0)

@@ -33,7 +33,7 @@ def test_a_command_out_of_range_is_refused_after_the_arm_was_stopped(name):
     assert stops == ['stop']
 
 
-def test_the_sentence_tells_what_came_and_what_is_allowed():
+def test_the_sentence_reports_what_came_and_what_is_allowed():
     with pytest.raises(CommandRefused, match=r'the speed along the normal is -5 m/s; allowed is -0\.5 to 0\.5 m/s$'):
         LIMITS.check(ArmCommand(normal_m_s=-5.0))
 

@@ -65,7 +65,7 @@ def test_a_surface_that_is_lost_in_the_slide_aborts_with_its_reason(make_logged_
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
 
 
-def test_no_state_without_contact_promises_anything_and_no_window_is_cut_from_air(make_logged_table):
+def test_no_state_without_contact_guarantees_anything_and_no_window_is_cut_from_air(make_logged_table):
     table = make_logged_table(DROP)
     table.explore(REQUEST)
     assert min(state.force_n for state in sliding(table)) < 0.1

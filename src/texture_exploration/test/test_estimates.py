@@ -1,7 +1,7 @@
 import threading
 
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
-from texture_exploration.estimates import CertaintyParams, Estimates
+from texture_exploration.estimates import EarlyStoppingParams, ExplorationEstimates
 
 
 def texture(**values):
@@ -9,16 +9,16 @@ def texture(**values):
 
 
 def test_a_known_texture_of_which_its_model_is_certain_ends_the_slide_if_it_is_confident_enough():
-    params = CertaintyParams(certain_confidence=0.9)
-    assert params.certain(texture(confidence=0.95, certain=True))
-    assert not params.certain(texture(confidence=0.95))
-    assert not params.certain(texture(confidence=0.85, certain=True))
-    assert not params.certain(texture(confidence=0.95, certain=True, known=False))
-    assert not params.certain(texture(certain=True))  # confidence unknown
+    params = EarlyStoppingParams(min_confidence=0.9)
+    assert params.may_stop(texture(confidence=0.95, decided=True))
+    assert not params.may_stop(texture(confidence=0.95))
+    assert not params.may_stop(texture(confidence=0.85, decided=True))
+    assert not params.may_stop(texture(confidence=0.95, decided=True, known=False))
+    assert not params.may_stop(texture(decided=True))  # confidence unknown
 
 
 def test_the_final_estimate_ends_the_waiting():
-    estimates = Estimates('one')
+    estimates = ExplorationEstimates('one')
     later = threading.Timer(0.05, estimates.update, [texture(final=True)])
     later.start()
     assert estimates.wait_until_final(['texture'], timeout_s=10.0)
@@ -26,7 +26,7 @@ def test_the_final_estimate_ends_the_waiting():
 
 
 def test_without_a_final_estimate_the_newest_stays():
-    estimates = Estimates('one')
+    estimates = ExplorationEstimates('one')
     estimates.update(texture(windows=2))
     estimates.update(RoughnessEstimate(1, 'one', final=True))
     assert estimates.wait_until_final(['roughness'], timeout_s=0.0)
@@ -35,6 +35,6 @@ def test_without_a_final_estimate_the_newest_stays():
 
 
 def test_nobody_waits_any_longer_once_it_is_given_up():
-    estimates = Estimates('one')
-    estimates.give_up()
+    estimates = ExplorationEstimates('one')
+    estimates.cancel()
     assert not estimates.wait_until_final(['texture'], timeout_s=60.0)

@@ -76,7 +76,7 @@ def test_a_slide_that_was_over_before_it_was_seen_is_no_success(table):
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
 
 
-def test_a_fault_of_the_arm_aborts_and_is_told(table):
+def test_a_fault_of_the_arm_aborts_and_is_reported(table):
     table.when[Phase.SLIDE] = lambda: table.arm.fail('protective stop')
     assert 'the arm reports a fault: protective stop' in table.explore().message
 
@@ -130,7 +130,7 @@ def test_states_come_fifty_times_a_second_and_carry_who_and_what(table):
 @pytest.mark.parametrize('phase', MOVING)
 def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase):
     watch = SignalWatch(0.12, lambda: table.now_ns)
-    table.silence, hear = watch.silence, watch.heard
+    table.signal_fault, hear = watch.signal_fault, watch.on_samples
     fell_silent = []
 
     go_on = table.pace
@@ -157,12 +157,12 @@ def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase)
 def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
     watch = SignalWatch(0.12, lambda: table.now_ns)
 
-    def silence(awake_ns):
-        told = watch.silence(awake_ns)
-        watch.heard()
+    def signal_fault(awake_ns):
+        told = watch.signal_fault(awake_ns)
+        watch.on_samples()
         return told
 
-    table.silence = silence
+    table.signal_fault = signal_fault
     table.when[Phase.SLIDE] = table.sleep
     assert table.explore().success
 
@@ -171,7 +171,7 @@ def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
 HAPPENINGS = {
     'a stop': (lambda table: table.exploration.stop('stopped on request'), 0.02),
     'a force above the limit': (lambda table: table.arm.push(20.0), 0.02),
-    'a shove out of the workspace': (lambda table: table.arm.shove((0.3, 0.0, 0.0)), 0.02),
+    'a shove out of the workspace': (lambda table: table.arm.displace((0.3, 0.0, 0.0)), 0.02),
     'an arm that hangs': (lambda table: table.arm.freeze(), 0.15),
     'an arm in a protective stop': (lambda table: table.arm.fail('protective stop'), 0.02),
 }

@@ -25,7 +25,7 @@ def graph():
 def test_every_motion_of_a_preset_is_made_and_the_node_ends(graph, tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text(PRESET)
-    quick = {'start_height_m': 0.002, 'stale_s': 2.0, 'watch_signal': False}
+    quick = {'start_height_m': 0.002, 'state_timeout_s': 2.0, 'watch_signal': False}
     explorer = ExplorerNode(parameter_overrides=[Parameter(name, value=value) for name, value in quick.items()])
     ended = threading.Event()
     asker = graph.add(partial(ExplorePreset, ended.set), preset=str(path), surface='cork', repeats=1)
@@ -40,10 +40,10 @@ def test_every_motion_of_a_preset_is_made_and_the_node_ends(graph, tmp_path):
         executor.shutdown()
         thread.join()
         explorer.destroy_node()
-    assert not asker.all_well
+    assert not asker.all_succeeded
     assert dict(asker.counts) == {'done': 2, 'aborted': 0, 'refused': 1}
 
 
-def test_an_unknown_preset_is_told_with_the_nearest_name(graph):
+def test_an_unknown_preset_is_reported_with_the_nearest_name(graph):
     with pytest.raises(UnknownName, match="did you mean 'hu'"):
         graph.add(ExplorePreset, preset='huu')

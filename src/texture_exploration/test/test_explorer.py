@@ -16,7 +16,7 @@ DEADLINE_S = 20.0
 def explorer():
     arm = SimulatedArm(SimulatedArmParams(start_height_m=0.002))
     # A busy machine may hold the threads up; this is about who may begin, not about time.
-    explorer = Explorer(arm, TouchParams(), SafetyLimits(stale_s=2.0), lambda state: None)
+    explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=2.0), lambda state: None)
     explorer.connect()
     yield explorer
     explorer.close()
@@ -52,7 +52,7 @@ def test_stopping_lifts_the_finger(explorer):
 
 def test_an_arm_that_failed_is_connected_again_by_the_next_request(explorer):
     explorer.arm.fail('protective stop')
-    assert explorer.trouble() == 'the arm reports a fault: protective stop'
+    assert explorer.fault() == 'the arm reports a fault: protective stop'
     exploration = explorer.begin('one', QUICK)
     assert exploration.ended.wait(DEADLINE_S)
     assert exploration.outcome.success, exploration.outcome.message
@@ -61,7 +61,7 @@ def test_an_arm_that_failed_is_connected_again_by_the_next_request(explorer):
 def test_recovering_frees_a_failed_arm_but_not_in_the_middle_of_an_exploration(explorer):
     explorer.arm.fail('protective stop')
     explorer.recover()
-    assert explorer.trouble() == ''
+    assert explorer.fault() == ''
     explorer.begin('one', SLOW)
     with pytest.raises(MotionRefused, match="'one' is still running"):
         explorer.recover()
@@ -73,12 +73,12 @@ def test_an_arm_recovers_in_its_own_way_if_it_knows_one(explorer):
             self.recovered = True
             self.connect()
 
-    wise = Explorer(Wise(), TouchParams(), SafetyLimits(stale_s=2.0), lambda state: None)
+    wise = Explorer(Wise(), TouchParams(), SafetyLimits(state_timeout_s=2.0), lambda state: None)
     wise.connect()
     wise.arm.fail('protective stop')
     wise.recover()
     assert wise.arm.recovered
-    assert wise.trouble() == ''
+    assert wise.fault() == ''
     wise.close()
 
 
@@ -103,4 +103,4 @@ def test_an_arm_that_cannot_be_reached_refuses_in_a_sentence():
     explorer = Explorer(LostArm(), TouchParams(), SafetyLimits(), lambda state: None)
     with pytest.raises(MotionRefused, match='the arm is not ready: the arm does not answer'):
         explorer.begin('one', QUICK)
-    assert explorer.trouble() == 'not connected'
+    assert explorer.fault() == 'not connected'

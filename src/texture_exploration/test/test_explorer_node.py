@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
 from texture_core.estimates import TextureEstimate
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import ESTIMATE_QOS, STATE_QOS
@@ -69,7 +69,7 @@ class World:
     """An explorer and a client in one executor."""
 
     def __init__(self, **parameters):
-        values = {'start_height_m': 0.002, 'stale_s': 1.0, 'watch_signal': False, **parameters}
+        values = {'start_height_m': 0.002, 'state_timeout_s': 1.0, 'watch_signal': False, **parameters}
         overrides = [Parameter(name, value=value) for name, value in values.items()]
         self.explorer = ExplorerNode(parameter_overrides=overrides)
         self.client = Client()
@@ -245,7 +245,7 @@ def test_an_arm_in_a_protective_stop_is_recovered_by_a_service(world):
     assert world.result(world.call(**QUICK)).success
 
 
-def test_the_action_tells_how_it_goes(world):
+def test_the_action_reports_how_it_goes(world):
     goal = world.goal(**{**QUICK, 'distance_m': 0.06})
     result = world.result(goal.get_result_async())
     assert result.status == GoalStatus.STATUS_SUCCEEDED
@@ -278,14 +278,14 @@ def test_a_refused_goal_ends_aborted_with_a_sentence(world):
 
 
 def cork(state, **values):
-    known = {'label': 'cork', 'known': True, 'confidence': 0.99, 'certain': True, 'windows': 5}
+    known = {'label': 'cork', 'known': True, 'confidence': 0.99, 'decided': True, 'windows': 5}
     return TextureEstimate(to_ns(state.header.stamp), state.exploration_id, **{**known, **values})
 
 
 def test_a_certain_texture_ends_the_slide_early(world):
     publisher = world.client.estimate(lambda state: cork(state, final=state.phase in ('lift', 'done')))
     world.until(publisher.get_subscription_count)
-    response = world.result(world.call(**SLOW, stop_when_certain=True))
+    response = world.result(world.call(**SLOW, early_stopping=True))
     assert response.success
     assert response.message == "ended early: 'cork' is certain with 0.99 after 5 windows"
     assert (response.texture.label, response.texture.final) == ('cork', True)

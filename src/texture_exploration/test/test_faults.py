@@ -62,7 +62,7 @@ def lose(motor):
 
 # Robot, module it needs, what happens, how it is mended, what is told, and how soon at most.
 FAULTS = {
-    'ur freezes': (ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.thaw, 'silent|not answered', 0.15),
+    'ur freezes': (ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.resume, 'silent|not answered', 0.15),
     'ur dies': (ur, 'rtde_control', ControllerProcess.stop, ControllerProcess.start, 'lost|silent|not answered', 0.15),
     'ur stops protectively': (
         ur, 'rtde_control', lambda c: c.ask('emulate protective stop'), nothing, 'protective stop', 0.1,
@@ -70,7 +70,8 @@ FAULTS = {
     'ur is stopped by hand': (ur, 'rtde_control', lambda c: c.ask('stop'), nothing, 'its control program', 0.1),
     'rails lose their cable': (rails, 'serial', EmulatedRails.unplug, EmulatedRails.plug, 'cannot be reached', 0.1),
     'rails fall silent': (
-        rails, 'serial', lambda r: setattr(r, 'mute', True), lambda r: setattr(r, 'mute', False), 'not answered', 0.15,
+        rails, 'serial', lambda r: setattr(r, 'silent', True),
+        lambda r: setattr(r, 'silent', False), 'not answered', 0.15,
     ),
     'rails meet something': (
         rails,
@@ -100,13 +101,13 @@ def explored(explorer, request, on_slide=None):
 
 
 @pytest.mark.parametrize('name', FAULTS)
-def test_a_fault_in_the_slide_is_told_in_time_and_the_next_exploration_works(name, tmp_path, record_property):
+def test_a_fault_in_the_slide_is_reported_in_time_and_the_next_exploration_works(name, tmp_path, record_property):
     robot, module, happens, mended, told, soon_s = FAULTS[name]
     pytest.importorskip(module)
     with ExitStack() as open_now:
         device, arm, request = open_now.enter_context(robot(tmp_path))
         # On a busy machine, too, the motor that is silent shall be named.
-        limits = SafetyLimits(stale_s=0.4) if robot is hand else SafetyLimits()
+        limits = SafetyLimits(state_timeout_s=0.4) if robot is hand else SafetyLimits()
         explorer = Explorer(arm, TOUCH, limits, lambda state: None)
         open_now.callback(explorer.close)
         explorer.connect()
@@ -124,7 +125,7 @@ def test_a_fault_in_the_slide_is_told_in_time_and_the_next_exploration_works(nam
         mended(device)
         if 'protective' in told:
             explorer.recover()  # all others are mended by the next request
-        explorer.limits = SafetyLimits(stale_s=1.0)
+        explorer.limits = SafetyLimits(state_timeout_s=1.0)
         again, _ = explored(explorer, request)
         assert again.outcome.success, again.outcome.message
 
@@ -138,7 +139,8 @@ from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 name, parameters, request = sys.argv[1], eval(sys.argv[2]), eval(sys.argv[3])
 touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.2)
-explorer = Explorer(ARMS[name](ARMS[name].Params(**parameters)), touch, SafetyLimits(stale_s=1.0), lambda state: None)
+limits = SafetyLimits(state_timeout_s=1.0)
+explorer = Explorer(ARMS[name](ARMS[name].Params(**parameters)), touch, limits, lambda state: None)
 explorer.connect()
 explorer.begin('one', ExplorationRequest(**request)).ended.wait()
 """
@@ -197,7 +199,7 @@ def test_when_the_explorer_is_killed_in_the_slide_the_robot_stops_by_itself(name
         record_property('stopped_s', moved_s - begin_s)
         print(f'{name} stopped {1e3 * (moved_s - begin_s):.0f} ms after the death of the explorer')
         assert moved_s - begin_s < soon_s + BUSY_S
-        again = Explorer(arm, TOUCH, SafetyLimits(stale_s=1.0), lambda state: None)
+        again = Explorer(arm, TOUCH, SafetyLimits(state_timeout_s=1.0), lambda state: None)
         again.connect()
         assert explored(again, next_request)[0].outcome.success
         again.close()

@@ -7,10 +7,10 @@ import pytest
 
 from texture_core.errors import InvalidParameter
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
-from texture_exploration.force_control import Feeling, ForceController, ForceLoop, ForceLoopParams
+from texture_exploration.force_control import ContactState, ForceController, ForceLoop, ForceLoopParams
 from texture_exploration.lag import LagEstimate
 from texture_exploration.slope_observer import SlopeObserver
-from texture_exploration.stability import growth
+from texture_exploration.stability import spectral_radius
 from texture_exploration.stiffness import StiffnessEstimate
 
 PERIOD_S = 0.004
@@ -36,27 +36,27 @@ def test_a_lag_is_not_measured_on_an_arm_that_was_still_moving():
 @pytest.mark.parametrize('stiffness', [100.0, 1e3, 1e4, 1e5])
 @pytest.mark.parametrize('delay', [0.0, 0.005, 0.02])
 def test_the_chosen_gain_is_stable_with_twice_the_stiffness_or_twice_the_delay(stiffness, delay):
-    gain = ForceLoopParams(loop_delay_s=delay).best_gain(stiffness, PERIOD_S)
-    for params, felt in [
+    gain = ForceLoopParams(loop_delay_s=delay).default_gain(stiffness, PERIOD_S)
+    for params, estimated_n_m in [
         (ForceLoopParams(loop_delay_s=delay), 2 * stiffness),
         (ForceLoopParams(loop_delay_s=2 * delay), stiffness),
     ]:
-        assert growth(params.loop(felt, PERIOD_S, gain)) < 1.0
+        assert spectral_radius(params.loop(estimated_n_m, PERIOD_S, gain)) < 1.0
 
 
 def test_an_unstable_gain_is_refused_with_one_that_would_do():
-    params = SimulatedArmParams(force_mode=False, force_gain_m_s_n=0.1, stiffest_n_m=20000.0, loop_delay_s=0.01)
+    params = SimulatedArmParams(force_mode=False, force_gain_m_s_n=0.1, max_stiffness_n_m=20000.0, loop_delay_s=0.01)
     with pytest.raises(
         InvalidParameter, match=r"'force_gain_m_s_n' is 0\.1; .* unstable from (\S+) m/s/N on; choose"
     ) as told:
         SimulatedArm(params, own_thread=False)
     advised = float(str(told.value).rsplit('choose ', 1)[1].split(',')[0])
     SimulatedArm(
-        SimulatedArmParams(force_mode=False, force_gain_m_s_n=advised, stiffest_n_m=20000.0, loop_delay_s=0.01)
+        SimulatedArmParams(force_mode=False, force_gain_m_s_n=advised, max_stiffness_n_m=20000.0, loop_delay_s=0.01)
     )
 
 
-def test_the_stiffness_is_felt_from_the_rise_of_the_force():
+def test_the_stiffness_is_measured_from_the_rise_of_the_force():
     estimate = StiffnessEstimate()
     for depth in np.linspace(0.0, 4e-4, 8):
         estimate.update(0.003 - depth, 1500.0 * depth)
@@ -71,28 +71,28 @@ def test_a_limited_speed_does_not_wind_up():
 
 
 def test_the_observer_sees_a_slope_at_once_when_the_speed_changes():
-    observer, way = SlopeObserver(ahead_s=0.01), 0.0
+    observer, travelled = SlopeObserver(ahead_s=0.01), 0.0
     for step in range(200):
         speed = 0.05 * step / 200
-        way += speed * PERIOD_S
-        rise = observer.update(way, 0.1 * way, speed, noise_m=1e-6)
+        travelled += speed * PERIOD_S
+        rise = observer.update(travelled, 0.1 * travelled, speed, noise_m=1e-6)
     assert rise == pytest.approx(0.1 * speed, rel=0.02)
 
 
 def test_the_observer_sees_where_a_bend_leads():
     observer, ahead_m = SlopeObserver(ahead_s=0.01), 0.05 * 0.01
-    for way in np.arange(40) * 2e-4:
-        rise = observer.update(way, 5.0 * way**2, 0.05, noise_m=1e-9)
-    assert rise == pytest.approx(0.05 * 2 * 5.0 * (way + ahead_m), rel=0.01)
+    for travelled in np.arange(40) * 2e-4:
+        rise = observer.update(travelled, 5.0 * travelled**2, 0.05, noise_m=1e-9)
+    assert rise == pytest.approx(0.05 * 2 * 5.0 * (travelled + ahead_m), rel=0.01)
 
 
 def test_a_finger_at_rest_is_pressed_on_no_faster_than_the_stiffest_base_allows():
-    params = ForceLoopParams(loop_delay_s=0.008, stiffest_n_m=20000.0)
+    params = ForceLoopParams(loop_delay_s=0.008, max_stiffness_n_m=20000.0)
     loop, height_m, force_n = ForceLoop(params, PERIOD_S), 0.0, 0.05
     for _ in range(50):
-        feeling = Feeling(height_m, 0.0, force_n)
-        loop.feel(feeling)
-        speed_m_s = loop.velocity_m_s(1.0, feeling, 0.0, PERIOD_S)
+        contact = ContactState(height_m, 0.0, force_n)
+        loop.observe(contact)
+        speed_m_s = loop.velocity_m_s(1.0, contact, 0.0, PERIOD_S)
         height_m, force_n = height_m + speed_m_s * PERIOD_S, force_n - 200.0 * speed_m_s * PERIOD_S
         # 1 N on 20 kN/m within 8 ms and two periods of 4 ms.
         assert speed_m_s >= -1.0 / 20000.0 / 0.016 - 1e-12

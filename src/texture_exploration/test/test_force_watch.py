@@ -12,13 +12,13 @@ from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
-ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, stiffest_n_m=20000.0)
+ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, max_stiffness_n_m=20000.0)
 TILT = 0.1745
 
 
 def explore(make_table, arm, happens, phase, request=REQUEST):
     """Explore while something happens in a phase; return the table, the outcome, when it was, and the peak force."""
-    table = make_table(arm, TouchParams(approach_stiffness_n_m=arm.stiffest_n_m))
+    table = make_table(arm, TouchParams(approach_stiffness_n_m=arm.max_stiffness_n_m))
     happened, peak, go_on = [], [0.0], table.pace
 
     def pace():
@@ -100,7 +100,7 @@ def test_a_small_drift_is_allowed(make_table):
 
 def test_a_force_of_the_wrong_sign_is_limited_too():
     state = ArmState(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), -10.1)
-    assert SafetyLimits().too_hard(state).endswith('its sign is wrong')
+    assert SafetyLimits().force_violation(state).endswith('its sign is wrong')
 
 
 def test_a_pause_of_the_arm_is_no_frozen_reading():

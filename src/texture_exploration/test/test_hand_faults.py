@@ -16,8 +16,8 @@ from texture_core.plain_data import load_yaml
 from texture_core.resources import find_file
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.protocol import ArmCommand
-from texture_exploration.hands.dynamixel import DynamixelHand, Finger
-from texture_exploration.hands.dynamixel_bus import DynamixelBus, Motor
+from texture_exploration.hands.dynamixel import DynamixelFinger, DynamixelHand
+from texture_exploration.hands.dynamixel_bus import DynamixelBus, MotorState
 from texture_exploration.hands.profile import load_profile, read_profile
 from texture_exploration.hands.simulated import SimulatedHand
 from texture_exploration.hands.torque_guard import torque_off_packet
@@ -112,9 +112,9 @@ def test_a_failed_connection_leaves_no_motor_under_torque(bus, hand):
 
 
 @pytest.mark.filterwarnings('ignore::pytest.PytestUnhandledThreadExceptionWarning')  # it is raised on purpose
-def test_an_error_in_the_program_lets_go_and_is_told(bus, hand, monkeypatch):
+def test_an_error_in_the_program_lets_go_and_is_reported(bus, hand, monkeypatch):
     hand.connect()
-    monkeypatch.setattr(Finger, 'goals', lambda *_arguments: 1 / 0)
+    monkeypatch.setattr(DynamixelFinger, 'goals', lambda *_arguments: 1 / 0)
     until(lambda: 'error in its program (ZeroDivisionError' in fault_of(hand))
     until(lambda: torque_is_off(bus))
 
@@ -238,15 +238,15 @@ def test_a_motor_that_falls_silent_while_it_is_taken_in_does_not_end_the_others(
 
 
 def test_a_motor_that_is_back_begins_where_it_is_and_not_where_it_was_to_go():
-    finger = Finger(LEAP.fingers['index'], LEAP)
-    here = {joint.id: Motor(0.0, 0.0, 0.5) for joint in LEAP.fingers['index'].values()}
+    finger = DynamixelFinger(LEAP.fingers['index'], LEAP)
+    here = {joint.id: MotorState(0.0, 0.0, 0.5) for joint in LEAP.fingers['index'].values()}
     finger.measure(here)
     for _ in range(100):
         goals = finger.goals(ArmCommand(tangential_m_s=(0.0, 0.05)), 0.01)
     assert goals[2][1] == pytest.approx(0.7)  # 0.2 rad ahead, as the motor does not follow
     finger.measure({motor: one for motor, one in here.items() if motor != 2})
     assert 2 not in finger.goals(ArmCommand(), 0.01)
-    finger.measure({**here, 2: Motor(0.0, 0.0, 0.45)})
+    finger.measure({**here, 2: MotorState(0.0, 0.0, 0.45)})
     assert finger.goals(ArmCommand(), 0.01)[2][1] == pytest.approx(0.45)
 
 
@@ -260,7 +260,7 @@ def test_a_second_program_on_the_bus_is_refused_and_disturbs_nothing(bus, hand):
     until(lambda: all(table[TORQUE] for table in bus.motors.tables.values()))
 
 
-def test_two_motors_with_one_id_are_told(bus, hand):
+def test_two_motors_with_one_id_are_reported(bus, hand):
     bus.motors.twice = {5}
     hand.connect()
     assert "motor 5 ('press' of middle) answers with what cannot be read: is its id given to two motors" in fault_of(
@@ -268,7 +268,7 @@ def test_two_motors_with_one_id_are_told(bus, hand):
     )
 
 
-def test_an_adapter_as_it_is_delivered_is_told_as_too_slow(bus, hand):
+def test_an_adapter_as_it_is_delivered_is_reported_as_too_slow(bus, hand):
     hand.connect()
     assert hand.warning() == ''
     bus.latency_s = 0.016
@@ -276,7 +276,7 @@ def test_an_adapter_as_it_is_delivered_is_told_as_too_slow(bus, hand):
     until(lambda: fault_of(hand) == '')
 
 
-def test_firmware_whose_watchdog_is_known_not_to_stop_the_motor_is_told(bus, hand):
+def test_firmware_whose_watchdog_is_known_not_to_stop_the_motor_is_reported(bus, hand):
     bus.motors.tables[3][6] = bus.motors.tables[5][6] = 51
     hand.connect()
     assert hand.warning().startswith('the watchdog of motors 3, 5 may not stop them')
@@ -291,7 +291,7 @@ def test_a_motor_with_a_latched_error_can_be_rebooted(bus, hand):
     assert torque_is_off(bus)
 
 
-def test_an_error_that_a_reboot_does_not_clear_is_told(bus, hand, monkeypatch):
+def test_an_error_that_a_reboot_does_not_clear_is_reported(bus, hand, monkeypatch):
     monkeypatch.setattr('texture_exploration.hands.dynamixel_bus.RESTART_S', 0.2)
     monkeypatch.setattr(bus.motors, 'reboot', lambda _motor: None)
     bus.motors.fail(1, OVERLOAD)

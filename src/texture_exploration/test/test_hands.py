@@ -20,7 +20,7 @@ from texture_exploration.hands.simulated import SimulatedHand
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
-from texture_simulation.devices.dynamixel_motors import DynamixelMotors, Pressing
+from texture_simulation.devices.dynamixel_motors import DynamixelMotors, PressingMotor
 
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')
@@ -40,7 +40,7 @@ def until(condition):
 
 def motors_of(profile, stiffness=2000.0):
     presses = [joints['press'] for joints in profile.fingers.values()]
-    pressing = {joint.id: Pressing(joint.lever_m, profile.start_height_m) for joint in presses}
+    pressing = {joint.id: PressingMotor(joint.lever_m, profile.start_height_m) for joint in presses}
     return DynamixelMotors(list(profile.ids), pressing, stiffness)
 
 
@@ -62,7 +62,9 @@ def rub(arm):
         if state.phase is Phase.SLIDE:
             forces.append({name: tip.force_n for name, tip in arm.hand.state().fingers.items()})
 
-    explorer = Explorer(arm, TouchParams(speed_tolerance=0.3, force_tolerance=0.2), SafetyLimits(stale_s=1.0), note)
+    explorer = Explorer(
+        arm, TouchParams(speed_tolerance=0.3, force_tolerance=0.2), SafetyLimits(state_timeout_s=1.0), note
+    )
     explorer.connect()
     request = ExplorationRequest('in_hand_sliding', speed_m_s=0.02, duration_s=1.5)
     exploration = explorer.begin('one', request)
@@ -91,7 +93,7 @@ def test_a_finger_that_loses_the_object_is_a_fault_that_names_it():
     arm.close()
 
 
-def test_an_unknown_finger_set_is_told_with_the_nearest():
+def test_an_unknown_finger_set_is_reported_with_the_nearest():
     with pytest.raises(UnknownName, match="did you mean 'kaboli-train'"):
         InHandArm(InHandParams(finger_set='kaboli-trane'))
 
@@ -103,7 +105,7 @@ def test_every_shipped_profile_can_be_read():
     assert LEAP.table['goal_position'] == (116, 4)
 
 
-def test_a_broken_profile_is_told(tmp_path):
+def test_a_broken_profile_is_reported(tmp_path):
     path = tmp_path / 'mine.yaml'
     path.write_text('models: [1]\n')
     with pytest.raises(InvalidParameter, match="hand profile 'mine' cannot be read"):
@@ -154,8 +156,8 @@ def test_motors_that_do_not_answer_are_let_go_too(bus):
 def test_a_late_answer_to_an_earlier_question_is_not_taken_for_a_measurement(bus):
     line = DynamixelBus(str(bus.port.link), LEAP)
     line.start()
-    late, hear = [bus._status(LEAP.ids[0], bytes(1))], bus.hear  # one byte, as of its register of errors
-    bus.hear = lambda data: (late.pop() if late else b'') + hear(data)
+    late, receive = [bus._status(LEAP.ids[0], bytes(1))], bus.receive  # one byte, as of its register of errors
+    bus.receive = lambda data: (late.pop() if late else b'') + receive(data)
     assert line.read() == {}
     assert line.missing == set()
     assert set(line.read()) == set(LEAP.ids)
@@ -191,7 +193,7 @@ def test_a_motor_that_reports_an_error_is_named_and_may_let_go(bus, torque_off):
 
 
 @needs_sdk
-def test_an_unplugged_hand_is_told_and_can_be_connected_again(bus):
+def test_an_unplugged_hand_is_reported_and_can_be_connected_again(bus):
     hand = DynamixelHand('leap', str(bus.port.link))
     hand.connect()
     bus.unplug()
@@ -206,7 +208,7 @@ def test_an_unplugged_hand_is_told_and_can_be_connected_again(bus):
 
 
 @needs_sdk
-def test_a_hand_of_another_model_or_without_power_is_told(bus):
+def test_a_hand_of_another_model_or_without_power_is_reported(bus):
     with pytest.raises(DeviceError, match=r"is of model 1240 .*; the profile 'xm430' is for"):
         DynamixelHand('xm430', str(bus.port.link)).connect()
     bus.motors.absent = set(LEAP.ids)

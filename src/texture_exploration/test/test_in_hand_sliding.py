@@ -24,7 +24,7 @@ def test_two_seconds_of_sliding_stay_within_the_stroke(table):
     assert max(along) == pytest.approx(0.02, abs=0.0005)
 
 
-def test_nothing_is_promised_for_a_turn(table):
+def test_nothing_is_guaranteed_for_a_turn(table):
     table.explore(RUB)
     promised = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
     slow = [s.stamp_ns for s, _ in sliding(table) if abs(s.speed_m_s - 0.02) > 0.0005]

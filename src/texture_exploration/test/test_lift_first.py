@@ -32,7 +32,7 @@ def lifting_first(monkeypatch):
 
 
 def test_a_finger_that_presses_is_free_before_it_comes_down_again(table, lifting_first):
-    table.arm.shove((0.0, 0.0, -0.0115))  # pressed by 1.5 mm: 3 N
+    table.arm.displace((0.0, 0.0, -0.0115))  # pressed by 1.5 mm: 3 N
     outcome = table.explore(REQUEST)
     assert outcome.success, outcome.message
     assert table.phases == [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT, Phase.DONE]
@@ -74,7 +74,7 @@ class Watched:
     def __init__(self):
         arm = SimulatedArm(SimulatedArmParams(start_height_m=0.002))
         self.heights = []
-        self.explorer = Explorer(arm, TOUCH, SafetyLimits(stale_s=2.0), self.on_state)
+        self.explorer = Explorer(arm, TOUCH, SafetyLimits(state_timeout_s=2.0), self.on_state)
         self.explorer.connect()
 
     def on_state(self, state):

@@ -44,7 +44,7 @@ def test_the_finger_goes_where_it_was_pointed(table):
     assert table.first(Phase.SLIDE)[0].direction_rad == math.pi / 2
 
 
-def test_what_a_slide_promises_it_keeps(table):
+def test_what_a_slide_guarantees_it_keeps(table):
     table.explore()
     end_ns = table.first(Phase.LIFT)[0].stamp_ns
     sliding = [state for state in table.states if state.phase is Phase.SLIDE]

@@ -4,8 +4,8 @@ from itertools import pairwise
 import pytest
 
 from texture_exploration.arms.protocol import ArmState
-from texture_exploration.motions.circular import Circle
-from texture_exploration.motions.linear_slide import Line
+from texture_exploration.motions.circular import CircularPath
+from texture_exploration.motions.linear_slide import StraightPath
 from texture_exploration.motions.path import PathFollower, ramp_s, ramps_m, smooth
 
 
@@ -18,14 +18,14 @@ def follow(path, places):
 
 def test_the_way_along_a_circle_is_its_arc():
     angles = [2 * math.pi * k / 500 for k in range(501)]
-    follower = follow(Circle(0.02, 8.0, 0.0), [(0.02 * math.cos(a), 0.02 * math.sin(a)) for a in angles])
+    follower = follow(CircularPath(0.02, 8.0, 0.0), [(0.02 * math.cos(a), 0.02 * math.sin(a)) for a in angles])
     assert follower.travelled_m == pytest.approx(2 * math.pi * 0.02, rel=1e-3)
     assert follower.velocity(1e-4) == pytest.approx((0.0, 1e-4), abs=1e-6)
 
 
 def test_a_finger_that_trembles_across_its_path_does_not_get_ahead():
     trembling = [(0.0, 0.0), (0.01, 0.0), (-0.01, 0.0)] * 100 + [(0.0, 0.005)]
-    assert follow(Line(1.0, math.pi / 2), trembling).travelled_m == pytest.approx(0.005, rel=1e-3)
+    assert follow(StraightPath(1.0, math.pi / 2), trembling).travelled_m == pytest.approx(0.005, rel=1e-3)
 
 
 def test_a_ramp_keeps_to_the_acceleration_and_takes_half_the_speed_in_the_mean():
@@ -43,7 +43,7 @@ def test_a_ramp_is_flat_outside():
 
 
 def test_a_finger_beside_its_path_is_led_back_at_the_same_speed():
-    follower = follow(Line(1.0, 0.0), [(0.0, 0.0), (0.01, 0.001)])
+    follower = follow(StraightPath(1.0, 0.0), [(0.0, 0.0), (0.01, 0.001)])
     vx, vy = follower.velocity(0.1)
     assert vy == pytest.approx(-0.015)  # 15 /s of 1 mm
     assert math.hypot(vx, vy) == pytest.approx(0.1)

@@ -41,7 +41,7 @@ TOLD = {
 
 
 @pytest.mark.parametrize('name', TOLD)
-def test_a_preset_holds_what_its_paper_tells(name):
+def test_a_preset_holds_what_its_paper_reports(name):
     preset, told = load_preset(name), dict(TOLD[name])
     assert preset.repeats == told.pop('repeats')
     for key, values in told.items():
@@ -55,7 +55,7 @@ def test_rounds_go_through_all_headings_before_they_repeat():
     assert headings == pytest.approx([0, 30, 45, 90] * 2)
 
 
-def test_a_mistake_in_a_preset_is_told_with_its_place():
+def test_a_mistake_in_a_preset_is_reported_with_its_place():
     slide = {'motion': 'linear_slide'}
     with pytest.raises(UnknownName, match="did you mean 'ets-linear'"):
         load_preset('ets-linea')

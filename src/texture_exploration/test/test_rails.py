@@ -10,7 +10,7 @@ import pytest
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ExplorationRequest
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_core.framing import Frame, pack, unpack
 from texture_core.parameters import markdown_table
 from texture_exploration.arms import rails_tables as tables
@@ -84,7 +84,7 @@ def test_something_in_the_way_is_a_fault(rails, arm):
 
 def test_an_exploration_on_the_rails_slides_as_in_the_paper(rails, arm):
     states = []
-    explorer = Explorer(arm, TouchParams(), SafetyLimits(stale_s=1.0), states.append)
+    explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=1.0), states.append)
     explorer.connect()
     request = ExplorationRequest('linear_slide', speed_m_s=0.0255, force_n=1.5, distance_m=0.02)
     exploration = explorer.begin('one', request)
@@ -103,7 +103,7 @@ def test_bytes_lost_on_the_line_are_counted_and_survived(rails, arm):
     until(lambda: arm.state().time_ns > before)
 
 
-def test_unplugged_rails_are_told_and_can_be_connected_again(rails, arm):
+def test_unplugged_rails_are_reported_and_can_be_connected_again(rails, arm):
     rails.unplug()
     with pytest.raises(DeviceError, match='cannot be reached'):
         until(lambda: not arm.state())
@@ -116,13 +116,13 @@ def test_unplugged_rails_are_told_and_can_be_connected_again(rails, arm):
     assert arm.state().fault == ''
 
 
-def test_a_silent_device_is_told(rails):
-    rails.mute = True
+def test_a_silent_device_is_reported(rails):
+    rails.silent = True
     with pytest.raises(DeviceError, match='sends no state of rails'):
         RailsArm(RailsParams(device=str(rails.port.link))).connect()
 
 
-def test_the_bench_is_told_where_the_finger_is(tmp_path):
+def test_the_bench_is_reported_where_the_finger_is(tmp_path):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
         bench.bind(('127.0.0.1', 0))
         bench.settimeout(DEADLINE_S)

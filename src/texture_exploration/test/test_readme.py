@@ -4,7 +4,7 @@ import pytest
 
 from texture_core.parameters import markdown_table
 from texture_exploration.arms.simulated import SimulatedArmParams
-from texture_exploration.estimates import CertaintyParams
+from texture_exploration.estimates import EarlyStoppingParams
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
@@ -13,7 +13,9 @@ from texture_exploration.signal_watch import SignalWatchParams
 README = (Path(__file__).parent.parent / 'README.md').read_text()
 
 
-@pytest.mark.parametrize('params', [SimulatedArmParams, TouchParams, SafetyLimits, CertaintyParams, SignalWatchParams])
+@pytest.mark.parametrize(
+    'params', [SimulatedArmParams, TouchParams, SafetyLimits, EarlyStoppingParams, SignalWatchParams]
+)
 def test_the_readme_lists_the_parameters_as_they_are(params):
     assert markdown_table(params) in README
 

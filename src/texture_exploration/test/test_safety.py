@@ -21,23 +21,23 @@ def test_a_limit_below_what_may_be_asked_for_is_refused():
 
 def test_a_finger_within_all_limits_violates_nothing():
     arm = ArmState(0, (0.0, 0.1, -0.001), REST, 9.9)
-    assert SafetyLimits().too_hard(arm) == SafetyLimits().outside(arm) == ''
+    assert SafetyLimits().force_violation(arm) == SafetyLimits().workspace_violation(arm) == ''
 
 
 @pytest.mark.parametrize('force', [10.1, math.nan, math.inf])
 def test_a_force_that_is_too_high_or_unknown_is_a_violation(force):
-    assert 'above the limit' in SafetyLimits().too_hard(ArmState(0, REST, REST, force))
+    assert 'above the limit' in SafetyLimits().force_violation(ArmState(0, REST, REST, force))
 
 
 def test_a_position_outside_or_unknown_is_a_violation():
-    assert SafetyLimits().outside(ArmState(0, (0.0, 0.3, 0.0), REST, 0.0)) == (
+    assert SafetyLimits().workspace_violation(ArmState(0, (0.0, 0.3, 0.0), REST, 0.0)) == (
         'the finger left the workspace: y is 0.3000 m, allowed is -0.2 to 0.2 m'
     )
-    assert 'unknown' in SafetyLimits().too_hard(ArmState(0, (0.0, 0.0, math.nan), REST, 0.0))
+    assert 'unknown' in SafetyLimits().force_violation(ArmState(0, (0.0, 0.0, math.nan), REST, 0.0))
 
 
 def test_the_room_is_the_way_to_the_nearest_wall():
     limits = SafetyLimits()
-    assert limits.room_m((0.1, 0.0, 0.0), 0.0) == pytest.approx(0.1)
-    assert limits.room_m((0.1, 0.0, 0.0), math.pi) == pytest.approx(0.3)
-    assert limits.room_m((0.0, 0.0, 0.0), math.pi / 4) == pytest.approx(0.2 * math.sqrt(2))
+    assert limits.free_distance_m((0.1, 0.0, 0.0), 0.0) == pytest.approx(0.1)
+    assert limits.free_distance_m((0.1, 0.0, 0.0), math.pi) == pytest.approx(0.3)
+    assert limits.free_distance_m((0.0, 0.0, 0.0), math.pi / 4) == pytest.approx(0.2 * math.sqrt(2))

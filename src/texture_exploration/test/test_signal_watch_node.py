@@ -13,17 +13,17 @@ from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
 pytestmark = pytest.mark.ros
 
 DEADLINE_S = 30.0
-PARAMETERS = {'watch_signal': 'true', 'start_height_m': 0.002, 'stale_s': 1.0}
+PARAMETERS = {'watch_signal': 'true', 'start_height_m': 0.002, 'state_timeout_s': 1.0}
 EXPLORER = [sys.executable, '-c', 'from texture_exploration.nodes.explorer import main; main()', '--ros-args']
 SLOW = {'motion': 'linear_slide', 'speed_m_s': 0.01, 'distance_m': 0.1}
 QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
 
 
 class Finger:
-    """A client that also plays the sensor, for as long as `feeling`."""
+    """A client that also plays the sensor, for as long as `streaming`."""
 
     def __init__(self, graph):
-        self.feeling, self.phases = True, []
+        self.streaming, self.phases = True, []
         self.until, peer = graph.until, graph.peer
         self._signal = peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
         peer.create_timer(0.01, self._feel)
@@ -31,7 +31,7 @@ class Finger:
         self._explore = peer.create_client(srv.Explore, 'explore')
 
     def _feel(self):
-        if self.feeling:
+        if self.streaming:
             self._signal.publish(msg.TactileSignal())
 
     def _on_state(self, state):
@@ -56,14 +56,14 @@ def test_a_silent_sensor_ends_the_slide_and_the_next_exploration_works(finger, r
     finger.until(finger.ready)
     answer = finger.explore(**SLOW)
     finger.until(lambda: finger.phases and finger.phases[-1][0] == 'slide')
-    finger.feeling, silent_s = False, time.monotonic()
+    finger.streaming, silent_s = False, time.monotonic()
     finger.until(lambda: finger.phases[-1][0] == 'lift')
     record_property('detected_s', finger.phases[-1][1] - silent_s)
     print(f'sensor silent: lifting after {1e3 * (finger.phases[-1][1] - silent_s):.0f} ms')
     finger.until(answer.done)
     assert not answer.result().success
     assert answer.result().message.startswith("no samples have come on 'signal' for")
-    finger.feeling = True
+    finger.streaming = True
     again = finger.explore(**QUICK)
     finger.until(again.done)
     assert again.result().success, again.result().message

@@ -4,7 +4,7 @@ import socket
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.velocity_only import HOLDS_S, DelayedVelocity
@@ -62,7 +62,7 @@ def test_an_arm_that_slept_moves_no_longer_than_a_command_holds(clock):
 
 
 def test_an_arm_without_force_mode_that_slept_goes_no_further_than_a_velocity_holds(clock):
-    arm = make(clock, force_mode=False, stiffness_n_m=20000.0, stiffest_n_m=20000.0, start_height_m=0.0005)
+    arm = make(clock, force_mode=False, stiffness_n_m=20000.0, max_stiffness_n_m=20000.0, start_height_m=0.0005)
     pressing = ArmCommand(tangential_m_s=(0.05, 0.0), force_n=1.0)
     run(arm, clock, pressing, 2.0)
     x_m, force_n = arm.state().position[0], arm.state().force_n
@@ -122,7 +122,7 @@ def test_a_closed_arm_refuses_commands(clock):
         arm.command(ArmCommand())
 
 
-def test_the_bench_is_told_where_the_finger_is(clock):
+def test_the_bench_is_reported_where_the_finger_is(clock):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
         bench.bind(('127.0.0.1', 0))
         bench.settimeout(5.0)

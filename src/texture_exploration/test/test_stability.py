@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from texture_exploration.force_control import ForceController
-from texture_exploration.stability import Loop, border_gain, growth, loop_matrix, simulated_border_gain, stability_chart
+from texture_exploration.stability import (
+    LoopModel,
+    loop_matrix,
+    simulated_stability_limit_gain,
+    spectral_radius,
+    stability_chart,
+    stability_limit_gain,
+)
 
 STIFFNESSES = [100.0, 1e3, 1e4, 1e5]
 DELAYS = [0.0, 0.003, 0.008, 0.0133, 0.02]
@@ -15,26 +22,28 @@ def controller(loop):
 
 
 def test_a_sampled_integrator_without_delay_bears_two_over_stiffness_and_period():
-    assert border_gain(Loop(1000.0, 0.0, 0.0, 0.004)) == pytest.approx(2.0 / (1000.0 * 0.004))
+    assert stability_limit_gain(LoopModel(1000.0, 0.0, 0.0, 0.004)) == pytest.approx(2.0 / (1000.0 * 0.004))
 
 
 def test_a_delay_of_many_periods_bears_half_pi_over_stiffness_and_delay():
     # The hold adds half a period to the delay.
-    assert border_gain(Loop(1000.0, 0.0, 0.1, 0.001)) == pytest.approx(0.5 * math.pi / (1000.0 * 0.1005), rel=1e-3)
+    assert stability_limit_gain(LoopModel(1000.0, 0.0, 0.1, 0.001)) == pytest.approx(
+        0.5 * math.pi / (1000.0 * 0.1005), rel=1e-3
+    )
 
 
-def test_a_delay_of_one_period_bears_the_golden_border():
+def test_a_delay_of_one_period_bears_the_golden_limit():
     # z² − z + g·k·T = 0 leaves the unit circle at g·k·T = 1.
-    assert border_gain(Loop(500.0, 0.0, 0.004, 0.004)) == pytest.approx(1.0 / (500.0 * 0.004))
+    assert stability_limit_gain(LoopModel(500.0, 0.0, 0.004, 0.004)) == pytest.approx(1.0 / (500.0 * 0.004))
 
 
 @pytest.mark.parametrize('delay', DELAYS)
-def test_the_matrix_foretells_the_running_controller_step_by_step(delay):
-    loop = Loop(2000.0, 0.01, delay, 0.004, 0.5)
+def test_the_matrix_predicts_the_running_controller_step_by_step(delay):
+    loop = LoopModel(2000.0, 0.01, delay, 0.004, 0.5)
     matrix, running = loop_matrix(loop), controller(loop)
     state = np.zeros(len(matrix))
     state[:2] = 1.0, loop.period_s
-    asked, error, foretold, measured = [0.0] * 10, 1.0, [], []
+    asked, error, predicted, measured = [0.0] * 10, 1.0, [], []
     for _ in range(20):
         asked.append(running.update(error, loop.period_s))
         share, whole = math.modf(round(delay / loop.period_s, 9))
@@ -42,23 +51,25 @@ def test_the_matrix_foretells_the_running_controller_step_by_step(delay):
         error += loop.stiffness_n_m * loop.period_s * ((1 - share) * newer + share * older)
         state = matrix @ state
         measured.append(error)
-        foretold.append(state[0])
-    assert foretold == pytest.approx(measured, abs=1e-9)
+        predicted.append(state[0])
+    assert predicted == pytest.approx(measured, abs=1e-9)
 
 
-def test_predicted_and_simulated_borders_agree_within_a_tenth():
+def test_predicted_and_simulated_limits_agree_within_a_tenth():
     chart = stability_chart(STIFFNESSES, DELAYS, controller)
     assert chart['predicted'].shape == (4, 5)
     np.testing.assert_allclose(chart['simulated'], chart['predicted'], rtol=0.1)
 
 
 def test_the_integral_part_costs_stability():
-    plain, integral = Loop(1000.0, 0.0, 0.01, 0.004), Loop(1000.0, 0.0, 0.01, 0.004, 0.05)
-    assert border_gain(integral) < border_gain(plain)
-    assert simulated_border_gain(integral, controller) == pytest.approx(border_gain(integral), rel=0.1)
+    plain, integral = LoopModel(1000.0, 0.0, 0.01, 0.004), LoopModel(1000.0, 0.0, 0.01, 0.004, 0.05)
+    assert stability_limit_gain(integral) < stability_limit_gain(plain)
+    assert simulated_stability_limit_gain(integral, controller) == pytest.approx(
+        stability_limit_gain(integral), rel=0.1
+    )
 
 
-def test_at_half_the_border_a_disturbance_dies_out_quickly():
-    loop = Loop(1000.0, 0.0, 0.01, 0.004, 0.5)
-    half = Loop(1000.0, 0.5 * border_gain(loop), 0.01, 0.004, 0.5)
-    assert growth(half) < 1.0
+def test_at_half_the_limit_a_disturbance_dies_out_quickly():
+    loop = LoopModel(1000.0, 0.0, 0.01, 0.004, 0.5)
+    half = LoopModel(1000.0, 0.5 * stability_limit_gain(loop), 0.01, 0.004, 0.5)
+    assert spectral_radius(half) < 1.0

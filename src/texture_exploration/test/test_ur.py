@@ -20,7 +20,7 @@ import pytest
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_core.parameters import markdown_table
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
@@ -42,7 +42,7 @@ needs_ur_rtde = pytest.mark.skipif(
 
 
 class Bench:
-    """The emulated controller, and the true state of its finger, as it tells the bench."""
+    """The emulated controller, and the true state of its finger, as it tells the emulator."""
 
     def __init__(self, ip):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -51,9 +51,9 @@ class Bench:
         self.ip = ip
         self.controller = ControllerProcess(UrControllerParams(ip=ip, finger_port=port, unlock_delay_s=UNLOCK_S))
         self.fingers = deque(maxlen=20000)
-        threading.Thread(target=self._listen, daemon=True).start()
+        threading.Thread(target=self._receive_commands, daemon=True).start()
 
-    def _listen(self):
+    def _receive_commands(self):
         with contextlib.suppress(OSError):
             while data := self._socket.recv(256):
                 self.fingers.append(FingerState.from_bytes(data))
@@ -181,7 +181,7 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(bench, rec
     explorer = Explorer(
         UrArm(UrArmParams(ip=bench.ip)),
         TouchParams(),
-        SafetyLimits(stale_s=1.0),  # a busy machine may hold the process up; silence is tested below
+        SafetyLimits(state_timeout_s=1.0),  # a busy machine may hold the process up; silence is tested below
         lambda state: phases.append((state.stamp_ns, state.phase)),
     )
     home = explorer.connect()
@@ -255,7 +255,7 @@ def test_a_protective_stop_is_a_fault_that_recover_clears_without_a_new_process(
 
 
 @needs_ur_rtde
-def test_connecting_releases_a_protective_stop_only_if_it_is_told_to(arm, bench):
+def test_connecting_releases_a_protective_stop_only_if_it_is_reported_to(arm, bench):
     bench.controller.ask('emulate protective stop')
     arm.close()
     with pytest.raises(DeviceError, match=r'held by its safety system \(PROTECTIVE_STOP\); find out why'):
@@ -287,7 +287,7 @@ def test_a_frozen_controller_is_a_fault_within_150_ms_and_stops_when_it_thaws(ar
     record_property('detected_s', silent_s)
     assert 'silent' in faulty(arm)
     assert 0.1 <= silent_s < 0.15 + ticker.worst_s
-    bench.controller.thaw()
+    bench.controller.resume()
     wait_for(lambda: faulty(arm) == '' and bench.rests())
     keep(arm, SLIDING, bench.moves)
 
@@ -333,7 +333,7 @@ def test_when_the_parent_is_killed_the_arm_stops_and_the_worker_ends(bench, reco
 
 
 @needs_ur_rtde
-def test_a_controller_that_was_killed_is_told_and_reached_again_when_it_is_back():
+def test_a_controller_that_was_killed_is_reported_and_reached_again_when_it_is_back():
     bench = Bench('127.0.0.51')
     arm = UrArm(UrArmParams(ip=bench.ip))
     try:

@@ -16,7 +16,7 @@ import pytest
 
 from texture_core.errors import CommandRefused, DeviceError
 from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_exploration.arms import ur_probe
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
@@ -153,7 +153,7 @@ def test_after_a_protective_stop_in_contact_the_same_force_is_pressed_again():
         assert press(arm, bench) == pytest.approx(3.0, abs=0.3)
 
 
-def test_after_a_recovery_the_arm_stands_still_until_it_is_told_to_move(shared):
+def test_after_a_recovery_the_arm_stands_still_until_it_is_reported_to_move(shared):
     bench, arm = shared
     keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
     bench.controller.ask('emulate protective stop')
@@ -177,7 +177,7 @@ def test_after_a_protective_stop_in_a_slide_and_a_recovery_the_same_request_pres
 
     with bench_at('127.0.0.73', surface_z_m=0.1 + ABOVE_PLANE_M) as bench:
         arm = UrArm(UrArmParams(ip=bench.ip, silence_s=1.0))  # a busy machine is not what is tested here
-        explorer = Explorer(arm, TouchParams(), SafetyLimits(stale_s=2.0), on_state)
+        explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=2.0), on_state)
         explorer.connect()
         try:
             stopped = explorer.begin('one', request)
@@ -217,14 +217,14 @@ def test_a_command_out_of_range_is_refused_and_the_arm_stops(command, shared):
 
 @pytest.fixture(scope='module')
 def shared():
-    """Return a bench and a connected arm, for faults that leave both whole."""
+    """Return a emulator and a connected arm, for faults that leave both whole."""
     with bench_at('127.0.0.74') as bench, connected(bench.ip) as arm:
         yield bench, arm
 
 
 @pytest.fixture(scope='module')
 def late():
-    """Return a bench whose controller acknowledges 300 ms late what the robot does, and an arm connected to it."""
+    """Return a emulator whose controller acknowledges 300 ms late what the robot does, and an arm connected to it."""
     with bench_at('127.0.0.75') as bench, connected(bench.ip) as arm:
         assert bench.controller.ask('emulate slow 0.3') == 'Acknowledging late'
         yield bench, arm
@@ -277,7 +277,7 @@ def test_a_program_of_somebody_else_is_not_stopped_unless_it_is_said():
             assert bench.controller.ask('programState') == 'PLAYING rtde_control'
 
 
-def test_polyscope_x_which_has_no_dashboard_tells_by_rtde_that_a_program_runs():
+def test_polyscope_x_which_has_no_dashboard_reports_by_rtde_that_a_program_runs():
     # On a busy machine the watchdog would end the program that is to be seen.
     with bench_at('127.0.0.77', version='10.10') as bench, connected(bench.ip, watchdog_hz=1.0) as arm:
         with pytest.raises(DeviceError, match=r"another program is on the controller .*'runtime state 2'"):

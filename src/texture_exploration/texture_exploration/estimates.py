@@ -1,4 +1,4 @@
-"""Collect what the estimators say about one exploration."""
+"""Collect the estimates of one exploration."""
 
 from __future__ import annotations
 
@@ -11,50 +11,54 @@ from texture_core.parameters import param
 
 
 @dataclass(frozen=True)
-class CertaintyParams:
-    """When a texture is certain, and how long to wait for the last word on it."""
+class EarlyStoppingParams:
+    """When a slide may end early, and how long to wait for the final estimates."""
 
-    certain_confidence: float = param(
-        0.0, 'Confidence that a texture needs to be certain, besides what its model asks for.', low=0.0, high=1.0
+    min_confidence: float = param(
+        0.0,
+        'Sets the lowest confidence that ends a slide early, besides the stopping rule of the model; a '
+        'higher value slides longer.',
+        low=0.0,
+        high=1.0,
     )
     estimate_timeout_s: float = param(
-        1.0, 'Wait so long after the lift for the final estimates.', unit='s', low=0.0, high=60.0
+        1.0, 'Sets how long to wait for the final estimates after the finger was lifted.', unit='s', low=0.0, high=60.0
     )
 
-    def certain(self, estimate: TextureEstimate) -> bool:
-        """Return whether the texture is certain enough to end the slide."""
-        return estimate.known and estimate.certain and estimate.confidence >= self.certain_confidence
+    def may_stop(self, estimate: TextureEstimate) -> bool:
+        """Return whether the texture estimate may end the slide."""
+        return estimate.known and estimate.decided and estimate.confidence >= self.min_confidence
 
 
-class Estimates:
+class ExplorationEstimates:
     """The newest texture and roughness estimate of one exploration; safe for threads."""
 
     def __init__(self, exploration_id: str) -> None:
         self.texture = TextureEstimate(0, exploration_id)
         self.roughness = RoughnessEstimate(0, exploration_id)
-        self._news = threading.Condition()
-        self._given_up = False
+        self._changed = threading.Condition()
+        self._cancelled = False
 
     def update(self, estimate: TextureEstimate | RoughnessEstimate) -> None:
         """Take over a newer estimate."""
-        with self._news:
+        with self._changed:
             if isinstance(estimate, TextureEstimate):
                 self.texture = estimate
             else:
                 self.roughness = estimate
-            self._news.notify_all()
+            self._changed.notify_all()
 
     def wait_until_final(self, kinds: Collection[str], timeout_s: float) -> bool:
         """Wait until the estimates of these kinds ('texture', 'roughness') are final; return whether they are."""
-        with self._news:
-            self._news.wait_for(lambda: self._given_up or self._final(kinds), timeout_s)
+        with self._changed:
+            self._changed.wait_for(lambda: self._cancelled or self._final(kinds), timeout_s)
             return self._final(kinds)
 
-    def give_up(self) -> None:
-        """End the waiting: nothing will come any more."""
-        with self._news:
-            self._given_up = True
-            self._news.notify_all()
+    def cancel(self) -> None:
+        """End the waiting: no further estimate will arrive."""
+        with self._changed:
+            self._cancelled = True
+            self._changed.notify_all()
 
     def _final(self, kinds: Collection[str]) -> bool:
         return all(getattr(self, kind).final for kind in kinds)

@@ -19,23 +19,23 @@ STATE_PERIOD_NS = 20_000_000
 GAP_NS = 50_000_000
 # A tick that comes a little early must not wait for the next one.
 STATE_SLACK_NS = 5_000_000
-NOT_SEEN_SLIDING = (
-    'the slide was shorter than the delay of the arm or than a pause of this machine, so nothing could be felt; '
+NO_SLIDE_OBSERVED = (
+    'the slide was shorter than the delay of the arm or than a pause of this machine, so no sample could be taken;  '
     'slide longer or more slowly'
 )
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How an exploration ended; `slid` tells whether there was anything to feel."""
+class ExplorationOutcome:
+    """How an exploration ended; `slid` is true if the finger slid, so that there are samples."""
 
     success: bool
     message: str
     slid: bool
 
 
-def hear_nothing(_awake_ns: int) -> str:
-    """Watch over no sensor."""
+def no_signal_watch(_awake_ns: int) -> str:
+    """Return '': the sensor is not watched."""
     return ''
 
 
@@ -51,7 +51,8 @@ class Exploration:
     clock
         CLOCK_MONOTONIC in ns.
     silence
-        Says in a sentence why the sensor feels nothing, '' if it does; it is given since when we are awake, in ns.
+        Returns in a sentence why the sensor delivers no samples, '' if it does; it is given since when we are awake, in
+        ns.
     on_state
         Called in the thread of `run` with each new phase and 50 times a second; stamps are of `clock`.
 
@@ -75,11 +76,11 @@ class Exploration:
         limits: SafetyLimits,
         clock: Callable[[], int],
         on_state: Callable[[ExplorationState], None],
-        silence: Callable[[int], str] = hear_nothing,
+        signal_fault: Callable[[int], str] = no_signal_watch,
     ) -> None:
         self.exploration_id = exploration_id
         self.request = request
-        self.outcome = Outcome(False, 'it broke off through an internal error; see the log', False)
+        self.outcome = ExplorationOutcome(False, 'it broke off through an internal error; see the log', False)
         self.ended = threading.Event()
         self.gaps = 0
         self.state = ExplorationState(clock(), exploration_id, request.motion, Phase.IDLE)
@@ -88,7 +89,7 @@ class Exploration:
         self._limits = limits
         self._clock = clock
         self._on_state = on_state
-        self._silence = silence
+        self._signal_fault = signal_fault
         reading = getattr(arm, 'force_reading', ForceReading.CONTROLLED)
         self._force_watch = ForceWatch(limits, reading, motion.force_n)
         self._commanded = ArmCommand()
@@ -99,7 +100,7 @@ class Exploration:
         self._next_state_ns = 0
         self._begin_ns = self._last_ns = self._awake_ns = clock()
 
-    def run(self, pace: Callable[[], None]) -> Outcome:
+    def run(self, pace: Callable[[], None]) -> ExplorationOutcome:
         """Go through the whole motion; `pace` returns when the next step is due."""
         try:
             while not self._tick():
@@ -123,12 +124,14 @@ class Exploration:
     def _tick(self) -> bool:
         """Do one step; return whether the exploration has ended."""
         arm, now_ns = self._arm.state(), self._clock()
-        self._note_gap(now_ns)
-        trouble = cannot_move(arm, now_ns, self._limits, self._awake_ns)
-        if trouble:
-            self._give_up(f'{trouble}; the finger was not lifted')
+        self._detect_gap(now_ns)
+        fault = arm_fault(arm, now_ns, self._limits, self._awake_ns)
+        if fault:
+            self._give_up(f'{fault}; the finger was not lifted')
             return True
-        reason = self._stop_reason or self._violation(arm) or self._silence(self._awake_ns) or self._overdue(now_ns)
+        reason = (
+            self._stop_reason or self._violation(arm) or self._signal_fault(self._awake_ns) or self._overdue(now_ns)
+        )
         if reason:
             self._motion.abort(reason)
         if self._finish_reason:
@@ -137,15 +140,15 @@ class Exploration:
         self._arm.command(step.command)
         self._commanded = step.command
         self._force_watch.note(step.phase, arm, step.command)
-        self._tell(now_ns, step, arm)
+        self._publish_state(now_ns, step, arm)
         return step.phase in ENDED
 
     def _violation(self, arm: ArmState) -> str:
         """Return which limit was passed; a finger that was pushed out of the workspace may come home first."""
-        outside = self._limits.outside(arm)
-        self._entered |= not outside
+        workspace_violation = self._limits.workspace_violation(arm)
+        self._entered |= not workspace_violation
         frozen = self._force_watch.frozen(arm, self._commanded)
-        return self._limits.too_hard(arm) or frozen or (outside if self._entered else '')
+        return self._limits.force_violation(arm) or frozen or (workspace_violation if self._entered else '')
 
     def _overdue(self, now_ns: int) -> str:
         """Return in a sentence that the exploration takes longer than its caller allows, '' if it does not."""
@@ -153,20 +156,20 @@ class Exploration:
         late = timeout_s > 0.0 and (now_ns - self._begin_ns) * 1e-9 > timeout_s
         return f'the exploration took longer than its timeout of {timeout_s:g} s' if late else ''
 
-    def _note_gap(self, now_ns: int) -> None:
+    def _detect_gap(self, now_ns: int) -> None:
         if now_ns - self._last_ns > GAP_NS:
             self._awake_ns = now_ns
             self.gaps += 1
         self._last_ns = now_ns
 
-    def _tell(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
+    def _publish_state(self, now_ns: int, step: MotionStep, arm: ArmState) -> None:
         """Report the state if its phase is new or the time has come."""
         self._slid |= step.phase is Phase.SLIDE
         flaw = self._flaw() if step.phase is Phase.DONE else ''
         if flaw:
-            self.outcome, step = Outcome(False, flaw, self._slid), replace(step, phase=Phase.ABORTED)
+            self.outcome, step = ExplorationOutcome(False, flaw, self._slid), replace(step, phase=Phase.ABORTED)
         elif step.phase in ENDED:
-            self.outcome = Outcome(step.phase is Phase.DONE, self._motion.message, self._slid)
+            self.outcome = ExplorationOutcome(step.phase is Phase.DONE, self._motion.message, self._slid)
         # A promise that is withdrawn is told at once: until then windows may be cut on it.
         as_before = step.phase is self.state.phase and (step.steady_s > 0) is (self.state.steady_s > 0)
         if as_before and now_ns < self._next_state_ns:
@@ -190,11 +193,11 @@ class Exploration:
 
     def _flaw(self) -> str:
         """Return why an exploration whose motion ended as planned is no success, '' if it is."""
-        return self._force_watch.drifted() if self._slid else NOT_SEEN_SLIDING
+        return self._force_watch.drifted() if self._slid else NO_SLIDE_OBSERVED
 
     def _give_up(self, reason: str) -> None:
         """End at once: an arm that does not follow cannot be lifted, only stopped."""
-        self.outcome = Outcome(False, reason, self._slid)
+        self.outcome = ExplorationOutcome(False, reason, self._slid)
         self._report(
             ExplorationState(
                 stamp_ns=self._clock(),
@@ -211,7 +214,7 @@ class Exploration:
         self._on_state(state)
 
 
-def cannot_move(arm: ArmState, now_ns: int, limits: SafetyLimits, awake_ns: int = 0) -> str:
+def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, awake_ns: int = 0) -> str:
     """Return in words why the arm would not follow a command, '' if it would.
 
     Silence of the arm counts from `awake_ns` on at the earliest: before, nobody listened.
@@ -219,6 +222,6 @@ def cannot_move(arm: ArmState, now_ns: int, limits: SafetyLimits, awake_ns: int 
     age_s = (now_ns - max(arm.time_ns, awake_ns)) * 1e-9
     if arm.fault:
         return f'the arm reports a fault: {arm.fault}'
-    if age_s > limits.stale_s:
+    if age_s > limits.state_timeout_s:
         return f'the arm has not answered for {age_s * 1e3:.0f} ms'
     return ''

@@ -1,4 +1,4 @@
-"""Whoever owns the arm: begins explorations, one at a time, each in a thread of its own."""
+"""Owner of the arm: runs explorations, one at a time, each in a thread of its own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from texture_core.catalogue import find
 from texture_core.errors import DeviceError, MotionRefused, TextureError
 from texture_core.exploration import ExplorationRequest, ExplorationState
 from texture_exploration.arms.protocol import Arm, Counting, Rebootable, Recoverable, Vector, Warns, Zeroing
-from texture_exploration.exploration import Exploration, cannot_move, hear_nothing
+from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import TouchParams
@@ -48,13 +48,13 @@ class Explorer:
         on_state: Callable[[ExplorationState], None],
         clock: Callable[[], int] = time.monotonic_ns,
         *,
-        silence: Callable[[int], str] = hear_nothing,
+        signal_fault: Callable[[int], str] = no_signal_watch,
     ) -> None:
         self.arm = arm
         self.touch, self.limits = touch, limits  # may be replaced; a running exploration keeps its own
         self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0, late_steps=0)
         self._on_state = on_state
-        self._silence = silence
+        self._signal_fault = signal_fault
         self._clock = clock
         self._lock = threading.Lock()
         self._home: Vector | None = None
@@ -98,13 +98,13 @@ class Explorer:
                 return self.arm.counts
         return {}
 
-    def trouble(self) -> str:
+    def fault(self) -> str:
         """Return in a sentence why the arm cannot move now, '' if it can."""
         try:
             state = self.arm.state()
         except DeviceError as error:
             return str(error)
-        return cannot_move(state, self._clock(), self.limits)
+        return arm_fault(state, self._clock(), self.limits)
 
     def warning(self) -> str:
         """Return in a sentence what is not as it should be although the arm moves, '' if nothing."""
@@ -146,7 +146,7 @@ class Explorer:
         return True
 
     def recover(self) -> None:
-        """Free the arm from a fault, as it knows itself or by connecting anew; whoever asks sees that it may move.
+        """Free the arm from a fault, as it knows itself or by connecting again; whoever asks sees that it may move.
 
         The next exploration lifts first, as the finger may still press.
 
@@ -155,15 +155,15 @@ class Explorer:
         MotionRefused
             If an exploration is running.
         DeviceError
-            If the arm stays in trouble.
+            If the fault remains.
         """
         with self._lock:
-            self._refuse_two()
+            self._check_idle()
             self._lift_first = True
-            if isinstance(self.arm, Recoverable) and self.trouble():
-                with contextlib.suppress(DeviceError):  # connecting anew tells it too
+            if isinstance(self.arm, Recoverable) and self.fault():
+                with contextlib.suppress(DeviceError):  # connecting again tells it too
                     self.arm.recover()
-            if self.trouble():
+            if self.fault():
                 self.connect()
 
     def reboot(self) -> str:
@@ -177,7 +177,7 @@ class Explorer:
             If a motor stays in its error.
         """
         with self._lock:
-            self._refuse_two()
+            self._check_idle()
             if not isinstance(self.arm, Rebootable):
                 raise MotionRefused('this arm has no motors that could be rebooted; use recover')
             return self.arm.reboot()
@@ -194,7 +194,7 @@ class Explorer:
     def _prepare(self, exploration_id: str, request: ExplorationRequest) -> Exploration:
         if self._closed:
             raise MotionRefused('the explorer is shutting down')
-        self._refuse_two()
+        self._check_idle()
         plan = find(MOTIONS, request.motion, 'motion')
         home = self._ready()
         motion = plan(request, home, self.touch, self.limits)
@@ -208,13 +208,13 @@ class Explorer:
             limits=self.limits,
             clock=self._clock,
             on_state=self._on_state,
-            silence=self._silence,
+            signal_fault=self._signal_fault,
         )
 
     def _believes_its_force(self) -> bool:
         return self.arm.zeroed if isinstance(self.arm, Zeroing) else True
 
-    def _refuse_two(self) -> None:
+    def _check_idle(self) -> None:
         if self.current is not None:
             raise MotionRefused(
                 f"exploration '{self.current.exploration_id}' is still running; wait for its end or stop it"
@@ -222,7 +222,7 @@ class Explorer:
 
     def _ready(self) -> Vector:
         """Return where explorations begin, once the arm can move."""
-        if self._home is None or self.trouble():
+        if self._home is None or self.fault():
             try:
                 self._home = self.connect()
             except DeviceError as error:

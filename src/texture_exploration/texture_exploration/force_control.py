@@ -20,7 +20,7 @@ from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
 from texture_exploration.lag import LagEstimate
 from texture_exploration.slope_observer import SlopeObserver
-from texture_exploration.stability import Loop, border_gain
+from texture_exploration.stability import LoopModel, stability_limit_gain
 from texture_exploration.stiffness import TOUCHING_N, StiffnessEstimate
 
 NOISE_N = 0.005  # of the force
@@ -29,7 +29,9 @@ SETTLED = 0.3  # from an error of this share of the wanted force on, the slope i
 REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
 LONGEST_DELAY_S = 0.1  # of `ForceLoopParams`
 UNDECLARED_PERIODS = 1.5  # a lag that is longer than declared by more than this counts
-LATE_IMPACT = 3.0  # so many times 'impact_n' may be met by an arm that is later than declared: coming down takes long
+LATE_IMPACT = (
+    3.0  # so many times 'max_impact_n' may be met by an arm that is later than declared: coming down takes long
+)
 INTEGRAL_LAGS = 20.0  # the integral part takes at least so many lags: a faster one adds to the overshoot
 NEAR_M = 0.001  # above a surface whose height is known, the finger slows down to closing speed
 
@@ -38,34 +40,73 @@ NEAR_M = 0.001  # above a surface whose height is known, the finger slows down t
 class ForceLoopParams:
     """Force control by an arm without a force mode."""
 
-    loop_delay_s: float = param(0.008, 'From force to movement, at most.', unit='s', low=0.0, high=0.1)
+    loop_delay_s: float = param(
+        0.008,
+        'Sets the largest delay from a measured force to the motion that answers it; a larger value lowers the gain.',
+        unit='s',
+        low=0.0,
+        high=0.1,
+    )
     force_gain_m_s_n: float = param(
-        0.0, 'Normal speed per force error; 0: chosen by the stiffness that is felt.', unit='m/s/N', low=0.0, high=1.0
+        0.0,
+        'Sets the normal speed per force error; 0 derives it from the estimated contact stiffness. A larger'
+        ' value settles faster and is less stable.',
+        unit='m/s/N',
+        low=0.0,
+        high=1.0,
     )
-    stiffest_n_m: float = param(
-        5000.0, 'Stiffest contact of finger and surface that is expected.', unit='N/m', low=100.0, high=200000.0
+    max_stiffness_n_m: float = param(
+        5000.0,
+        'Sets the stiffest contact of finger and surface that is expected; a larger value lowers the '
+        'approach speed and the first gain.',
+        unit='N/m',
+        low=100.0,
+        high=200000.0,
     )
-    gain_margin: float = param(4.0, 'So many times the gain is below the border of stability.', low=2.0, high=50.0)
-    integral_s: float = param(0.5, 'Time constant of the integral part.', unit='s', low=0.05, high=100.0)
-    force_speed_m_s: float = param(0.05, 'Highest normal speed under force control.', unit='m/s', low=0.001, high=0.25)
-    impact_n: float = param(
-        0.15, 'The stiffest surface may be met so hard before the arm can react.', unit='N', low=0.01, high=5.0
+    gain_margin: float = param(
+        4.0,
+        'Sets by which factor the gain stays below the stability limit; a larger factor is more stable and slower.',
+        low=2.0,
+        high=50.0,
+    )
+    integral_s: float = param(
+        0.5,
+        'Sets the time constant of the integral part; a longer time removes a constant force error more slowly.',
+        unit='s',
+        low=0.05,
+        high=100.0,
+    )
+    force_speed_m_s: float = param(
+        0.05,
+        'Sets the highest normal speed under force control; a higher speed corrects force errors faster.',
+        unit='m/s',
+        low=0.001,
+        high=0.25,
+    )
+    max_impact_n: float = param(
+        0.15,
+        'Sets the largest impact force on the stiffest surface before the arm can react; a larger force '
+        'allows a faster approach.',
+        unit='N',
+        low=0.01,
+        high=5.0,
     )
 
     press_impact_share: float = param(
         1.0,
-        'While pressing at rest, the stiffest base under a soft layer may be met with this share of the wanted force.',
+        'Sets the largest impact on the stiffest base under a soft layer, while pressing at rest, as a '
+        'share of the wanted force; a larger share presses faster.',
         low=0.05,
         high=100.0,
     )
 
-    def loop(self, stiffness_n_m: float, period_s: float, gain_m_s_n: float = 0.0) -> Loop:
+    def loop(self, stiffness_n_m: float, period_s: float, gain_m_s_n: float = 0.0) -> LoopModel:
         """Return the closed loop on a contact."""
-        return Loop(stiffness_n_m, gain_m_s_n, self.loop_delay_s, period_s, self.integral_s)
+        return LoopModel(stiffness_n_m, gain_m_s_n, self.loop_delay_s, period_s, self.integral_s)
 
-    def best_gain(self, stiffness_n_m: float, period_s: float) -> float:
-        """Return the gain for a contact, m/s/N: below the border by the margin."""
-        return border_gain(self.loop(stiffness_n_m, period_s)) / self.gain_margin
+    def default_gain(self, stiffness_n_m: float, period_s: float) -> float:
+        """Return the gain for a contact, m/s/N: below the stability limit by the margin."""
+        return stability_limit_gain(self.loop(stiffness_n_m, period_s)) / self.gain_margin
 
     def check_gain(self, period_s: float) -> None:
         """Refuse a gain that is not stable on the stiffest contact.
@@ -75,18 +116,19 @@ class ForceLoopParams:
         InvalidParameter
             With the gain that would do.
         """
-        border = border_gain(self.loop(self.stiffest_n_m, period_s))
-        if self.force_gain_m_s_n >= border:
+        limit = stability_limit_gain(self.loop(self.max_stiffness_n_m, period_s))
+        if self.force_gain_m_s_n >= limit:
             raise InvalidParameter(
-                f"parameter 'force_gain_m_s_n' is {self.force_gain_m_s_n:g}; on a contact of {self.stiffest_n_m:g} N/m "
-                f'with a loop delay of {1e3 * self.loop_delay_s:g} ms, once every {1e3 * period_s:g} ms, that is '
-                f'unstable from {border:.2g} m/s/N on; choose {border / self.gain_margin:.2g}, or 0 to let it be chosen'
+                f"parameter 'force_gain_m_s_n' is {self.force_gain_m_s_n:g}; on a contact of "
+                f'{self.max_stiffness_n_m:g} N/m with a loop delay of '
+                f'{1e3 * self.loop_delay_s:g} ms, once every {1e3 * period_s:g} ms, that is '
+                f'unstable from {limit:.2g} m/s/N on; choose {limit / self.gain_margin:.2g}, or 0 to let it be chosen'
             )
 
     @property
-    def closing_force_rate(self) -> float:
+    def max_impact_depth_m(self) -> float:
         """Impact per stiffness, m: how deep the finger may run into the stiffest surface."""
-        return self.impact_n / self.stiffest_n_m
+        return self.max_impact_n / self.max_stiffness_n_m
 
 
 class ForceController:
@@ -111,7 +153,7 @@ class ForceController:
         self._sum_ns = 0.0
 
     def update(self, error_n: float, dt_s: float, feed_forward_m_s: float = 0.0, down_m_s: float = math.inf) -> float:
-        """Return the normal velocity, positive away from the surface, for an error of the force, wanted less felt.
+        """Return the normal velocity, positive away from the surface, for a force error, wanted less measured.
 
         Towards the surface it is at most `down_m_s`.
         """
@@ -125,16 +167,16 @@ class ForceController:
 
 
 @dataclass(frozen=True)
-class Feeling:
-    """What the force loop is told: height of the finger, its way along the surface so far, the force on it."""
+class ContactState:
+    """State of the contact: height of the finger, distance travelled along the surface, force on the finger."""
 
     height_m: float
-    way_m: float
+    travelled_m: float
     force_n: float
 
 
 class ForceLoop:
-    """Come down, feel the stiffness, press with the wanted force: the force mode of an arm that has none.
+    """Come down, estimate the stiffness, press with the wanted force: the force mode of an arm that has none.
 
     Parameters
     ----------
@@ -166,16 +208,16 @@ class ForceLoop:
         self.controller.restart()
         self._observer.restart()
 
-    def feel(self, feeling: Feeling, speed_m_s: float = 0.0) -> None:
+    def observe(self, contact: ContactState, speed_m_s: float = 0.0) -> None:
         """Take note of a contact, whatever is commanded; call it once a period. Sliding tells nothing of stiffness."""
-        if feeling.force_n < TOUCHING_N:
+        if contact.force_n < TOUCHING_N:
             self.stiffness.restart()
             return
         if self.stiffness.empty:
-            self._surface_m = feeling.height_m
+            self._surface_m = contact.height_m
         if speed_m_s > SLOWEST_M_S:
             self.stiffness.fixed = True
-        self.stiffness.update(feeling.height_m, feeling.force_n)
+        self.stiffness.update(contact.height_m, contact.force_n)
         self._choose_gain()
 
     def asked(self, height_m: float, asked_m_s: float, dt_s: float) -> None:
@@ -184,42 +226,44 @@ class ForceLoop:
         if self.stiffness.empty:  # a gain is not changed in contact
             self._adapt_to_lag()
 
-    def velocity_m_s(self, wanted_n: float, feeling: Feeling, speed_m_s: float, dt_s: float) -> float:
+    def velocity_m_s(self, wanted_n: float, contact: ContactState, speed_m_s: float, dt_s: float) -> float:
         """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface."""
-        height_m, force_n = feeling.height_m, feeling.force_n
+        height_m, force_n = contact.height_m, contact.force_n
         if force_n < TOUCHING_N:
             self.restart()
-            return -self.closing_m_s(height_m)
-        felt = self.stiffness.value_n_m
+            return -self.approach_m_s(height_m)
+        estimated_n_m = self.stiffness.value_n_m
         settled = abs(wanted_n - force_n) < SETTLED * wanted_n
-        rising = 0.0
-        if not math.isnan(felt) and (settled or self._observer.running):
-            rising = self._observer.update(feeling.way_m, height_m + force_n / felt, speed_m_s, NOISE_N / felt)
+        feed_forward_m_s = 0.0
+        if not math.isnan(estimated_n_m) and (settled or self._observer.running):
+            feed_forward_m_s = self._observer.update(
+                contact.travelled_m, height_m + force_n / estimated_n_m, speed_m_s, NOISE_N / estimated_n_m
+            )
         down_m_s = math.inf if speed_m_s > SLOWEST_M_S else self._pressing_m_s(wanted_n)
-        return self.controller.update(wanted_n - force_n, dt_s, rising, down_m_s)
+        return self.controller.update(wanted_n - force_n, dt_s, feed_forward_m_s, down_m_s)
 
     def _pressing_m_s(self, wanted_n: float) -> float:
         """Return how fast the finger may be pressed on: what is soft now may have a hard base."""
-        depth_m = self._params.press_impact_share * wanted_n / self._told.stiffest_n_m
+        depth_m = self._params.press_impact_share * wanted_n / self._told.max_stiffness_n_m
         return depth_m * self._patience / self._reaction_s(self._params)
 
-    def closing_m_s(self, height_m: float) -> float:
+    def approach_m_s(self, height_m: float) -> float:
         """Return how fast the finger may come down: slowly where the surface may be."""
         params = self._params
         reaction_s = self._reaction_s(params)
-        slow = min(params.force_speed_m_s, self._closing_m / reaction_s)
+        slow_m_s = min(params.force_speed_m_s, self._closing_m / reaction_s)
         if self._surface_m is None:
-            return slow
+            return slow_m_s
         above_m = height_m - self._surface_m - NEAR_M
-        return min(params.force_speed_m_s, max(slow, above_m / (4 * reaction_s)))
+        return min(params.force_speed_m_s, max(slow_m_s, above_m / (4 * reaction_s)))
 
     @property
     def _closing_m(self) -> float:
         """How deep the finger may run into the surface before it reacts, m."""
-        depth_m = self._told.closing_force_rate
-        felt = self.stiffness.value_n_m
-        if self._late and not self.stiffness.empty and not math.isnan(felt):
-            depth_m *= max(1.0, self._told.stiffest_n_m / felt)
+        depth_m = self._told.max_impact_depth_m
+        estimated_n_m = self.stiffness.value_n_m
+        if self._delayed and not self.stiffness.empty and not math.isnan(estimated_n_m):
+            depth_m *= max(1.0, self._told.max_stiffness_n_m / estimated_n_m)
         return depth_m * self._patience
 
     @property
@@ -231,7 +275,7 @@ class ForceLoop:
         return params.loop_delay_s + REACTION_PERIODS * self._period_s
 
     @property
-    def _late(self) -> bool:
+    def _delayed(self) -> bool:
         return self._params.loop_delay_s > self._told.loop_delay_s
 
     def _adapt_to_lag(self) -> None:
@@ -253,12 +297,12 @@ class ForceLoop:
 
     def _new_controller(self) -> ForceController:
         params = self._params
-        gain = params.force_gain_m_s_n or params.best_gain(params.stiffest_n_m, self._period_s)
+        gain = params.force_gain_m_s_n or params.default_gain(params.max_stiffness_n_m, self._period_s)
         return ForceController(gain, params.integral_s, params.force_speed_m_s)
 
     def _choose_gain(self) -> None:
-        felt = self.stiffness.value_n_m
-        if self._params.force_gain_m_s_n or math.isnan(felt) or felt == self._chosen_for:
+        estimated_n_m = self.stiffness.value_n_m
+        if self._params.force_gain_m_s_n or math.isnan(estimated_n_m) or estimated_n_m == self._chosen_for:
             return
-        self._chosen_for = felt
-        self.controller.gain_m_s_n = self._params.best_gain(felt, self._period_s)
+        self._chosen_for = estimated_n_m
+        self.controller.gain_m_s_n = self._params.default_gain(estimated_n_m, self._period_s)

@@ -9,7 +9,7 @@ from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading
 from texture_exploration.safety import SafetyLimits
 
-LEAST_REPEATS = 3  # of one reading, before it can count as frozen
+MIN_REPEATS = 3  # of one reading, before it can count as frozen
 CONTACT_N = 0.1  # above the force in free air, which may stay the same for long
 HELD_SHARE = 0.1  # a force this close to the wanted one is being held
 ZEROING_S = 0.1  # an arm may zero its force sensor while it stands, or as it moves off
@@ -61,7 +61,7 @@ class ForceWatch:
             self._newest_ns = arm.time_ns
             self._repeats += 1
         same_s = (arm.time_ns - self._first.time_ns) * 1e-9
-        if self._repeats < LEAST_REPEATS or same_s < self._limits.frozen_force_s:
+        if self._repeats < MIN_REPEATS or same_s < self._limits.frozen_force_s:
             return ''
         moved_m = abs(arm.position[2] - self._first.position[2])
         if self._reading is not ForceReading.NOISY and not self._implausible(arm.force_n, moved_m, command):

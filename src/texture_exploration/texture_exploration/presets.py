@@ -16,10 +16,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from texture_core.catalogue import find, unknown
+from texture_core.catalogue import find, unknown_name
 from texture_core.errors import InvalidParameter
 from texture_core.exploration import ExplorationRequest
-from texture_core.plain_data import load_yaml, shown
+from texture_core.plain_data import load_yaml, safe_repr
 from texture_core.resources import find_file
 from texture_exploration.motions.catalogue import MOTIONS
 
@@ -62,7 +62,7 @@ def load_preset(name_or_path: str) -> Preset:
     path = find_file(name_or_path, 'texture_exploration', 'config/presets', 'preset')
     content = load_yaml(path, 'preset')
     if not isinstance(content, Mapping):
-        raise InvalidParameter(f"preset '{path.stem}': came {shown(content)}; a mapping with a motion is needed")
+        raise InvalidParameter(f"preset '{path.stem}': came {safe_repr(content)}; a mapping with a motion is needed")
     return read_preset(content, path.stem)
 
 
@@ -71,16 +71,16 @@ def read_preset(content: Mapping[str, Any], name: str) -> Preset:
     where = f"preset '{name}'"
     vary = content.get('vary', {})
     if not isinstance(vary, Mapping):
-        raise InvalidParameter(f"{where}: 'vary' is {shown(vary)}; a mapping of numbers to lists is needed")
+        raise InvalidParameter(f"{where}: 'vary' is {safe_repr(vary)}; a mapping of numbers to lists is needed")
     given = {key: value for key, value in content.items() if key not in KEYS}
     for key in (*given, *vary):
         if key not in (*NUMBERS, *SHORTHANDS):
-            raise InvalidParameter(f'{where}: {unknown(str(key), (*KEYS, *NUMBERS, *SHORTHANDS), "key")}')
+            raise InvalidParameter(f'{where}: {unknown_name(str(key), (*KEYS, *NUMBERS, *SHORTHANDS), "key")}')
     motion = str(content.get('motion', ''))
     find(MOTIONS, motion, 'motion')
     repeats = content.get('repeats', 1)
     if not isinstance(repeats, int) or not 1 <= repeats <= MOST:
-        raise InvalidParameter(f"{where}: 'repeats' is {shown(repeats)}; a whole number from 1 to {MOST} is needed")
+        raise InvalidParameter(f"{where}: 'repeats' is {safe_repr(repeats)}; a whole number from 1 to {MOST} is needed")
     varied = [_sequence(key, values, where) for key, values in vary.items()]
     combinations = math.prod(map(len, varied))
     if combinations > MOST:
@@ -95,7 +95,7 @@ def read_preset(content: Mapping[str, Any], name: str) -> Preset:
 def _request(motion: str, numbers: Mapping[str, Any], where: str) -> ExplorationRequest:
     for key, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise InvalidParameter(f"{where}: '{key}' is {shown(value)}; a number is needed")
+            raise InvalidParameter(f"{where}: '{key}' is {safe_repr(value)}; a number is needed")
     values: dict[str, Any] = {key: float(value) for key, value in numbers.items() if key not in SHORTHANDS}
     if 'direction_deg' in numbers:
         values['direction_rad'] = math.radians(numbers['direction_deg'])
@@ -108,5 +108,5 @@ def _request(motion: str, numbers: Mapping[str, Any], where: str) -> Exploration
 
 def _sequence(key: str, values: Any, where: str) -> Sequence[Any]:
     if not isinstance(values, list) or not values:
-        raise InvalidParameter(f"{where}: 'vary' gives {shown(values)} for '{key}'; a list of numbers is needed")
+        raise InvalidParameter(f"{where}: 'vary' gives {safe_repr(values)} for '{key}'; a list of numbers is needed")
     return values

@@ -20,53 +20,145 @@ MAX_DIRECTION_RAD = 100.0
 class SafetyLimits:
     """Limits of what is asked, of what is measured, and of how long each phase may take."""
 
-    min_speed_m_s: float = param(0.002, 'Lowest speed that may be asked for.', unit='m/s', low=1e-4)
-    max_speed_m_s: float = param(0.25, 'Highest speed that may be asked for.', unit='m/s', low=1e-4, high=1.0)
-    min_force_n: float = param(0.1, 'Lowest force that may be asked for.', unit='N', low=0.01)
-    max_force_n: float = param(6.0, 'Highest force that may be asked for.', unit='N', low=0.01, high=50.0)
-    force_limit_n: float = param(10.0, 'A higher measured force aborts.', unit='N', low=0.1, high=100.0)
+    min_speed_m_s: float = param(
+        0.002, 'Sets the lowest speed that may be requested; slower requests are refused.', unit='m/s', low=1e-4
+    )
+    max_speed_m_s: float = param(
+        0.25,
+        'Sets the highest speed that may be requested; faster requests are refused.',
+        unit='m/s',
+        low=1e-4,
+        high=1.0,
+    )
+    min_force_n: float = param(
+        0.1, 'Sets the lowest normal force that may be requested; smaller forces are refused.', unit='N', low=0.01
+    )
+    max_force_n: float = param(
+        6.0,
+        'Sets the highest normal force that may be requested; larger forces are refused.',
+        unit='N',
+        low=0.01,
+        high=50.0,
+    )
+    force_limit_n: float = param(
+        10.0, 'Sets the measured force above which an exploration is aborted.', unit='N', low=0.1, high=100.0
+    )
     frozen_force_s: float = param(
         0.06,
-        'A measured force that stays exactly the same for longer, where it should change, aborts.',
+        'Sets how long a measured force may stay exactly the same, where it should change, before the '
+        'exploration is aborted.',
         unit='s',
         low=0.02,
         high=5.0,
     )
     frozen_travel_m: float = param(
         0.00005,
-        'In contact, the force should change when the finger moves further along the normal.',
+        'Sets the travel along the normal, in contact, after which the measured force must have changed; a '
+        'longer travel notices a frozen force later.',
         unit='m',
         low=1e-6,
         high=0.01,
     )
     force_drift_share: float = param(
         0.3,
-        'The force in free air may change by this share of the wanted one over an exploration; more makes it aborted.',
+        'Sets the largest change of the force in free air over an exploration, as a share of the wanted '
+        'force; more aborts it.',
         low=0.01,
         high=10.0,
     )
-    min_distance_m: float = param(0.002, 'Shortest slide that may be asked for.', unit='m', low=1e-4)
-    max_distance_m: float = param(1.0, 'Longest slide that may be asked for.', unit='m', low=1e-3)
-    min_radius_m: float = param(0.005, 'Smallest circle that may be asked for.', unit='m', low=1e-3)
-    max_radius_m: float = param(0.1, 'Largest circle that may be asked for.', unit='m', low=1e-3)
-    min_turns: float = param(0.1, 'Fewest turns that may be asked for.', low=0.01)
-    max_turns: float = param(100.0, 'Most turns that may be asked for.', low=0.01)
-    max_turning_m_s2: float = param(
-        5.0, 'Highest acceleration towards the centre of a circle.', unit='m/s²', low=0.05, high=20.0
+    min_distance_m: float = param(
+        0.002, 'Sets the shortest slide that may be requested; shorter requests are refused.', unit='m', low=1e-4
     )
-    min_duration_s: float = param(0.1, 'Shortest slide in the hand that may be asked for.', unit='s', low=0.01)
-    max_duration_s: float = param(60.0, 'Longest slide in the hand that may be asked for.', unit='s', low=0.01)
-    x_low_m: float = param(-0.2, 'Lowest x the finger may reach.', unit='m', low=-2.0, high=2.0)
-    x_high_m: float = param(0.2, 'Highest x the finger may reach.', unit='m', low=-2.0, high=2.0)
-    y_low_m: float = param(-0.2, 'Lowest y the finger may reach.', unit='m', low=-2.0, high=2.0)
-    y_high_m: float = param(0.2, 'Highest y the finger may reach.', unit='m', low=-2.0, high=2.0)
-    z_low_m: float = param(-0.02, 'Lowest z the finger may reach.', unit='m', low=-2.0, high=2.0)
-    z_high_m: float = param(0.2, 'Highest z the finger may reach.', unit='m', low=-2.0, high=2.0)
-    stale_s: float = param(0.13, 'An older arm state aborts.', unit='s', low=0.01, high=2.0)
-    approach_timeout_s: float = param(10.0, 'Time to reach the surface.', unit='s', low=0.1)
-    contact_timeout_s: float = param(3.0, 'Time to settle the force, and to reach the speed.', unit='s', low=0.1)
-    slide_overtime_s: float = param(2.0, 'Time a slide may take beyond its plan.', unit='s', low=0.1)
-    lift_timeout_s: float = param(5.0, 'Time to brake, and to lift.', unit='s', low=0.1)
+    max_distance_m: float = param(
+        1.0, 'Sets the longest slide that may be requested; longer requests are refused.', unit='m', low=1e-3
+    )
+    min_radius_m: float = param(
+        0.005, 'Sets the smallest circle radius that may be requested; smaller circles are refused.', unit='m', low=1e-3
+    )
+    max_radius_m: float = param(
+        0.1, 'Sets the largest circle radius that may be requested; larger circles are refused.', unit='m', low=1e-3
+    )
+    min_turns: float = param(
+        0.1, 'Sets the smallest number of turns that may be requested; fewer turns are refused.', low=0.01
+    )
+    max_turns: float = param(
+        100.0, 'Sets the largest number of turns that may be requested; more turns are refused.', low=0.01
+    )
+    max_turning_m_s2: float = param(
+        5.0,
+        'Sets the highest centripetal acceleration on a circle; a larger value allows faster and smaller circles.',
+        unit='m/s²',
+        low=0.05,
+        high=20.0,
+    )
+    min_duration_s: float = param(
+        0.1, 'Sets the shortest in-hand slide that may be requested; shorter requests are refused.', unit='s', low=0.01
+    )
+    max_duration_s: float = param(
+        60.0, 'Sets the longest in-hand slide that may be requested; longer requests are refused.', unit='s', low=0.01
+    )
+    x_low_m: float = param(
+        -0.2,
+        'Sets the lowest x coordinate of the workspace in the surface frame; leaving it aborts.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    x_high_m: float = param(
+        0.2,
+        'Sets the highest x coordinate of the workspace in the surface frame; leaving it aborts.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    y_low_m: float = param(
+        -0.2,
+        'Sets the lowest y coordinate of the workspace in the surface frame; leaving it aborts.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    y_high_m: float = param(
+        0.2,
+        'Sets the highest y coordinate of the workspace in the surface frame; leaving it aborts.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    z_low_m: float = param(
+        -0.02,
+        'Sets the lowest z coordinate of the workspace in the surface frame; leaving it aborts.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    z_high_m: float = param(
+        0.2,
+        'Sets the highest z coordinate of the workspace in the surface frame; leaving it aborts.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    state_timeout_s: float = param(
+        0.13,
+        'Sets the age of the newest arm state above which an exploration is aborted; a longer time notices '
+        'a dead arm later.',
+        unit='s',
+        low=0.01,
+        high=2.0,
+    )
+    approach_timeout_s: float = param(
+        10.0, 'Sets how long the approach to the surface may take before the exploration is aborted.', unit='s', low=0.1
+    )
+    contact_timeout_s: float = param(
+        3.0, 'Sets how long force and speed may take to settle before the exploration is aborted.', unit='s', low=0.1
+    )
+    slide_overtime_s: float = param(
+        2.0, 'Sets how much longer than planned a slide may take before the exploration is aborted.', unit='s', low=0.1
+    )
+    lift_timeout_s: float = param(
+        5.0, 'Sets how long braking and lifting may take before the exploration is aborted.', unit='s', low=0.1
+    )
 
     def __post_init__(self) -> None:
         for axis, (low, high) in self.workspace.items():
@@ -119,7 +211,7 @@ class SafetyLimits:
         if given:
             raise MotionRefused(f'{request.motion} knows no {" and no ".join(given)}; leave it at 0')
 
-    def room_m(self, start: Vector, direction_rad: float) -> float:
+    def free_distance_m(self, start: Vector, direction_rad: float) -> float:
         """Return how far the finger can go from `start` along the surface before it leaves the workspace, m."""
         steps = (math.cos(direction_rad), math.sin(direction_rad))
         rooms = [
@@ -129,7 +221,7 @@ class SafetyLimits:
         ]
         return max(0.0, min(rooms))
 
-    def too_hard(self, arm: ArmState) -> str:
+    def force_violation(self, arm: ArmState) -> str:
         """Return in a sentence that the force is too high, or that it or the place is unknown; '' if not."""
         # Written so that NaN is too much too.
         if not arm.force_n <= self.force_limit_n:
@@ -143,7 +235,7 @@ class SafetyLimits:
             return f'the place of the finger is unknown: the arm tells {arm.position}'
         return ''
 
-    def outside(self, arm: ArmState) -> str:
+    def workspace_violation(self, arm: ArmState) -> str:
         """Return in a sentence where the finger has left the workspace, '' if it has not."""
         for at, (axis, (low, high)) in zip(arm.position, self.workspace.items(), strict=True):
             if not low <= at <= high:

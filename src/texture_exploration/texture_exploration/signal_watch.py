@@ -1,4 +1,4 @@
-"""Whether the sensor is heard while the finger moves: sliding without it feels nothing."""
+"""Whether samples arrive while the finger moves: a slide without them measures nothing."""
 
 from __future__ import annotations
 
@@ -12,12 +12,10 @@ from texture_core.parameters import param
 class SignalWatchParams:
     """Whether to end an exploration when the sensor falls silent."""
 
-    watch_signal: bool = param(
-        True, 'Whether an exploration is aborted, and the finger lifted, when no samples come on `signal`.'
-    )
+    watch_signal: bool = param(True, "Aborts an exploration when no samples arrive on the topic 'signal'.")
     signal_timeout_s: float = param(
         0.25,
-        'Longest silence of `signal` before the abort; a longer time tolerates a busier machine.',
+        'Sets how long no sample may arrive before the exploration is aborted.',
         unit='s',
         low=0.02,
         high=5.0,
@@ -25,7 +23,7 @@ class SignalWatchParams:
 
 
 class SignalWatch:
-    """Remember when the sensor was heard last; `heard` and `silence` may be called from different threads.
+    """Remember when the sensor was heard last; `on_samples` and `signal_fault` may be called from different threads.
 
     Parameters
     ----------
@@ -38,15 +36,15 @@ class SignalWatch:
     def __init__(self, timeout_s: float, clock: Callable[[], int]) -> None:
         self._timeout_s = timeout_s
         self._clock = clock
-        self._heard_ns = 0
+        self._last_samples_ns = 0
 
-    def heard(self) -> None:
+    def on_samples(self) -> None:
         """Take note that samples have come."""
-        self._heard_ns = self._clock()
+        self._last_samples_ns = self._clock()
 
-    def silence(self, awake_ns: int) -> str:
+    def signal_fault(self, awake_ns: int) -> str:
         """Return in a sentence that the sensor is silent, '' if not; before `awake_ns` nobody listened."""
-        age_s = (self._clock() - max(self._heard_ns, awake_ns)) * 1e-9
+        age_s = (self._clock() - max(self._last_samples_ns, awake_ns)) * 1e-9
         if age_s <= self._timeout_s:
             return ''
         return (

@@ -27,18 +27,18 @@ class SlopeObserver:
 
     def __init__(self, ahead_s: float) -> None:
         self._ahead_s = ahead_s
-        self._seen: deque[tuple[float, float]] = deque(maxlen=OBSERVED)
+        self._points: deque[tuple[float, float]] = deque(maxlen=OBSERVED)
 
     @property
     def running(self) -> bool:
         """Whether it has seen a height."""
-        return bool(self._seen)
+        return bool(self._points)
 
     def restart(self) -> None:
         """The finger left the surface."""
-        self._seen.clear()
+        self._points.clear()
 
-    def update(self, way_m: float, surface_m: float, speed_m_s: float, noise_m: float) -> float:
+    def update(self, travelled_m: float, surface_m: float, speed_m_s: float, noise_m: float) -> float:
         """Return how fast the surface will rise, m/s.
 
         Parameters
@@ -52,16 +52,16 @@ class SlopeObserver:
         noise_m
             Of the height.
         """
-        self._seen.append((way_m, surface_m))
-        if len(self._seen) < MIN_POINTS:
+        self._points.append((travelled_m, surface_m))
+        if len(self._points) < MIN_POINTS:
             return 0.0
-        way, height = np.array(self._seen).T
-        unit = max(float(way[-1] - way[0]), SHORTEST_M)
-        way = (way - way_m) / unit
-        shapes = np.stack([way, way**2], axis=1)
+        travelled, height = np.array(self._points).T
+        unit = max(float(travelled[-1] - travelled[0]), SHORTEST_M)
+        travelled = (travelled - travelled_m) / unit
+        shapes = np.stack([travelled, travelled**2], axis=1)
         shapes = shapes - shapes.mean(axis=0)
         # Likely slopes and bends, as if they had been seen once beside the heights.
         likely = np.diag([noise_m / (LIKELY_SLOPE * unit), noise_m / (LIKELY_BEND_1_M * unit**2)]) ** 2
-        slope, bend = np.linalg.solve(shapes.T @ shapes + likely, shapes.T @ (height - height.mean()))
+        slope, curvature = np.linalg.solve(shapes.T @ shapes + likely, shapes.T @ (height - height.mean()))
         ahead = min(1.0, speed_m_s * self._ahead_s / unit)
-        return float((slope + 2 * bend * ahead) / unit * speed_m_s)
+        return float((slope + 2 * curvature * ahead) / unit * speed_m_s)

@@ -1,4 +1,4 @@
-"""Where force control becomes unstable: predicted from the sampled loop, and found by running it.
+"""Stability limit of the force control: predicted from the sampled loop, and found by simulation.
 
 The contact integrates the velocity to a force, F' = −k·u; u is held for a period T and comes into effect after a delay
 of (m + γ)·T, with a whole m and 0 ≤ γ < 1. With s = Σ e·T, the loop on the force error e is exactly
@@ -6,7 +6,7 @@ of (m + γ)·T, with a whole m and 0 ≤ γ < 1. With s = Σ e·T, the loop on t
     e[n+1] = e[n] + k·T·((1 − γ)·u[n−m] + γ·u[n−m−1]),    s[n+1] = s[n] + T·e[n+1],    u[n] = −g·(e[n] + s[n] / Ti),
 
 a linear map; it is stable if all its eigenvalues lie within the unit circle. Only the products g·k·T, delay / T and
-Ti / T matter. Without the integral part and without sampling the border is g·k·delay = π/2.
+Ti / T matter. Without the integral part and without sampling the stability limit is g·k·delay = π/2.
 
 Source: Åström & Wittenmark, Computer-Controlled Systems, 1997, section 2.3 (sampling a system with delay).
 """
@@ -30,7 +30,7 @@ FINE = 20  # simulation steps per period
 
 
 @dataclass(frozen=True)
-class Loop:
+class LoopModel:
     """Force control on a contact: stiffness k, gain g, delay, period T and time constant Ti of the integral part."""
 
     stiffness_n_m: float
@@ -40,14 +40,14 @@ class Loop:
     integral_s: float = math.inf
 
 
-class Controller(Protocol):
+class NormalVelocityController(Protocol):
     """What is simulated; see `texture_exploration.force_control.ForceController`."""
 
     def update(self, error_n: float, dt_s: float) -> float:
         """Return the normal velocity, positive away from the surface."""
 
 
-def loop_matrix(loop: Loop) -> Array:
+def loop_matrix(loop: LoopModel) -> Array:
     """Return the matrix of the loop; the state is e, s if there is an integral part, and m + 1 velocities.
 
     Returns
@@ -74,23 +74,25 @@ def loop_matrix(loop: Loop) -> Array:
     return matrix if math.isfinite(loop.integral_s) else np.delete(np.delete(matrix, 1, axis=0), 1, axis=1)
 
 
-def growth(loop: Loop) -> float:
+def spectral_radius(loop: LoopModel) -> float:
     """Return by how much a disturbance grows each period, the spectral radius; below 1 it dies out."""
     return float(np.abs(np.linalg.eigvals(loop_matrix(loop))).max())
 
 
 @lru_cache(maxsize=4096)
-def border_gain(loop: Loop) -> float:
+def stability_limit_gain(loop: LoopModel) -> float:
     """Return the gain from which the loop is unstable, m/s/N, by its eigenvalues; its own gain does not count."""
-    return _bisect(loop, lambda gain: growth(replace(loop, gain_m_s_n=gain)) < 1.0)
+    return _bisect(loop, lambda gain: spectral_radius(replace(loop, gain_m_s_n=gain)) < 1.0)
 
 
-def simulated_border_gain(loop: Loop, controller: Callable[[Loop], Controller]) -> float:
+def simulated_stability_limit_gain(
+    loop: LoopModel, controller: Callable[[LoopModel], NormalVelocityController]
+) -> float:
     """Return the gain from which the running controller makes a disturbance grow, m/s/N."""
-    return _bisect(loop, lambda gain: dies_out(replace(loop, gain_m_s_n=gain), controller), bisections=12)
+    return _bisect(loop, lambda gain: disturbance_decays(replace(loop, gain_m_s_n=gain), controller), bisections=12)
 
 
-def dies_out(loop: Loop, controller: Callable[[Loop], Controller]) -> bool:
+def disturbance_decays(loop: LoopModel, controller: Callable[[LoopModel], NormalVelocityController]) -> bool:
     """Run a controller on a spring, finely integrated, after a jolt of 1 N; return whether the swinging shrinks."""
     running = controller(loop)
     fine_s = loop.period_s / FINE
@@ -113,27 +115,27 @@ def dies_out(loop: Loop, controller: Callable[[Loop], Controller]) -> bool:
 def stability_chart(
     stiffness_n_m: Sequence[float],
     delay_s: Sequence[float],
-    controller: Callable[[Loop], Controller],
+    controller: Callable[[LoopModel], NormalVelocityController],
     period_s: float = 0.004,
     integral_s: float = 0.5,
 ) -> dict[str, Array]:
-    """Return the data of a chart: the border in gain over stiffness and delay, predicted and simulated.
+    """Return the data of a chart: the stability limit of the gain over stiffness and delay, predicted and simulated.
 
     Returns
     -------
     dict
         'stiffness_n_m' (s,), 'delay_s' (d,), and 'predicted' and 'simulated' (s, d) in m/s/N.
     """
-    loops = [[Loop(k, 0.0, delay, period_s, integral_s) for delay in delay_s] for k in stiffness_n_m]
+    loops = [[LoopModel(k, 0.0, delay, period_s, integral_s) for delay in delay_s] for k in stiffness_n_m]
     return {
         'stiffness_n_m': np.array(stiffness_n_m, dtype=float),
         'delay_s': np.array(delay_s, dtype=float),
-        'predicted': np.array([[border_gain(loop) for loop in row] for row in loops]),
-        'simulated': np.array([[simulated_border_gain(loop, controller) for loop in row] for row in loops]),
+        'predicted': np.array([[stability_limit_gain(loop) for loop in row] for row in loops]),
+        'simulated': np.array([[simulated_stability_limit_gain(loop, controller) for loop in row] for row in loops]),
     }
 
 
-def _bisect(loop: Loop, stable: Callable[[float], bool], bisections: int = BISECTIONS) -> float:
+def _bisect(loop: LoopModel, stable: Callable[[float], bool], bisections: int = BISECTIONS) -> float:
     """Return the lowest gain that is not stable, around that of the pure delay, π / 2 / (k · delay)."""
     high = 2.5 / (loop.stiffness_n_m * loop.period_s)  # a pure integrator bears 2 / (k·T)
     # Far below, the integral part makes a slow swing, which a short run could take for an unstable one.

@@ -1,4 +1,4 @@
-"""How stiff a contact is, felt while the force rises."""
+"""Stiffness of a contact, estimated while the force rises."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TOUCHING_N = 0.03
 
 
 class StiffnessEstimate:
-    """Feel how stiff a contact is, by the slope of force over height while the force rises: least squares."""
+    """Estimate how stiff a contact is, by the slope of force over height while the force rises: least squares."""
 
     def __init__(self) -> None:
         self.value_n_m = math.nan

@@ -155,7 +155,7 @@ def test_bursts_lie_above_what_is_typical_and_a_steady_hum_does_not():
         assert (mean - typical > 1.0) == apart
 
 
-def test_low_lines_tell_ridges_apart_that_share_a_band():
+def test_low_lines_report_ridges_apart_that_share_a_band():
     feature = FEATURES['low_lines'](points=256)
     lines = [feature.names[int(feature(windows(tone(hz)))[0].argmax())] for hz in (98.0, 106.0)]
     assert lines == ['25', '27']  # line k stands at k · 1000 / 256 Hz

@@ -30,7 +30,7 @@ def found(fast, senses, rate_hz=RATE_HZ, noise=0.05):
 @pytest.mark.parametrize(('senses', 'power'), [('force', 0.0), ('change', 1.0), ('change', 1.5), ('either', 1.0)])
 @pytest.mark.parametrize('lines_hz', [[180.0], [90.0, 230.0, 310.0], np.arange(40.0, 400.0, 30.0)])
 @pytest.mark.parametrize('rate_hz', [1000.0, 2200.0])
-def test_a_rising_pitch_tells_when_the_finger_set_off(senses, power, lines_hz, rate_hz):
+def test_a_rising_pitch_reports_when_the_finger_set_off(senses, power, lines_hz, rate_hz):
     rng = np.random.default_rng(0)
     errors = [
         found(sliding(np.array(lines_hz), power, rng, rate_hz=rate_hz), senses, rate_hz) - SETS_OFF_S for _ in range(10)

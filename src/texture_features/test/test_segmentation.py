@@ -66,7 +66,7 @@ def test_without_slow_channels_the_end_is_one_ramp_before_rest():
     assert found.end_s == pytest.approx(2.0, abs=0.03)
 
 
-def test_several_slides_are_told_apart():
+def test_several_slides_are_reported_apart():
     slides = ((1.0, 2.0), (3.5, 4.5))
     fast, slow = recording(slides, 6.0)
     found = find_sliding(fast, RATE_HZ, SegmentParams(), slow=slow, slow_rate_hz=SLOW_HZ)
@@ -109,7 +109,7 @@ def test_gain_and_offset_of_the_sensor_do_not_matter():
 
 
 @pytest.mark.parametrize('load', [np.zeros((50, 2)), np.ones((1, 3)), np.random.default_rng(0).normal(size=(200, 1))])
-def test_channels_without_a_load_tell_no_contact(load):
+def test_channels_without_a_load_report_no_contact(load):
     assert find_touches(load, SLOW_HZ, np.ones(len(load))) == []
 
 
@@ -124,7 +124,7 @@ def test_a_contact_is_where_the_finger_vibrates_whatever_the_sign_of_the_load(si
     assert touch.ends_s == pytest.approx(1.6, abs=0.01)
 
 
-def test_knocks_of_touching_and_letting_go_do_not_tell_which_level_is_contact():
+def test_knocks_of_touching_and_letting_go_do_not_report_which_level_is_contact():
     times = np.arange(0, 1.8, 0.01)
     load = np.interp(times, [0.2, 0.3, 1.6, 1.7], [0.0, 1.0, 1.0, 0.0])[:, None]
     knocks = (np.abs(times - 0.25) < 0.11) | (np.abs(times - 1.65) < 0.11)  # most of what is no contact
@@ -171,7 +171,7 @@ def live(signals, segmenter):
     return told, segmenter.finish()
 
 
-def test_states_of_a_recording_and_states_told_live_agree():
+def test_states_of_a_recording_and_states_reported_live_agree():
     slides = ((1.0, 2.5), (4.0, 5.0))
     fast, slow = recording(slides, 6.5)
     signals = {'signal': batches(fast, RATE_HZ), 'signal_static': batches(slow, SLOW_HZ)}
@@ -181,7 +181,7 @@ def test_states_of_a_recording_and_states_told_live_agree():
     assert not rest  # all was told while the recording went on
 
 
-def test_live_states_come_soon_and_promise_only_what_was_felt():
+def test_live_states_come_soon_and_promise_only_what_was_measured():
     fast, slow = recording(((1.0, 3.0),), 4.0)
     signals = {'signal': batches(fast, RATE_HZ), 'signal_static': batches(slow, SLOW_HZ)}
     told, _ = live(signals, SlideSegmenter(SegmentParams()))

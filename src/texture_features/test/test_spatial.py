@@ -52,7 +52,7 @@ def test_the_power_in_all_bands_adds_up_to_the_variance():
     assert (density * np.diff(feature.edges_per_m)).sum() == pytest.approx(0.5, rel=0.02)
 
 
-def test_the_mean_over_the_taxels_does_not_know_which_felt_it():
+def test_the_mean_over_the_taxels_does_not_know_which_measured_it():
     samples = slide(0.05) * np.array([1.0, 2.0, 3.0, 4.0])
     for name in ('mean_spatial_bands', 'mean_shape'):
         feature = FEATURES[name]()
@@ -113,7 +113,7 @@ def test_bands_that_end_before_they_begin_are_refused():
 
 
 @pytest.mark.parametrize('speed', SPEEDS_M_S)
-def test_the_array_tells_its_own_speed_on_a_surface_it_never_met(speed):
+def test_the_array_reports_its_own_speed_on_a_surface_it_never_met(speed):
     taught = [(slide(0.04, surface=rough(seed)), RATE_HZ, 0.04) for seed in range(4)]
     tried = np.geomspace(0.01, 0.2, 200)
     for estimator in (ArraySpeed.learnt(taught), ArraySpeed.from_places(PLACES_M)):

@@ -60,7 +60,7 @@ def test_what_would_lie_above_half_the_rate_is_left_out():
     assert np.abs(resample(fast, 250)[10:-10]).max() < 0.05
 
 
-def test_the_stretched_feature_is_told_the_new_speed():
+def test_the_stretched_feature_is_reported_the_new_speed():
     class Told:
         of_signal, names = False, ('',)
 

@@ -62,7 +62,7 @@ def as_data(pieces):
     ]
 
 
-def test_windows_cover_the_promised_time_and_no_more():
+def test_windows_cover_the_guaranteed_time_and_no_more():
     pieces = run({'signal': stream(3.0)}, [state(1.0, steady_s=1.0), state(2.0, Phase.LIFT)])
     assert starts(pieces) == [1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
     assert first_samples(pieces) == [1000, 1100, 1200, 1300, 1400, 1500]
@@ -86,7 +86,7 @@ def test_a_state_in_the_air_withdraws_the_promise_and_leaves_a_hole_up_to_the_ne
     assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 1.3]
 
 
-def test_a_turn_leaves_a_hole_but_keeps_what_was_promised():
+def test_a_turn_leaves_a_hole_but_keeps_what_was_guaranteed():
     turning = [state(at, force_n=1.0) for at in (1.0, 1.02, 1.04)]
     states = [state(0.0, steady_s=1.01, force_n=1.0), *turning, state(1.06, steady_s=0.6, force_n=1.0)]
     assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 1.1]

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from texture_core.catalogue import find
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_core.parameters import from_mapping
-from texture_core.plain_data import shown
+from texture_core.plain_data import safe_repr
 
 T = TypeVar('T')
 
@@ -25,7 +25,7 @@ def choose(catalogue: Mapping[str, type[T]], entry: Any, kind: str, where: str) 
         entry = {entry: {}}
     if not isinstance(entry, Mapping) or len(entry) != 1:
         raise InvalidParameter(
-            f"{where}: came {shown(entry)}; a {kind} is written 'name' or 'name: {{parameter: value}}'"
+            f"{where}: came {safe_repr(entry)}; a {kind} is written 'name' or 'name: {{parameter: value}}'"
         )
     [(name, values)] = entry.items()
     try:

@@ -17,7 +17,7 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.features import FeatureVector
 from texture_core.parameters import from_mapping, param
-from texture_core.plain_data import shown
+from texture_core.plain_data import safe_repr
 from texture_core.window import Window
 from texture_features.catalogue import FEATURES
 from texture_features.choice import choose
@@ -98,7 +98,7 @@ class FeatureSet:
         inputs = recipe.get('inputs')
         if not isinstance(inputs, Mapping) or not inputs:
             raise InvalidParameter(
-                f'{where}: inputs is {shown(inputs)}; name one or more, '
+                f'{where}: inputs is {safe_repr(inputs)}; name one or more, '
                 "such as 'inputs: {signal: {features: [hjorth]}}'"
             )
         return cls(windows, tuple(_input(str(topic), section, where) for topic, section in inputs.items()))
@@ -220,7 +220,9 @@ class FeatureSet:
 def _input(topic: str, section: Any, where: str) -> InputFeatures:
     place = f"{where}, input '{topic}'"
     if not isinstance(section, Mapping) or not isinstance(section.get('features'), list) or not section['features']:
-        raise InvalidParameter(f"{place}: came {shown(section)}; a list under 'features' is needed, such as [hjorth]")
+        raise InvalidParameter(
+            f"{place}: came {safe_repr(section)}; a list under 'features' is needed, such as [hjorth]"
+        )
     topics = topic.split(JOINT)
     if not all(topics) or len(set(topics)) < len(topics):
         raise InvalidParameter(f"{place}: inputs are joined by their names, as in 'signal+signal_static', each once")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from texture_core.errors import InvalidParameter
-from texture_core.plain_data import load_card, load_yaml, shown
+from texture_core.plain_data import load_card, load_yaml, safe_repr
 from texture_core.resources import find_file
 
 
@@ -27,5 +27,5 @@ def read_recipe(
         path = path.with_suffix('.json')
     content = load_card(path) if path.suffix == '.json' else load_yaml(path, kind)
     if not isinstance(content, Mapping):
-        raise InvalidParameter(f"{kind} '{path}' holds {shown(content)}; a mapping with the key 'inputs' is needed")
+        raise InvalidParameter(f"{kind} '{path}' holds {safe_repr(content)}; a mapping with the key 'inputs' is needed")
     return path.stem, content

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidLaunch
 
 CONDITIONS = ('if', 'unless')
@@ -34,10 +34,10 @@ def check_form(element: Element, kind: str) -> None:
     attributes, children = ALLOWED[kind]
     for name in element.attrib:
         if name not in attributes:
-            raise unknown(name, attributes, f'attribute of <{element.tag}>')
+            raise unknown_name(name, attributes, f'attribute of <{element.tag}>')
     for child in element:
         if children is not None and child.tag not in children:
-            raise unknown(child.tag, children, f'element inside <{element.tag}>')
+            raise unknown_name(child.tag, children, f'element inside <{element.tag}>')
 
 
 def attribute(element: Element, name: str) -> str:

@@ -6,14 +6,14 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from texture_core import resources
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidLaunch
 
 SUFFIX = '.launch.xml'
 
 
 def find_launch_file(name_or_path: str) -> Path:
-    """Return a launch file: a path, or the name of one of this package, such as 'bench' or 'bench.launch.xml'.
+    """Return a launch file: a path, or the name of one of this package, such as 'bench' or 'emulator.launch.xml'.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def find_launch_file(name_or_path: str) -> Path:
     }
     name = name_or_path.removesuffix(SUFFIX)
     if name not in shipped:
-        raise unknown(name, shipped, 'launch file')
+        raise unknown_name(name, shipped, 'launch file')
     return shipped[name]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 
 INDEX = Path('share') / 'ament_index' / 'resource_index' / 'packages'
 
@@ -22,7 +22,7 @@ def prefix(package: str) -> Path:
         if (candidate / INDEX / package).exists():
             return candidate
     installed = {item.name for place in _prefixes() for item in (place / INDEX).glob('*')}
-    raise unknown(package, installed, 'package')
+    raise unknown_name(package, installed, 'package')
 
 
 def share(package: str) -> Path:
@@ -41,7 +41,7 @@ def executable(package: str, name: str) -> Path:
     folder = prefix(package) / 'lib' / package
     path = folder / name
     if not (path.is_file() and os.access(path, os.X_OK)):
-        raise unknown(name, {item.name for item in folder.glob('*')}, f"executable of package '{package}'")
+        raise unknown_name(name, {item.name for item in folder.glob('*')}, f"executable of package '{package}'")
     return path
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidLaunch, TextureError
 from texture_core.files import FileRefused, read_bounded
 from texture_launch.description import Argument, NodeDescription
@@ -21,10 +21,10 @@ from texture_launch.elements import CONDITIONS, attribute, check_form, is_declar
 from texture_launch.node_element import joined_namespace, read_node
 from texture_launch.scope import Scope
 
-MOST_INCLUDES = 20  # of files within each other
-MOST_BYTES = 200_000  # of one file; the longest in use has 5 kB
-MOST_DEPTH = 30  # of elements within each other
-MOST_ELEMENTS = 5000  # in one file, and that are performed in all files together
+MAX_INCLUDES = 20  # of files within each other
+MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
+MAX_DEPTH = 30  # of elements within each other
+MAX_ELEMENTS = 5000  # in one file, and that are performed in all files together
 
 
 class _BoundedTree(ElementTree.TreeBuilder):
@@ -38,9 +38,9 @@ class _BoundedTree(ElementTree.TreeBuilder):
         """Begin an element."""
         self._depth += 1
         self._count += 1
-        if self._depth > MOST_DEPTH or self._count > MOST_ELEMENTS:
+        if self._depth > MAX_DEPTH or self._count > MAX_ELEMENTS:
             raise FileRefused(
-                f'it has more than {MOST_ELEMENTS} elements, or some more than {MOST_DEPTH} deep within each other'
+                f'it has more than {MAX_ELEMENTS} elements, or some more than {MAX_DEPTH} deep within each other'
             )
         return super().start(tag, attrs)
 
@@ -83,7 +83,7 @@ def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -
     _read_file(path, Scope(dict(given), dict(environment)), reading)
     for name in given:
         if name not in reading.declared:
-            raise unknown(name, reading.declared, f'argument of {path.name}')
+            raise unknown_name(name, reading.declared, f'argument of {path.name}')
     return reading.nodes
 
 
@@ -107,7 +107,7 @@ def _certain_includes(path: Path, environment: Mapping[str, str], seen: set[Path
     for element in _parse(path).iter('include'):
         with contextlib.suppress(TextureError):
             included = Path(Scope({}, dict(environment)).expand(attribute(element, 'file')))
-            if included in seen or len(seen) > MOST_INCLUDES:
+            if included in seen or len(seen) > MAX_INCLUDES:
                 continue
             seen.add(included)
             inner = list(_certain_includes(included, environment, seen))
@@ -117,7 +117,7 @@ def _certain_includes(path: Path, environment: Mapping[str, str], seen: set[Path
 
 def _parse(path: Path) -> Element:
     try:
-        content = read_bounded(path, MOST_BYTES)
+        content = read_bounded(path, MAX_BYTES)
         root: Element = ElementTree.fromstring(content, ElementTree.XMLParser(target=_BoundedTree()))
     except OSError as error:
         raise InvalidLaunch(f"launch file '{path}' cannot be read: {error.strerror}") from error
@@ -132,8 +132,8 @@ def _parse(path: Path) -> Element:
 
 def _read_file(path: Path, scope: Scope, reading: Reading) -> None:
     root = _parse(path)
-    if len(reading.files) > MOST_INCLUDES:
-        raise InvalidLaunch(f"'{path}' is included more than {MOST_INCLUDES} levels deep; does it include itself?")
+    if len(reading.files) > MAX_INCLUDES:
+        raise InvalidLaunch(f"'{path}' is included more than {MAX_INCLUDES} levels deep; does it include itself?")
     reading.files.append(path)
     # Also those behind a condition that is not met: to give one of them is no error.
     reading.declared |= {argument.name for argument in declared_arguments(path)}
@@ -148,12 +148,12 @@ def _read_file(path: Path, scope: Scope, reading: Reading) -> None:
 def _read_children(parent: Element, scope: Scope, reading: Reading) -> None:
     for element in parent:
         reading.elements += 1
-        if reading.elements > MOST_ELEMENTS:
+        if reading.elements > MAX_ELEMENTS:
             raise InvalidLaunch(
-                f'the files included have more than {MOST_ELEMENTS} elements; do they include each other?'
+                f'the files included have more than {MAX_ELEMENTS} elements; do they include each other?'
             )
         if element.tag not in READERS:
-            raise unknown(element.tag, READERS, 'launch element')
+            raise unknown_name(element.tag, READERS, 'launch element')
         check_form(element, element.tag)
         if _wanted(element, scope):
             READERS[element.tag](element, scope, reading)
@@ -205,7 +205,7 @@ def _read_include(element: Element, scope: Scope, reading: Reading) -> None:
         check_form(item, 'arg of an include')
         name = scope.expand(attribute(item, 'name'))
         if name not in known:
-            raise unknown(name, known, f'argument of {path.name}')
+            raise unknown_name(name, known, f'argument of {path.name}')
         given[name] = scope.expand(attribute(item, 'value'))
     scope.variables.update(given)
     _read_file(path, scope, reading)

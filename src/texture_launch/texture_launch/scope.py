@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from texture_core.catalogue import find, unknown
+from texture_core.catalogue import find, unknown_name
 from texture_core.errors import InvalidLaunch
 from texture_launch import packages, template
 
@@ -47,7 +47,7 @@ class Scope:
 def _variable(scope: Scope, arguments: Sequence[str]) -> str:
     name, *default = arguments
     if name not in scope.variables and not default:
-        raise unknown(name, scope.variables, 'launch variable')
+        raise unknown_name(name, scope.variables, 'launch variable')
     return scope.variables.get(name, *default)
 
 

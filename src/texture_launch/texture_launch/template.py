@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from texture_core.errors import InvalidLaunch
 
 # A text in a launch file is a path, a number or a short list. Twenty that double each other would fill the memory.
-MOST_CHARACTERS = 10_000
-MOST_DEPTH = 30  # of calls within each other
+MAX_CHARACTERS = 10_000
+MAX_DEPTH = 30  # of calls within each other
 NAME = re.compile(r'[A-Za-z][\w-]*')
 
 
@@ -50,9 +50,9 @@ def expand(template: Template, perform: Perform) -> str:
 
 
 def _bounded(text: str) -> str:
-    if len(text) > MOST_CHARACTERS:
+    if len(text) > MAX_CHARACTERS:
         raise InvalidLaunch(
-            f'a text has {len(text)} characters, with what stands for its calls; {MOST_CHARACTERS} are allowed'
+            f'a text has {len(text)} characters, with what stands for its calls; {MAX_CHARACTERS} are allowed'
         )
     return text
 
@@ -90,8 +90,8 @@ class _Reader:
     def _call(self) -> Call:
         start = self._at
         self._depth += 1
-        if self._depth > MOST_DEPTH:
-            raise InvalidLaunch(f'a text has substitutions more than {MOST_DEPTH} deep within each other')
+        if self._depth > MAX_DEPTH:
+            raise InvalidLaunch(f'a text has substitutions more than {MAX_DEPTH} deep within each other')
         self._at += len('$(')
         name = NAME.match(self._text, self._at)
         if not name:

@@ -9,7 +9,7 @@ import yaml
 
 from texture_core.catalogue import find
 from texture_core.errors import InvalidLaunch
-from texture_core.plain_data import BROKEN, parse_yaml
+from texture_core.plain_data import PARSE_ERRORS, parse_yaml
 from texture_launch import template
 
 SCALARS = (bool, int, float, str)
@@ -63,7 +63,7 @@ def _scalar(text: str, kind: type | None, pending: bool) -> Any:
         return text
     try:
         return CONVERT[kind](text)
-    except BROKEN as error:
+    except PARSE_ERRORS as error:
         if pending or (kind is None and isinstance(error, yaml.YAMLError)):
             return text
         wanted = kind.__name__ if kind else 'bool, int, float, str or a list of one of them'
@@ -90,7 +90,7 @@ CONVERT: Mapping[type | None, Callable[[str], Any]] = {int: int, float: float, b
 def _list(text: str, kind: type | None) -> list[Any]:
     try:
         value = parse_yaml(text)
-    except BROKEN as error:
+    except PARSE_ERRORS as error:
         raise InvalidLaunch(f"parameter value '{text}' is no list in YAML: {error}") from error
     if not isinstance(value, list) or not all(isinstance(item, (str, kind or str)) for item in value):
         raise InvalidLaunch(f"parameter value '{text}' is no list of {kind.__name__ if kind else 'values'}")

@@ -66,7 +66,7 @@ def test_stamps_lie_on_the_ten_millisecond_grid_from_the_epoch(tmp_path: Path) -
     assert {after.stamp_ns - before.stamp_ns for before, after in pairwise(fast)} == {20_000_000}
 
 
-def test_a_state_arrives_before_the_batch_it_covers_and_promises_its_length(tmp_path: Path) -> None:
+def test_a_state_arrives_before_the_batch_it_covers_and_guarantees_its_length(tmp_path: Path) -> None:
     (bag,) = import_biotac20(make_source(tmp_path / 'in'), tmp_path / 'out', slides='1')
     covered_ns = 0
     for topic, log_ns, value in read_bag(bag):

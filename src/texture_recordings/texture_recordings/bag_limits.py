@@ -26,7 +26,7 @@ if sys.version_info >= (3, 14):
 else:
     from backports.zstd import ZstdDecompressor
 
-MOST_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
+MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
 # Each record in a chunk becomes objects of 150 bytes, however little it takes in the file.
 RECORDS_AT_LEAST = 16
 PACKED_RECORD_BYTES = 8
@@ -34,10 +34,10 @@ CHUNK = 0x06
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
 RECORD_HEAD = struct.Struct('<BQ')
 # SQLite counts its own steps; reading a row three times takes fewer than a hundred, and a row 30 bytes or more.
-MOST_STEPS = 10_000_000
+MAX_STEPS = 10_000_000
 STEPS_PER_BYTE = 4
 STEPS_AT_ONCE = 100_000
-MOST_TABLES = 100
+MAX_TABLES = 100
 COMPUTED = re.compile(r'\bAS\s*\(|\bVIEW\b|\bVIRTUAL\b|\bTRIGGER\b', re.IGNORECASE)
 
 
@@ -50,7 +50,7 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
         """Return the text of a short file."""
-        return read_text(self, MOST_METADATA_BYTES, encoding or 'utf-8')
+        return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
 
 
 def check_storage(path: Path) -> None:
@@ -109,10 +109,10 @@ def _check_sqlite(path: Path) -> None:
         f'file:{path}?immutable=1', flags=apsw.SQLITE_OPEN_READONLY | apsw.SQLITE_OPEN_URI
     )  # fmt: skip
     try:
-        definitions = connection.execute('SELECT sql FROM sqlite_master LIMIT ?', (MOST_TABLES + 1,)).fetchall()
+        definitions = connection.execute('SELECT sql FROM sqlite_master LIMIT ?', (MAX_TABLES + 1,)).fetchall()
     finally:
         connection.close()
-    if len(definitions) > MOST_TABLES or any(COMPUTED.search(str(sql)) for (sql,) in definitions):
+    if len(definitions) > MAX_TABLES or any(COMPUTED.search(str(sql)) for (sql,) in definitions):
         raise FileRefused('it has tables that are computed, which no bag has')
 
 
@@ -131,7 +131,7 @@ class _Steps:
 def _limit_sqlite(connection: apsw.Connection) -> None:
     size = Path(connection.filename).stat().st_size
     connection.limit(apsw.SQLITE_LIMIT_LENGTH, max(size, MB))
-    connection.set_progress_handler(_Steps(MOST_STEPS + STEPS_PER_BYTE * size), STEPS_AT_ONCE)
+    connection.set_progress_handler(_Steps(MAX_STEPS + STEPS_PER_BYTE * size), STEPS_AT_ONCE)
 
 
 def _unpacked(decompressor: Any, data: bytes, size: int) -> bytes:

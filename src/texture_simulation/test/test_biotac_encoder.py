@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from texture_core.framing import Deframer
+from texture_core.framing import FrameDecoder
 from texture_drivers.biotac.protocol import decode
 from texture_drivers.biotac.tables import LAYOUTS, sampling_command
 from texture_simulation.devices.biotac_encoder import commands, encode_replies, reply_frame, serials_frame, stuff
@@ -37,7 +37,7 @@ def test_the_driver_reads_the_emulators_frames() -> None:
     values = np.zeros((44, 3), dtype=np.uint16)
     body = encode_replies(values[None])[0].tobytes()
     stream = reply_frame(65_537, 2**32 + 5, values, body) + serials_frame(3, 7, ['BT-1', '', 'BT-3'])
-    reply, serials = Deframer().feed(stream)
+    reply, serials = FrameDecoder().feed(stream)
     assert (reply.kind, reply.sequence, reply.time_us, reply.rows, reply.columns, reply.body) == (
         ord('B'), 1, 5, 44, 3, body,
     )  # fmt: skip

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from texture_drivers.biotac.tables import LAYOUTS
-from texture_simulation.path import Path
 from texture_simulation.scene import scene_from
 from texture_simulation.sensors.biotac import PA_PER_N, PATH_RATE_HZ, PDC_PA, BioTacModel
+from texture_simulation.trajectory import Trajectory
 
 BIOTAC = LAYOUTS['biotac']
 PITCH_M = 1e-3
@@ -19,22 +19,22 @@ def model(surface: str) -> BioTacModel:
     return BioTacModel(SCENE, SCENE.surface(surface), np.random.default_rng(0), BIOTAC)
 
 
-def slide(n_frames: int, speed_m_s: float = 0.0, force_n: float = 2.0) -> Path:
+def slide(n_frames: int, speed_m_s: float = 0.0, force_n: float = 2.0) -> Trajectory:
     time_s = np.arange(n_frames * len(BIOTAC.slots)) / PATH_RATE_HZ
-    return Path(speed_m_s * time_s, np.zeros_like(time_s), np.full_like(time_s, force_n))
+    return Trajectory(speed_m_s * time_s, np.zeros_like(time_s), np.full_like(time_s, force_n))
 
 
 def slow(values: np.ndarray, channel: str) -> np.ndarray:
     return values[:, BIOTAC.slots.index(channel)].astype(float)
 
 
-def test_ridges_are_felt_at_speed_over_pitch() -> None:
+def test_ridges_are_measured_at_speed_over_pitch() -> None:
     pac = model('ridges').advance(slide(220, speed_m_s=0.1))[20:, 1::2].ravel().astype(float)
     spectrum = np.abs(np.fft.rfft(pac - pac.mean()))
     assert np.fft.rfftfreq(len(pac), 1 / 2200)[spectrum.argmax()] == pytest.approx(0.1 / PITCH_M, abs=1.0)
 
 
-def test_a_resting_finger_on_a_flat_surface_feels_no_vibration() -> None:
+def test_a_resting_finger_on_a_flat_surface_senses_no_vibration() -> None:
     pac = model('flat').advance(slide(100))[50:, 1::2]
     assert np.ptp(pac) <= 1
     assert pac.mean() == pytest.approx(2030, abs=1)

@@ -7,9 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_simulation.devices.dynamixel import EmulatedDynamixelBus, crc16
-from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, OVERLOAD, DynamixelMotors, Pressing, leap_hand
+from texture_simulation.devices.dynamixel_motors import (
+    LEAP_FINGERS,
+    OVERLOAD,
+    DynamixelMotors,
+    PressingMotor,
+    leap_hand,
+)
 
 DEADLINE_S = 20.0
 PING_1 = bytes.fromhex('fffffd00010300 01 194e'.replace(' ', ''))
@@ -17,7 +23,7 @@ PING_1 = bytes.fromhex('fffffd00010300 01 194e'.replace(' ', ''))
 
 @pytest.fixture
 def bus():
-    return EmulatedDynamixelBus(Path('/nowhere'), DynamixelMotors([1, 2], {1: Pressing(0.1, 0.01)}))
+    return EmulatedDynamixelBus(Path('/nowhere'), DynamixelMotors([1, 2], {1: PressingMotor(0.1, 0.01)}))
 
 
 def packet(motor, instruction, params=b''):
@@ -31,7 +37,7 @@ def write(motor, address, value, size):
 
 
 def read(bus, motor, address, form):
-    answer = bus.hear(packet(motor, 2, struct.pack('<HH', address, struct.calcsize(form))))
+    answer = bus.receive(packet(motor, 2, struct.pack('<HH', address, struct.calcsize(form))))
     return struct.unpack(form, answer[9:-2])[0]
 
 
@@ -41,44 +47,46 @@ def test_the_checksum_is_that_of_the_protocol():
 
 
 def test_a_ping_answers_with_the_model_and_in_pieces(bus):
-    assert bus.hear(PING_1[:4]) == b''
-    answer = bus.hear(PING_1[4:])
+    assert bus.receive(PING_1[:4]) == b''
+    answer = bus.receive(PING_1[4:])
     assert answer[4] == 1
     assert struct.unpack('<H', answer[9:11])[0] == 1240
 
 
 def test_noise_and_a_wrong_checksum_get_no_answer(bus):
-    assert bus.hear(b'\x00\xff' + PING_1[:-1] + b'\x00') == b''
-    assert bus.hear(PING_1)
+    assert bus.receive(b'\x00\xff' + PING_1[:-1] + b'\x00') == b''
+    assert bus.receive(PING_1)
 
 
 def test_the_mode_cannot_be_changed_under_torque(bus):
-    bus.hear(write(1, 64, 1, 1))
-    assert bus.hear(write(1, 11, 5, 1))[8] == 7
-    bus.hear(write(1, 64, 0, 1))
-    assert bus.hear(write(1, 11, 5, 1))[8] == 0
+    bus.receive(write(1, 64, 1, 1))
+    assert bus.receive(write(1, 11, 5, 1))[8] == 7
+    bus.receive(write(1, 64, 0, 1))
+    assert bus.receive(write(1, 11, 5, 1))[8] == 0
 
 
 def test_a_sync_read_ends_at_the_first_that_is_silent(bus):
     bus.motors.absent = {1}
     ask = packet(0xFE, 0x82, struct.pack('<HH', 132, 4) + bytes([1, 2]))
-    assert bus.hear(ask) == b''
+    assert bus.receive(ask) == b''
     bus.motors.absent = set()
-    assert bus.hear(ask).count(b'\xff\xff\xfd\x00') == 2
+    assert bus.receive(ask).count(b'\xff\xff\xfd\x00') == 2
 
 
 def test_the_goal_current_bounds_the_force(bus):
     for address, value, size in ((84, 600, 2), (102, 200, 2), (116, 2048 + 400, 4), (64, 1, 1)):
-        bus.hear(write(1, address, value, size))
+        bus.receive(write(1, address, value, size))
     bus.motors.advance(4000)
     assert bus.motors.forces_n[1] == pytest.approx(0.2 * 0.517 / 0.1, rel=0.01)  # current · torque constant / lever
     assert read(bus, 1, 126, '<h') == 200
 
 
 def test_a_motor_presses_calmly_however_stiff_the_object():
-    stiff = EmulatedDynamixelBus(Path('/nowhere'), DynamixelMotors([1], {1: Pressing(0.1, 0.01)}, stiffness_n_m=1e5))
+    stiff = EmulatedDynamixelBus(
+        Path('/nowhere'), DynamixelMotors([1], {1: PressingMotor(0.1, 0.01)}, stiffness_n_m=1e5)
+    )
     for address, value, size in ((84, 600, 2), (102, 200, 2), (116, 2048 + 400, 4), (64, 1, 1)):
-        stiff.hear(write(1, address, value, size))
+        stiff.receive(write(1, address, value, size))
     stiff.motors.advance(4000)
     for _ in range(20):
         stiff.motors.advance(1)
@@ -87,7 +95,7 @@ def test_a_motor_presses_calmly_however_stiff_the_object():
 
 def test_a_free_motor_goes_to_its_goal(bus):
     for address, value, size in ((84, 600, 2), (102, 300, 2), (116, 1948, 4), (64, 1, 1)):
-        bus.hear(write(2, address, value, size))
+        bus.receive(write(2, address, value, size))
     bus.motors.advance(2000)
     assert read(bus, 2, 132, '<i') == 1948
 
@@ -97,7 +105,7 @@ S = 2000  # steps of the mechanics in a second
 
 
 def error_of(bus, request):
-    return bus.hear(request)[8]
+    return bus.receive(request)[8]
 
 
 def pressed(bus):
@@ -106,7 +114,7 @@ def pressed(bus):
         assert error_of(bus, write(1, address, value, size)) == 0
     for _ in range(20):
         bus.motors.advance(S // 20)
-        bus.hear(packet(2, 1))  # to another motor
+        bus.receive(packet(2, 1))  # to another motor
 
 
 def test_a_motor_that_hears_nothing_stops_and_takes_no_goal_until_its_watchdog_is_cleared(bus):
@@ -127,7 +135,7 @@ def test_a_motor_that_hears_nothing_stops_and_takes_no_goal_until_its_watchdog_i
 
 
 def test_firmware_whose_watchdog_only_reports_presses_on():
-    motors = DynamixelMotors([1, 2], {1: Pressing(0.1, 0.01)}, watchdog_stops=False)
+    motors = DynamixelMotors([1, 2], {1: PressingMotor(0.1, 0.01)}, watchdog_stops=False)
     bus = EmulatedDynamixelBus(Path('/nowhere'), motors)
     pressed(bus)
     bus.motors.advance(S)
@@ -136,8 +144,8 @@ def test_firmware_whose_watchdog_only_reports_presses_on():
 
 
 def test_a_watchdog_that_is_not_armed_or_without_torque_does_not_trip(bus):
-    bus.hear(write(1, 64, 1, 1))
-    bus.hear(write(2, 98, 1, 1))
+    bus.receive(write(1, 64, 1, 1))
+    bus.receive(write(2, 98, 1, 1))
     bus.motors.advance(S)
     assert (read(bus, 1, 98, '<b'), read(bus, 2, 98, '<b')) == (0, 1)
 
@@ -150,7 +158,7 @@ def test_an_overload_ends_the_torque_until_a_reboot(bus):
     assert error_of(bus, write(1, 64, 1, 1)) == ALERT | ACCESS
     assert error_of(bus, write(1, 64, 0, 1)) == ALERT
     assert error_of(bus, packet(1, 8)) == ALERT
-    assert bus.hear(packet(1, 1)) == b''  # it starts
+    assert bus.receive(packet(1, 1)) == b''  # it starts
     bus.motors.advance(S)
     assert error_of(bus, packet(1, 1)) == 0
     assert error_of(bus, write(1, 64, 1, 1)) == 0
@@ -164,11 +172,11 @@ def test_what_a_motor_refuses_it_answers_and_does_not_do(bus):
     assert error_of(bus, write(1, 102, 1, 1)) == LENGTH
     assert error_of(bus, write(1, 126, 1, 2)) == ACCESS  # what is measured
     assert error_of(bus, packet(1, 0x77)) == 2  # no such instruction
-    bus.hear(packet(0xFE, 0x83, struct.pack('<HHBHBH', 102, 2, 1, 1751, 2, 100)))
+    bus.receive(packet(0xFE, 0x83, struct.pack('<HHBHBH', 102, 2, 1, 1751, 2, 100)))
     assert (read(bus, 1, 102, '<h'), read(bus, 2, 102, '<h')) == (1750, 100)
 
 
-def test_the_bench_is_told_where_the_finger_is_and_how_hard_it_presses(tmp_path):
+def test_the_bench_is_reported_where_the_finger_is_and_how_hard_it_presses(tmp_path):
     motors, finger = leap_hand(), LEAP_FINGERS['index']
     # 174 mA · 0.517 N·m/A / 0.09 m = 1 N
     for motor, current_ma, angle_rad in ((finger.press, 174, 0.4), (finger.across, 350, 0.1)):

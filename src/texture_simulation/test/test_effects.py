@@ -10,22 +10,22 @@ import pytest
 from scipy import signal
 
 from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.effects.contact_growth import ForceGain, PatchGrowth
 from texture_simulation.effects.drift import Drift
 from texture_simulation.effects.dropouts import Dropouts
 from texture_simulation.effects.finger_spread import FingerSpread
-from texture_simulation.effects.growth import ForceGain, PatchGrowth
 from texture_simulation.effects.mains_hum import MainsHum
 from texture_simulation.effects.motor_vibration import MotorVibration
 from texture_simulation.effects.noise import Noise
+from texture_simulation.effects.protocols import ForceEffect, PathEffect, SignalEffect
 from texture_simulation.effects.quantisation import Quantisation
 from texture_simulation.effects.skids import Skids
 from texture_simulation.effects.skin import Skin
 from texture_simulation.effects.slide_error import SlideError
-from texture_simulation.effects.stages import ForceEffect, PathEffect, SignalEffect
 from texture_simulation.effects.unevenness import Unevenness
-from texture_simulation.path import Path
 from texture_simulation.scene import scene_from
 from texture_simulation.sensors.catalogue import SENSORS
+from texture_simulation.trajectory import Trajectory
 
 RATE_HZ = 1000.0
 CUTS = (0, 3, 3, 400, 401, 1000)
@@ -39,9 +39,9 @@ def on_signal(effect: Any, samples: np.ndarray, *, slow: bool = False, seed: int
     return effect.start_signal(rng(seed), RATE_HZ, (), samples.shape[-1], slow=slow)(samples)
 
 
-def along_x(speed_m_s: float, count: int = 1000, force_n: float = 1.0) -> Path:
+def along_x(speed_m_s: float, count: int = 1000, force_n: float = 1.0) -> Trajectory:
     x_m = speed_m_s * np.arange(count) / RATE_HZ
-    return Path(x_m, np.zeros_like(x_m), np.full_like(x_m, force_n))
+    return Trajectory(x_m, np.zeros_like(x_m), np.full_like(x_m, force_n))
 
 
 def test_noise_has_the_stated_density_at_all_frequencies() -> None:
@@ -107,7 +107,7 @@ def test_the_skin_resonates_where_and_as_much_as_mass_spring_and_damper() -> Non
     assert np.abs(found) == pytest.approx(1 / np.hypot(1 - ratio**2, 2 * 0.2 * ratio), rel=2e-3)
 
 
-def test_the_energy_of_a_struck_skin_never_grows() -> None:
+def test_the_energy_of_a_pushed_skin_never_grows() -> None:
     skin = Skin(resonance_hz=400.0, damping=0.01).start_force(rng(), RATE_HZ, ())
     struck = np.zeros(4000)
     struck[0] = 1.0
@@ -118,9 +118,9 @@ def test_the_energy_of_a_struck_skin_never_grows() -> None:
 
 def test_the_motor_shakes_at_speed_times_steps_and_not_at_rest_or_in_the_air() -> None:
     shaking = MotorVibration(rms_n=1e-3, steps_1_m=1000.0)
-    felt = shaking.start_force(rng(), RATE_HZ, ())(along_x(0.1), np.zeros(1000))
-    assert np.abs(np.fft.rfft(felt)).argmax() == 100
-    assert felt.std() == pytest.approx(1e-3, rel=0.01)
+    measured = shaking.start_force(rng(), RATE_HZ, ())(along_x(0.1), np.zeros(1000))
+    assert np.abs(np.fft.rfft(measured)).argmax() == 100
+    assert measured.std() == pytest.approx(1e-3, rel=0.01)
     assert np.ptp(shaking.start_force(rng(), RATE_HZ, ())(along_x(0.0), np.zeros(1000))) < 1e-15
     assert not shaking.start_force(rng(), RATE_HZ, ())(along_x(0.1, force_n=0.0), np.zeros(1000)).any()
 
@@ -134,7 +134,7 @@ def test_size_and_stiffness_of_the_contact_grow_with_the_cube_root_of_the_force(
 
 def test_unevenness_has_its_spread_and_the_mean_1() -> None:
     x_m, y_m = np.meshgrid(np.linspace(0, 1, 1000), np.linspace(0, 1, 50))
-    gain = Unevenness(relative=0.2).gain(Path(x_m.ravel(), y_m.ravel(), np.ones(x_m.size)), 0)
+    gain = Unevenness(relative=0.2).gain(Trajectory(x_m.ravel(), y_m.ravel(), np.ones(x_m.size)), 0)
     assert np.mean(gain) == pytest.approx(1.0, abs=0.01)
     assert np.std(gain) == pytest.approx(0.2, rel=0.05)
 
@@ -192,6 +192,6 @@ def test_every_effect_works_with_every_sensor_and_is_off_unless_named(name: str,
     kind = SENSORS[sensor]
     count = kind.step_points * round(0.2 * kind.path_rate_hz / kind.step_points)
     x_m = 0.1 * np.arange(count) / kind.path_rate_hz
-    path = Path(x_m, np.zeros_like(x_m), np.full_like(x_m, 2.0))
-    felt = kind.make(named, named.surface('rough'), rng(), settled=True).streams(path)
-    assert all(np.isfinite(samples).all() for samples in felt.values())
+    path = Trajectory(x_m, np.zeros_like(x_m), np.full_like(x_m, 2.0))
+    measured = kind.make(named, named.surface('rough'), rng(), settled=True).streams(path)
+    assert all(np.isfinite(samples).all() for samples in measured.values())

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_simulation.path import Path
-from texture_simulation.scans import scans
 from texture_simulation.scene import Scene, scene_from
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.slide_batches import simulate_slides
 from texture_simulation.stick_slip.limit_cycle import slow_drag
 from texture_simulation.surfaces.sliding_friction import CREEP_M_S, SlidingDrag, SlidingFriction
+from texture_simulation.trajectory import Trajectory
 
 RATE_HZ = 2000.0
 HANGS = {'kind': 'stick_slip'}
@@ -27,36 +27,42 @@ def table(*terms: dict, sensor: str = 'tsf85') -> Scene:
 
 def dragged_n(speed_m_s: np.ndarray, force_n: float = 1.0, **values: float) -> np.ndarray:
     x_m = np.cumsum(speed_m_s) / RATE_HZ
-    path = Path(x_m, 0 * x_m, np.full_like(x_m, force_n))
-    return SlidingDrag(SlidingFriction(felt=1.0, **values), RATE_HZ).advance(path)
+    path = Trajectory(x_m, 0 * x_m, np.full_like(x_m, force_n))
+    return SlidingDrag(SlidingFriction(force_coupling=1.0, **values), RATE_HZ).advance(path)
 
 
 @pytest.mark.parametrize('sensor', SENSORS)
-def test_every_sensor_feels_a_skin_that_hangs_and_lets_go(sensor: str) -> None:
-    felt = [
-        scans(table(*terms, sensor=sensor), 'sheet', 3, Sliding(0.05, 1.5, 0.3), np.random.default_rng(0))
+def test_every_sensor_senses_a_skin_that_hangs_and_lets_go(sensor: str) -> None:
+    measured = [
+        simulate_slides(
+            table(*terms, sensor=sensor), 'sheet', 3, SimulatedSlide(0.05, 1.5, 0.3), np.random.default_rng(0)
+        )
         for terms in ([], [HANGS])
     ]
-    assert np.isfinite(felt[1]).all()
-    assert (felt[0].std(axis=1) < 0.01 * felt[1].std(axis=1)).all()
+    assert np.isfinite(measured[1]).all()
+    assert (measured[0].std(axis=1) < 0.01 * measured[1].std(axis=1)).all()
 
 
 def test_the_skin_lets_go_as_often_as_the_formula_of_slow_drag_says() -> None:
     scene = table(HANGS)
     friction = scene.surface('sheet').friction
     speed_m_s, force_n, duration_s = 0.01, 1.5, 4.0
-    felt = scans(scene, 'sheet', 1, Sliding(speed_m_s, force_n, duration_s), np.random.default_rng(0))[0, :, 0]
-    jumps = np.flatnonzero(np.abs(felt) > 0.5 * np.abs(felt).max()) / 1000
+    measured = simulate_slides(
+        scene, 'sheet', 1, SimulatedSlide(speed_m_s, force_n, duration_s), np.random.default_rng(0)
+    )[0, :, 0]
+    jumps = np.flatnonzero(np.abs(measured) > 0.5 * np.abs(measured).max()) / 1000
     times_s = jumps[np.diff(jumps, prepend=-1.0) > 0.02]
     assert np.diff(times_s).mean() == pytest.approx(slow_drag(friction, speed_m_s, force_n).period_s, rel=0.1)
 
 
 def test_slides_cut_out_of_longer_ones_begin_anywhere_in_the_cycle_and_a_seed_is_one_of_them() -> None:
-    def felt(seed: int) -> np.ndarray:
-        return scans(table(HANGS), 'sheet', 3, Sliding(0.02, 1.5, 0.3), np.random.default_rng(seed))[..., 0]
+    def measured(seed: int) -> np.ndarray:
+        return simulate_slides(table(HANGS), 'sheet', 3, SimulatedSlide(0.02, 1.5, 0.3), np.random.default_rng(seed))[
+            ..., 0
+        ]
 
-    assert np.array_equal(felt(1), felt(1))
-    assert np.abs(np.corrcoef(felt(1))[np.triu_indices(3, 1)]).max() < 0.9
+    assert np.array_equal(measured(1), measured(1))
+    assert np.abs(np.corrcoef(measured(1))[np.triu_indices(3, 1)]).max() < 0.9
 
 
 def test_steady_sliding_pulls_as_the_stribeck_curve_says() -> None:
@@ -78,7 +84,7 @@ def test_sliding_friction_builds_up_and_ebbs_away_without_a_jump() -> None:
 
 def test_blocks_of_a_path_give_the_same_pull_as_the_whole() -> None:
     x_m = np.cumsum(np.linspace(0, 0.1, 300)) / RATE_HZ
-    path = Path(x_m, 0 * x_m, np.full_like(x_m, 2.0))
+    path = Trajectory(x_m, 0 * x_m, np.full_like(x_m, 2.0))
     whole = SlidingDrag(SlidingFriction(), RATE_HZ).advance(path)
     pieces = SlidingDrag(SlidingFriction(), RATE_HZ)
     cuts = [0, 2, 2, 90, 300]
@@ -90,7 +96,7 @@ def test_a_swapped_sample_brings_its_own_friction() -> None:
     scene = scene_from('test', {'surfaces': {'sticky': [HANGS], 'bare': []}})
     model = SENSORS['tsf85'].make(scene, scene.surface('sticky'), np.random.default_rng(0))
     x_m = 0.05 * np.arange(2000) / RATE_HZ
-    path = Path(x_m, 0 * x_m, np.full_like(x_m, 1.5))
+    path = Trajectory(x_m, 0 * x_m, np.full_like(x_m, 1.5))
     assert model.streams(path)['signal'].std() > 100
     model.touch.surface = scene.surface('bare')
     assert model.streams(path)['signal'][500:].std() < 1

@@ -1,4 +1,4 @@
-"""The other sensors on the emulated bench: scene, model, device, line and driver together."""
+"""The other sensors on the emulator: scene, model, device, line and driver together."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_core.signal import NANOSECONDS
 from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.daq.sensor import daq
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
-from texture_simulation.bench import Bench, BenchParams
+from texture_simulation.emulator import Emulator, EmulatorParams
 from texture_simulation.live_sensor import live_biotac, live_daq
 from texture_simulation.scene import load_scene
 
@@ -27,20 +27,20 @@ SPEED_M_S, FORCE_N = 0.1, 2.0  # over ridges of 2 mm: 50 Hz
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Bench]:
-    params = BenchParams(
+def bench(tmp_path: Path) -> Iterator[Emulator]:
+    params = EmulatorParams(
         surface='ridge_2mm_deep',
-        tsf85_link=str(tmp_path / 'tsf85'),
+        sensor_link=str(tmp_path / 'tsf85'),
         daq_link=str(tmp_path / 'daq'),
         pvdf_link=str(tmp_path / 'pvdf'),
         finger_port=0,
     )
-    with Bench(params) as made:
+    with Emulator(params) as made:
         yield made
 
 
 @pytest.fixture
-def arm(bench: Bench) -> Iterator[None]:
+def arm(bench: Emulator) -> Iterator[None]:
     """An arm whose finger slides for ever along x."""
     stop = threading.Event()
 
@@ -79,18 +79,18 @@ def peak_hz(samples: np.ndarray, rate_hz: float) -> float:
     return float(np.fft.rfftfreq(len(samples), 1 / rate_hz)[spectrum.argmax()])
 
 
-def test_the_daq_finger_feels_the_ridges_at_speed_over_pitch(bench: Bench, arm: None, tmp_path: Path) -> None:
+def test_the_daq_finger_senses_the_ridges_at_speed_over_pitch(bench: Emulator, arm: None, tmp_path: Path) -> None:
     samples = read(daq(SensorParams(device=str(tmp_path / 'daq'))), 3.0)['signal'][2500:]
     assert peak_hz(samples[:, 0], 2500.0) == pytest.approx(50.0, abs=1.0)
 
 
-def test_the_pvdf_finger_feels_ridges_and_force(bench: Bench, arm: None, tmp_path: Path) -> None:
+def test_the_pvdf_finger_senses_ridges_and_force(bench: Emulator, arm: None, tmp_path: Path) -> None:
     found = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 3.0)
     assert peak_hz(found['signal'][4096:, 0], 4096.0) == pytest.approx(50.0, abs=1.0)
     assert found['signal_static'][64:].mean() == pytest.approx(FORCE_N, rel=0.05)
 
 
-def test_swapping_the_sample_is_felt_by_all(bench: Bench, arm: None, tmp_path: Path) -> None:
+def test_swapping_the_sample_is_measured_by_all(bench: Emulator, arm: None, tmp_path: Path) -> None:
     rough = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 2.0)['signal'][4096:].std()
     bench.set_surface('glass')
     smooth = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 2.0)['signal'][4096:].std()
@@ -98,7 +98,7 @@ def test_swapping_the_sample_is_felt_by_all(bench: Bench, arm: None, tmp_path: P
 
 
 def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
-    scene = load_scene('bench')
+    scene = load_scene('twelve_textures')
     live = live_daq(scene, scene.surface('glass'), tmp_path / 'daq', np.random.default_rng(0))
     live.advance(0)
     live.advance(10 * NANOSECONDS)
@@ -106,8 +106,8 @@ def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
 
 
 def test_the_bench_may_hold_a_biotac_alone(tmp_path: Path) -> None:
-    params = BenchParams(sensor='biotac', tsf85_link=str(tmp_path / 'biotac'), finger_port=0)
-    with Bench(params) as bench:
+    params = EmulatorParams(sensor='biotac', sensor_link=str(tmp_path / 'biotac'), finger_port=0)
+    with Emulator(params) as bench:
         found = read(BioTac(SensorParams(device=str(tmp_path / 'biotac'))), 1.0)
     assert bench.counts['bytes nobody took'] == 0
     assert found['signal'].mean() == pytest.approx(2030, abs=30)  # nothing touches: PAC idles
@@ -115,7 +115,7 @@ def test_the_bench_may_hold_a_biotac_alone(tmp_path: Path) -> None:
 
 
 def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:
-    scene = load_scene('bench')
+    scene = load_scene('twelve_textures')
     live = live_biotac(scene, scene.surface('glass'), tmp_path / 'biotac', np.random.default_rng(0))
     live.advance(0)
     live.advance(10 * NANOSECONDS)

@@ -11,7 +11,7 @@ from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
 
 START_NS = 1_700_000_000 * NANOSECONDS
-SCENE = load_scene('bench')
+SCENE = load_scene('twelve_textures')
 
 
 def explore(surface='ridge_2mm_deep', seed=0, **more):
@@ -19,7 +19,7 @@ def explore(surface='ridge_2mm_deep', seed=0, **more):
     return simulate_exploration(SCENE, surface, 0.1, 2.0, 1.0, start_ns=START_NS, exploration_id='one', rng=rng, **more)
 
 
-def test_the_phases_come_in_order_and_the_slide_is_covered_by_promises() -> None:
+def test_the_phases_come_in_order_and_the_slide_is_covered_by_guarantees() -> None:
     states, _ = explore()
     phases = [state.phase for state in states]
     assert list(dict.fromkeys(phases)) == [Phase.APPROACH, Phase.CONTACT, Phase.SLIDE, Phase.LIFT, Phase.DONE]

@@ -17,7 +17,7 @@ def move(vx=0.0, vy=0.0, mode=HOLD, value=0):
 
 def advance(firmware, seconds, keep=b''):
     for _ in range(round(seconds / STEP_S)):
-        firmware.hear(keep)
+        firmware.receive(keep)
         firmware.advance(STEP_S)
 
 
@@ -39,7 +39,7 @@ def test_pressing_stops_at_the_force_and_locks():
 
 def test_silence_of_150_ms_stops_everything():
     firmware = RailsFirmware(RailsMachine())
-    firmware.hear(move(0.02))
+    firmware.receive(move(0.02))
     advance(firmware, 0.14)
     assert firmware.velocity[0] == pytest.approx(0.02)
     advance(firmware, 0.05)
@@ -70,7 +70,7 @@ def test_an_overload_lifts_the_finger_whatever_is_ordered_until_cleared():
     advance(firmware, 0.1, move(mode=PRESS, value=1000))
     assert state(firmware)[4] & OVERLOAD
     firmware.surface_m = 0.0
-    firmware.hear(pack(Frame(0xA2, 1, 0, 0, 1, 1, b'')))
+    firmware.receive(pack(Frame(0xA2, 1, 0, 0, 1, 1, b'')))
     assert not state(firmware)[4] & OVERLOAD
 
 
@@ -78,7 +78,7 @@ def test_damaged_orders_are_counted_and_passed_over():
     firmware = RailsFirmware(RailsMachine())
     broken = bytearray(move(0.02))
     broken[5] ^= 0x40  # not to zero, which would make two of one
-    firmware.hear(bytes(broken) + move(0.01))
+    firmware.receive(bytes(broken) + move(0.01))
     advance(firmware, 0.1)
     assert firmware.bad_frames == 1
     assert firmware.velocity[0] == pytest.approx(0.01)

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_core.ros.local_graph import LocalGraph
 from texture_simulation.nodes.leap_hand import LeapHandNode
 from texture_simulation.nodes.rails import RailsNode
@@ -24,7 +24,7 @@ def graph():
 
 
 @pytest.mark.parametrize('name', NODES)
-def test_the_device_lives_with_its_node_and_tells_where_the_finger_is(name, graph, tmp_path):
+def test_the_device_lives_with_its_node_and_reports_where_the_finger_is(name, graph, tmp_path):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
         bench.bind(('127.0.0.1', 0))
         bench.settimeout(DEADLINE_S)
@@ -39,7 +39,7 @@ def test_the_device_lives_with_its_node_and_tells_where_the_finger_is(name, grap
         assert not (tmp_path / name).exists()
 
 
-def test_a_link_that_cannot_be_made_is_told(graph, tmp_path):
+def test_a_link_that_cannot_be_made_is_reported(graph, tmp_path):
     (tmp_path / 'file').touch()
     with pytest.raises(DeviceError, match='no link at'):
         graph.add(RailsNode, link=str(tmp_path / 'file'))

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from texture_simulation.devices.sampler import Sampled, encode
+from texture_simulation.devices.sampler import SampledStream, encode
 
 
 def test_a_frame_is_what_the_protocol_says_byte_by_byte():
     counts = np.array([[0x0102, -1], [0, 0x7F00]], dtype=np.int16)
-    data = encode(Sampled(kind=1, rate_hz=2500.0, columns=2, rows=2), 65_536 + 3, 2**32 + 0x04030201, counts)
+    data = encode(SampledStream(kind=1, rate_hz=2500.0, columns=2, rows=2), 65_536 + 3, 2**32 + 0x04030201, counts)
     # Before stuffing: 01 01 0300 01020304 02 02 | 0201 FFFF 0000 007F | checksum, whose bits were worked by hand.
     checksum = bitwise_crc(bytes.fromhex('01 01 0300 01020304 02 02 0201 FFFF 0000 007F')).to_bytes(2, 'little')
     stuffed = bytes.fromhex('04 01 01 03 0B 01 02 03 04 02 02 02 01 FF FF 01 01 04 7F') + checksum + b'\x00'
@@ -26,6 +26,6 @@ def bitwise_crc(data: bytes) -> int:
 @pytest.mark.parametrize('rows', [1, 32, 255])
 def test_no_zero_stands_within_a_frame(rows):
     counts = np.zeros((rows, 8), dtype=np.int16)
-    data = encode(Sampled(kind=1, rate_hz=2500.0, columns=8, rows=rows), 0, 0, counts)
+    data = encode(SampledStream(kind=1, rate_hz=2500.0, columns=8, rows=rows), 0, 0, counts)
     assert data.count(0) == 1
     assert data[-1] == 0

@@ -8,7 +8,7 @@ from texture_simulation.scene import load_scene, scene_from
 
 
 def test_the_bench_has_at_least_ten_surfaces_that_differ() -> None:
-    scene = load_scene('bench')
+    scene = load_scene('twelve_textures')
     x_m = np.linspace(0, 0.05, 1000)
     heights = [surface.height_m(x_m, 0 * x_m, 0 * x_m + 1e-4) for surface in scene.surfaces.values()]
     assert len(heights) >= 10
@@ -23,9 +23,9 @@ def test_effects_are_off_unless_named() -> None:
 
 def test_an_unknown_surface_or_scene_gets_the_nearest_name() -> None:
     with pytest.raises(UnknownName, match="did you mean 'ridge_1mm'"):
-        load_scene('bench').surface('ridge_1m')
-    with pytest.raises(UnknownName, match="did you mean 'bench'"):
-        load_scene('bensch')
+        load_scene('twelve_textures').surface('ridge_1m')
+    with pytest.raises(UnknownName, match="did you mean 'twelve_textures'"):
+        load_scene('twelve_texture')
 
 
 @pytest.mark.parametrize(

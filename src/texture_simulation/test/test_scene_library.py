@@ -9,8 +9,8 @@ import pytest
 
 from texture_core.parameters import markdown_table
 from texture_core.resources import folder
-from texture_simulation.bench import BenchParams
 from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.emulator import EmulatorParams
 from texture_simulation.frictions import FRICTIONS
 from texture_simulation.scene import load_scene
 from texture_simulation.sensors.catalogue import SENSORS
@@ -25,8 +25,8 @@ SENSOR_OF = {
 }  # fmt: skip
 
 
-def test_the_readme_tells_every_parameter_effect_and_kind_of_surface() -> None:
-    assert markdown_table(BenchParams) in README
+def test_the_readme_reports_every_parameter_effect_and_kind_of_surface() -> None:
+    assert markdown_table(EmulatorParams) in README
     assert all(f'| `{name}` |' in README for name in (*EFFECTS, *KINDS, *FRICTIONS))
     assert all(f'`{path.stem}`' in README for path in FILES)
 

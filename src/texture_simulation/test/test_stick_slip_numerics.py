@@ -4,34 +4,42 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, UnknownName
-from texture_simulation.path import Path
-from texture_simulation.stick_slip.border import BORDERS, MARGIN, Phase, border_s, check_step
 from texture_simulation.stick_slip.bristle import jacobian
 from texture_simulation.stick_slip.friction import StickSlip
 from texture_simulation.stick_slip.integrators import INTEGRATORS
 from texture_simulation.stick_slip.reference import solve
 from texture_simulation.stick_slip.simulate import drag, pull_n
+from texture_simulation.stick_slip.simulated_limit import simulated_max_stable_step_s
+from texture_simulation.stick_slip.stability_limit import (
+    MARGIN,
+    STEP_LIMITS,
+    ContactRegime,
+    check_step,
+    max_stable_step_s,
+)
 from texture_simulation.stick_slip.tip_drag import TipDrag
-from texture_simulation.stick_slip.trial import found_border_s
+from texture_simulation.trajectory import Trajectory
 
 USUAL = StickSlip()
 RATE_HZ = 2000.0
 
 
 @pytest.mark.parametrize('method', INTEGRATORS)
-@pytest.mark.parametrize('phase', Phase)
-def test_the_border_of_stability_is_found_where_it_was_predicted(method: str, phase: Phase) -> None:
-    slip_m_s = 0.0 if phase is Phase.STICK else 0.4
-    predicted_s = BORDERS[method](USUAL, slip_m_s, 2.0)
+@pytest.mark.parametrize('phase', ContactRegime)
+def test_the_limit_of_stability_is_found_where_it_was_predicted(method: str, phase: ContactRegime) -> None:
+    slip_m_s = 0.0 if phase is ContactRegime.STICK else 0.4
+    predicted_s = STEP_LIMITS[method](USUAL, slip_m_s, 2.0)
     between = (predicted_s / 3, predicted_s * 3) if math.isfinite(predicted_s) else (1e-5, 0.1)
-    found_s = found_border_s(method, USUAL, phase, 2.0, slip_m_s=0.4, between_s=between)
+    found_s = simulated_max_stable_step_s(method, USUAL, phase, 2.0, slip_m_s=0.4, between_s=between)
     assert found_s == pytest.approx(predicted_s, rel=0.02)
 
 
-def test_the_border_of_euler_falls_with_the_stiffness_and_that_of_the_default_does_not() -> None:
+def test_the_limit_of_euler_falls_with_the_stiffness_and_that_of_the_default_does_not() -> None:
     soft, stiff = StickSlip(bristle_1_m=1e5), StickSlip(bristle_1_m=1e7)
-    assert border_s('explicit_euler', stiff, 0.1, 1.0) < 0.02 * border_s('explicit_euler', soft, 0.1, 1.0)
-    assert border_s('semi_implicit', stiff, 0.1, 1.0) == border_s('semi_implicit', soft, 0.1, 1.0)
+    assert max_stable_step_s('explicit_euler', stiff, 0.1, 1.0) < 0.02 * max_stable_step_s(
+        'explicit_euler', soft, 0.1, 1.0
+    )
+    assert max_stable_step_s('semi_implicit', stiff, 0.1, 1.0) == max_stable_step_s('semi_implicit', soft, 0.1, 1.0)
 
 
 def test_eigenvalues_at_rest_are_those_of_a_mass_on_bristles_and_skin() -> None:
@@ -43,8 +51,8 @@ def test_eigenvalues_at_rest_are_those_of_a_mass_on_bristles_and_skin() -> None:
 
 
 @pytest.mark.parametrize('method', INTEGRATORS)
-def test_a_step_beyond_the_border_is_refused_with_what_is_allowed(method: str) -> None:
-    allowed_s = MARGIN * border_s(method, USUAL, 0.1, 2.0)
+def test_a_step_beyond_the_limit_is_refused_with_what_is_allowed(method: str) -> None:
+    allowed_s = MARGIN * max_stable_step_s(method, USUAL, 0.1, 2.0)
     check_step(method, USUAL, 0.99 * allowed_s, 0.1, 2.0)
     with pytest.raises(InvalidParameter, match=f'{method} allows at most .* take a shorter step_s'):
         drag(USUAL, np.full(3, 0.1), np.full(3, 2.0), 1.01 * allowed_s, method=method)
@@ -82,11 +90,11 @@ def test_both_solvers_of_scipy_agree() -> None:
     assert np.allclose(tips[0].stretch_m, tips[1].stretch_m, rtol=1e-3)
 
 
-def along_x(x_m: np.ndarray, force_n: float = 2.0) -> Path:
-    return Path(x_m, np.zeros_like(x_m), np.full_like(x_m, force_n))
+def along_x(x_m: np.ndarray, force_n: float = 2.0) -> Trajectory:
+    return Trajectory(x_m, np.zeros_like(x_m), np.full_like(x_m, force_n))
 
 
-def test_a_path_in_blocks_feels_like_the_whole() -> None:
+def test_a_path_in_blocks_senses_like_the_whole() -> None:
     path = along_x(0.05 / RATE_HZ * np.arange(600))
     whole = TipDrag(USUAL, RATE_HZ).advance(path)
     follower = TipDrag(USUAL, RATE_HZ)
@@ -98,29 +106,29 @@ def test_a_path_in_blocks_feels_like_the_whole() -> None:
 def test_back_the_way_it_came_the_skin_is_pulled_the_other_way_even_after_a_rest() -> None:
     friction = StickSlip(skin_n_s_m=20.0)
     there = 0.1 / RATE_HZ * np.arange(800)
-    way = np.concatenate([there, np.full(200, there[-1]), there[::-1]])
-    felt = TipDrag(friction, RATE_HZ).advance(along_x(way)) / friction.felt
-    assert felt[700] == pytest.approx(2.0 * 0.5, rel=0.05)
-    assert felt[-50] == pytest.approx(-2.0 * 0.5, rel=0.05)
+    offset = np.concatenate([there, np.full(200, there[-1]), there[::-1]])
+    measured = TipDrag(friction, RATE_HZ).advance(along_x(offset)) / friction.force_coupling
+    assert measured[700] == pytest.approx(2.0 * 0.5, rel=0.05)
+    assert measured[-50] == pytest.approx(-2.0 * 0.5, rel=0.05)
 
 
 def test_the_direction_of_a_way_does_not_matter() -> None:
-    way = 0.05 / RATE_HZ * np.arange(400)
-    straight = TipDrag(USUAL, RATE_HZ).advance(along_x(way))
-    oblique = TipDrag(USUAL, RATE_HZ).advance(Path(-0.6 * way, 0.8 * way, np.full(400, 2.0)))
+    offset = 0.05 / RATE_HZ * np.arange(400)
+    straight = TipDrag(USUAL, RATE_HZ).advance(along_x(offset))
+    oblique = TipDrag(USUAL, RATE_HZ).advance(Trajectory(-0.6 * offset, 0.8 * offset, np.full(400, 2.0)))
     assert np.allclose(straight, oblique, atol=1e-9)
 
 
 def test_many_slides_at_once_are_each_as_alone() -> None:
     rng = np.random.default_rng(0)
-    way = np.cumsum(rng.normal(2e-5, 2e-5, (3, 300)), axis=-1)
-    paths = Path(way, np.zeros_like(way), rng.uniform(0.0, 3.0, (3, 300)))
+    offset = np.cumsum(rng.normal(2e-5, 2e-5, (3, 300)), axis=-1)
+    paths = Trajectory(offset, np.zeros_like(offset), rng.uniform(0.0, 3.0, (3, 300)))
     together = TipDrag(USUAL, RATE_HZ).advance(paths)
     for i in range(3):
-        alone = TipDrag(USUAL, RATE_HZ).advance(Path(way[i], 0 * way[i], paths.force_n[i]))
+        alone = TipDrag(USUAL, RATE_HZ).advance(Trajectory(offset[i], 0 * offset[i], paths.force_n[i]))
         assert np.allclose(together[i], alone)
 
 
 def test_a_finger_put_elsewhere_has_not_slid() -> None:
-    way = np.concatenate([np.zeros(50), np.ones(50)])
-    assert not TipDrag(USUAL, RATE_HZ).advance(along_x(way)).any()
+    offset = np.concatenate([np.zeros(50), np.ones(50)])
+    assert not TipDrag(USUAL, RATE_HZ).advance(along_x(offset)).any()

@@ -8,8 +8,8 @@ from texture_simulation.stick_slip.bristle import AT_REST, Tip, energy_j, jacobi
 from texture_simulation.stick_slip.friction import PASSIVE, StickSlip
 from texture_simulation.stick_slip.limit_cycle import slow_drag
 from texture_simulation.stick_slip.simulate import drag, pull_n
+from texture_simulation.stick_slip.simulated_limit import nudged
 from texture_simulation.stick_slip.stribeck import coefficient, critical_speed_m_s, slope_s_m, steady_force_n
-from texture_simulation.stick_slip.trial import nudged
 
 STEP_S = 5e-5
 USUAL = StickSlip()

@@ -4,9 +4,9 @@ import pytest
 from texture_core.errors import InvalidParameter
 from texture_simulation.surfaces.grating import Grating
 from texture_simulation.surfaces.self_affine import SelfAffine
-from texture_simulation.surfaces.surface import LEAST_BLUR_M, Surface
+from texture_simulation.surfaces.surface import MIN_BLUR_M, Surface
 
-SHARP = LEAST_BLUR_M
+SHARP = MIN_BLUR_M
 PLACES = np.linspace(0.0, 0.2, 20_000)
 
 
@@ -16,15 +16,15 @@ def height(term, blur_m=SHARP, x_m=PLACES, y_m=0.0):
 
 def test_a_sine_is_blurred_by_the_gaussian_s_transfer_function() -> None:
     pitch_m, depth_m, blur_m = 2e-3, 1e-4, 4e-4
-    felt = height(Grating(pitch_m, depth_m), blur_m)
+    measured = height(Grating(pitch_m, depth_m), blur_m)
     expected = depth_m / 2 * np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)
-    assert np.ptp(felt) / 2 == pytest.approx(expected, rel=1e-3)
+    assert np.ptp(measured) / 2 == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_square_ridge_felt_sharply_is_as_high_and_as_wide_as_asked() -> None:
-    felt = height(Grating(5e-3, 1e-4, shape='square', duty=0.3))
-    assert np.median(felt[felt > 0]) - np.median(felt[felt < 0]) == pytest.approx(1e-4, rel=0.02)
-    assert (felt > felt.mean()).mean() == pytest.approx(0.3, abs=0.02)
+def test_a_square_ridge_measured_sharply_is_as_high_and_as_wide_as_asked() -> None:
+    measured = height(Grating(5e-3, 1e-4, shape='square', duty=0.3))
+    assert np.median(measured[measured > 0]) - np.median(measured[measured < 0]) == pytest.approx(1e-4, rel=0.02)
+    assert (measured > measured.mean()).mean() == pytest.approx(0.3, abs=0.02)
 
 
 def test_sliding_along_the_ridges_meets_none() -> None:
@@ -34,8 +34,8 @@ def test_sliding_along_the_ridges_meets_none() -> None:
 def test_random_roughness_has_its_rms_and_its_waves() -> None:
     rough = SelfAffine(rms_m=1e-5, longest_m=4e-3, shortest_m=5e-4)
     x_m, y_m = (np.random.default_rng(0).uniform(0, 1, 50_000) for _ in range(2))
-    felt = height(rough, x_m=x_m, y_m=y_m)
-    assert felt.std() == pytest.approx(1e-5, rel=0.15)  # the least blur takes some of it
+    measured = height(rough, x_m=x_m, y_m=y_m)
+    assert measured.std() == pytest.approx(1e-5, rel=0.15)  # the least blur takes some of it
     line = height(rough)
     power = np.abs(np.fft.rfft(line * np.hanning(len(line)))) ** 2
     wave = np.fft.rfftfreq(len(line), PLACES[1] - PLACES[0])

@@ -7,15 +7,15 @@ import itertools
 import numpy as np
 import pytest
 
-from texture_simulation.path import Path
-from texture_simulation.scans import scans
 from texture_simulation.scene import Scene, load_scene, scene_from
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.skin_contact import SkinContact
+from texture_simulation.slide_batches import simulate_slides
 from texture_simulation.surfaces.sandpaper import Sandpaper
 from texture_simulation.surfaces.self_affine import SelfAffine
 from texture_simulation.surfaces.tiles import POINTS_PER_WAVE, SIDE
-from texture_simulation.touch import Touch
+from texture_simulation.trajectory import Trajectory
 
 PITCH_M = 1.5e-3
 SPEEDS_M_S = (0.02, 0.05, 0.1, 0.2, 0.4)
@@ -36,11 +36,11 @@ def ridges(pitch_m: float = PITCH_M, **more: object) -> Scene:
 @pytest.mark.parametrize('sensor', SENSORS)
 def test_ridges_give_their_line_at_speed_over_pitch_at_all_speeds_and_angles(sensor: str) -> None:
     speed_m_s, angle_rad = np.array(list(itertools.product(SPEEDS_M_S, ANGLES_RAD))).T
-    sliding = Sliding(speed_m_s, 2.0, 1.0, angle_rad)
+    sliding = SimulatedSlide(speed_m_s, 2.0, 1.0, angle_rad)
     scene = ridges(sensor=sensor, effects={'patch_growth': {}, 'force_gain': {}})
-    felt = scans(scene, 'ridges', len(speed_m_s), sliding, np.random.default_rng(0))[..., 0]
-    felt = (felt - felt.mean(axis=1, keepdims=True)) * np.hanning(felt.shape[1])
-    found_hz = np.abs(np.fft.rfft(felt, axis=1)).argmax(axis=1) * 1.0  # 1 s: bins of 1 Hz
+    measured = simulate_slides(scene, 'ridges', len(speed_m_s), sliding, np.random.default_rng(0))[..., 0]
+    measured = (measured - measured.mean(axis=1, keepdims=True)) * np.hanning(measured.shape[1])
+    found_hz = np.abs(np.fft.rfft(measured, axis=1)).argmax(axis=1) * 1.0  # 1 s: bins of 1 Hz
     line_hz = speed_m_s * np.abs(np.cos(angle_rad)) / PITCH_M
     clear = line_hz > 3.0  # below, a slide of 1 s has hardly a period
     assert clear.sum() >= 20
@@ -67,39 +67,41 @@ def test_the_power_of_a_relief_is_the_same_in_place_and_in_frequency() -> None:
     assert SelfAffine(rms_m=2e-5).sharp().std() == pytest.approx(2e-5)
 
 
-def test_half_of_the_sampling_rate_is_felt_little_and_what_would_be_folded_to_low_frequencies_not_at_all() -> None:
+def test_half_of_the_sampling_rate_is_measured_little_and_what_would_be_folded_to_low_frequencies_not_at_all() -> None:
     rate_hz, pitch_m = 2000.0, 2e-3
 
-    def felt(frequency_hz: float) -> float:
-        touch = Touch(ridges(pitch_m), ridges(pitch_m).surface('ridges'), np.random.default_rng(0), rate_hz,
-                      finger=0, scans=())  # fmt: skip
+    def measured(frequency_hz: float) -> float:
+        touch = SkinContact(ridges(pitch_m), ridges(pitch_m).surface('ridges'), np.random.default_rng(0), rate_hz,
+                      finger=0, batch_shape=())  # fmt: skip
         x_m = np.arange(4000) * frequency_hz * pitch_m / rate_hz
-        path = Path(x_m, np.zeros_like(x_m), np.ones_like(x_m))
+        path = Trajectory(x_m, np.zeros_like(x_m), np.ones_like(x_m))
         return float(touch.variation_n(touch.placed(path)).std())
 
-    assert felt(1000.0) < 0.25 * felt(100.0)
-    assert felt(1990.0) < 2e-3 * felt(100.0)
+    assert measured(1000.0) < 0.25 * measured(100.0)
+    assert measured(1990.0) < 2e-3 * measured(100.0)
 
 
-def test_grooves_finer_than_the_contact_are_not_felt() -> None:
+def test_grooves_finer_than_the_contact_are_not_measured() -> None:
     fine, coarse = (
-        scans(ridges(pitch_m), 'ridges', 1, Sliding(0.1, 2.0, 0.5), np.random.default_rng(0)).std()
+        simulate_slides(ridges(pitch_m), 'ridges', 1, SimulatedSlide(0.1, 2.0, 0.5), np.random.default_rng(0)).std()
         for pitch_m in (5e-5, PITCH_M)
     )
     assert fine < 1e-3 * coarse
 
 
 def test_what_a_contact_averages_weakens_ridges_as_the_gaussian_s_transfer_function() -> None:
-    def felt(force_n: float) -> float:
+    def measured(force_n: float) -> float:
         scene = ridges(sensor='pvdf', effects={'patch_growth': {}})
-        return float(scans(scene, 'ridges', 1, Sliding(0.1, force_n, 2.0), np.random.default_rng(0)).std())
+        return float(
+            simulate_slides(scene, 'ridges', 1, SimulatedSlide(0.1, force_n, 2.0), np.random.default_rng(0)).std()
+        )
 
     blur_m = 1.2e-4 * np.cbrt([1.0, 8.0])
     expected = np.exp(-0.5 * (2 * np.pi * blur_m / PITCH_M) ** 2)
-    assert felt(8.0) / felt(1.0) == pytest.approx(expected[1] / expected[0], rel=0.01)
+    assert measured(8.0) / measured(1.0) == pytest.approx(expected[1] / expected[0], rel=0.01)
 
 
-def odd_way(rate_hz: float, step_points: int) -> Path:
+def odd_way(rate_hz: float, step_points: int) -> Trajectory:
     """Return a way that stands, goes, turns round, lifts off, jumps, touches again, and is pressed with nothing."""
     speed = [0.0, 0.1, -0.1, 0.1, 0.0, 0.3, 0.1, 0.0]
     force = [2.0, 2.0, 2.0, 0.0, 0.0, 5.0, 1e-9, 0.0]
@@ -107,7 +109,7 @@ def odd_way(rate_hz: float, step_points: int) -> Path:
     x_m = np.cumsum(np.repeat(speed, count)) / rate_hz
     x_m[4 * count :] += 0.05  # put elsewhere in the air
     force_n = np.repeat(force, count)
-    return Path(x_m, np.zeros_like(x_m), force_n)
+    return Trajectory(x_m, np.zeros_like(x_m), force_n)
 
 
 @pytest.mark.parametrize('friction', FRICTIONS)
@@ -125,15 +127,15 @@ def test_rest_reversal_lift_off_and_a_new_touch_do_no_harm(sensor: str, friction
 
 @pytest.mark.parametrize('friction', FRICTIONS)
 @pytest.mark.parametrize('sensor', SENSORS)
-def test_a_finger_in_the_air_or_at_rest_feels_nothing_however_long(sensor: str, friction: list) -> None:
+def test_a_finger_in_the_air_or_at_rest_senses_nothing_however_long(sensor: str, friction: list) -> None:
     scene = scene_from('still', {'sensor': sensor, 'surfaces': {'rough': [ROUGH, *friction]}})
     kind = SENSORS[sensor]
     count = kind.step_points * round(0.5 * kind.path_rate_hz / kind.step_points)
-    way_m, rest_m = 0.1 * np.arange(count) / kind.path_rate_hz, np.zeros(count)
-    for x_m, force_n in ((way_m, 0.0), (rest_m, 2.0)):
+    travelled_m, rest_m = 0.1 * np.arange(count) / kind.path_rate_hz, np.zeros(count)
+    for x_m, force_n in ((travelled_m, 0.0), (rest_m, 2.0)):
         model = kind.make(scene, scene.surface('rough'), np.random.default_rng(0), settled=True)
-        felt = model.streams(Path(x_m, rest_m, np.full(count, force_n)), slow=False)[kind.fast.topic]
-        assert np.ptp(felt[len(felt) // 2 :], axis=0).max() <= 1e-3 * max(1.0, np.abs(felt).max())
+        measured = model.streams(Trajectory(x_m, rest_m, np.full(count, force_n)), slow=False)[kind.fast.topic]
+        assert np.ptp(measured[len(measured) // 2 :], axis=0).max() <= 1e-3 * max(1.0, np.abs(measured).max())
 
 
 @pytest.mark.parametrize('name', ['ets_fine', 'jamali', 'kaboli', 'hu', 'sticky'])
@@ -141,11 +143,11 @@ def test_a_seed_is_one_set_of_slides_of_a_paper_s_scene(name: str) -> None:
     scene = load_scene(name)
     surface = next(iter(scene.surfaces))
 
-    def felt(seed: int) -> np.ndarray:
-        return scans(scene, surface, 2, Sliding(0.05, 1.5, 0.2), np.random.default_rng(seed))
+    def measured(seed: int) -> np.ndarray:
+        return simulate_slides(scene, surface, 2, SimulatedSlide(0.05, 1.5, 0.2), np.random.default_rng(seed))
 
-    assert np.array_equal(felt(7), felt(7))
-    assert not np.array_equal(felt(7), felt(8))
+    assert np.array_equal(measured(7), measured(7))
+    assert not np.array_equal(measured(7), measured(8))
 
 
 def test_the_tile_holds_all_waves_that_are_asked_for() -> None:

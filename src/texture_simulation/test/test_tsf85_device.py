@@ -80,7 +80,7 @@ def test_unplugging_breaks_the_port_and_removes_the_link(device: EmulatedTsf85, 
 
 
 def test_after_an_unclean_end_it_takes_several_starts(device: EmulatedTsf85, host: Host) -> None:
-    device.deaf_starts = 2
+    device.ignored_starts = 2
     came = []
     for _ in range(3):
         os.write(host.end, STOP + START)
@@ -89,8 +89,8 @@ def test_after_an_unclean_end_it_takes_several_starts(device: EmulatedTsf85, hos
     assert came == [False, False, True]
 
 
-def test_a_mute_device_says_nothing_whatever_it_hears(device: EmulatedTsf85, host: Host) -> None:
-    device.mute = True
+def test_a_silent_device_says_nothing_whatever_it_hears(device: EmulatedTsf85, host: Host) -> None:
+    device.silent = True
     os.write(host.end, STOP + START)
     device.advance(TEN_MS, NO_IMAGE)
     assert host.read() == b''

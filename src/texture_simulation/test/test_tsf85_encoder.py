@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from texture_drivers.tsf85.finger import SIGNAL, Finger
+from texture_drivers.tsf85.finger_stream import SIGNAL, FingerStream
 from texture_drivers.tsf85.protocol import PacketParser
-from texture_drivers.tsf85.sets import SetSplitter
+from texture_drivers.tsf85.sample_frames import SampleFrameSplitter
 from texture_simulation.devices.tsf85_encoder import Tsf85Encoder
 
 IMAGE = np.arange(28, dtype=np.uint16) + 0x1000
@@ -38,7 +38,7 @@ def test_new_firmware_sends_an_image_once() -> None:
     assert came.count(bytes.fromhex(IMAGE_HEX)) == 1
 
 
-def test_both_fingers_may_feel() -> None:
+def test_both_fingers_may_sense() -> None:
     came = Tsf85Encoder().encode(1, np.array([[2, 3]], dtype=np.int16), np.stack([IMAGE, IMAGE]), image_is_new=True)
     images = f'9A 00 58 39 10 {IMAGE_HEX} 9A 00 58 39 14 {IMAGE_HEX}'
     rest = f'30 {STILL[0]} 40 {STILL[1]}', f'34 {STILL[0]} 44 {STILL[1]}'
@@ -46,12 +46,17 @@ def test_both_fingers_may_feel() -> None:
 
 
 def test_without_stamps_the_index_jumps_over_lost_packets_and_the_times_are_right_again() -> None:
-    encoder, parser, splitter, finger = Tsf85Encoder(stamped=False), PacketParser(), SetSplitter(0), Finger()
+    encoder, parser, splitter, finger = (
+        Tsf85Encoder(stamped=False),
+        PacketParser(),
+        SampleFrameSplitter(0),
+        FingerStream(),
+    )
     errors_ms: dict[int, float] = {}
     for first_ms in range(0, 6000, 10):
         packets = list(encoder.packets(first_ms, np.arange(first_ms, first_ms + 10, dtype=np.int16), IMAGE, False))
         data = b'' if 3000 <= first_ms < 3200 else b''.join(packets)
-        for batch in finger.place(splitter.sets(parser.feed(data)), (first_ms + 10) * 1_000_000).get(SIGNAL, []):
+        for batch in finger.place(splitter.frames(parser.feed(data)), (first_ms + 10) * 1_000_000).get(SIGNAL, []):
             sent_ms = int(batch.samples[0, 0])
             errors_ms[sent_ms] = batch.stamp_ns / 1e6 - sent_ms
     assert max(abs(error) for ms, error in errors_ms.items() if ms < 3000) < 2.0

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from texture_simulation.offline import record
-from texture_simulation.path import Path
 from texture_simulation.scene import Scene, scene_from
 from texture_simulation.sensors.tsf85 import OVERSAMPLING, PATH_RATE_HZ, Tsf85Model
+from texture_simulation.trajectory import Trajectory
 
 PITCH_M = 1.5e-3
 
@@ -43,7 +43,7 @@ def test_the_amplitude_grows_with_the_cube_root_of_the_force() -> None:
 
 
 @pytest.mark.parametrize('surface', ['sine', 'rough'])
-def test_a_finger_at_rest_feels_only_noise(surface: str) -> None:
+def test_a_finger_at_rest_senses_only_noise(surface: str) -> None:
     assert not slide(scene_of(), 0.0, surface).any()
     noise = slide(scene_of(noise_count=25.0), 0.0, surface)
     assert noise.std() == pytest.approx(25.0, rel=0.1)
@@ -67,7 +67,7 @@ def test_too_strong_a_vibration_is_clipped_as_by_the_converter() -> None:
 def test_blocks_of_any_length_join_without_a_trace() -> None:
     n_points = 1200
     x_m = 0.1 * np.arange(n_points) / PATH_RATE_HZ
-    path = Path(x_m, 0 * x_m, np.full(n_points, 2.0))
+    path = Trajectory(x_m, 0 * x_m, np.full(n_points, 2.0))
     scene = scene_of()
     whole = Tsf85Model(scene, scene.surface('rough'), np.random.default_rng(3)).advance(path)
     pieces = Tsf85Model(scene, scene.surface('rough'), np.random.default_rng(3))
@@ -82,7 +82,7 @@ def test_the_image_rises_where_and_as_hard_as_the_finger_presses() -> None:
     scene = scene_from('t', {'surfaces': {'flat': []}})
     model = Tsf85Model(scene, scene.surface('flat'), np.random.default_rng(0))
     still = np.zeros(200)
-    free, pressed = (model.advance(Path(still, still, still + force))[1][-1] for force in (0.0, 2.0))
+    free, pressed = (model.advance(Trajectory(still, still, still + force))[1][-1] for force in (0.0, 2.0))
     rise = (pressed.astype(int) - free).reshape(7, 4)
     assert rise.sum() == pytest.approx(6000, abs=20)
     assert rise[3, 1] >= rise.max() - 1

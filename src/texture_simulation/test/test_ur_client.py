@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
@@ -94,7 +94,7 @@ def test_other_versions_let_the_client_move(version):
     assert session.stdout.splitlines()[-1:] == ['True 0.41'], session.stderr
 
 
-def test_it_tells_the_bench_where_the_finger_is():
+def test_it_reports_the_bench_where_the_finger_is():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
         bench.bind(('127.0.0.1', 0))
         bench.settimeout(10.0)

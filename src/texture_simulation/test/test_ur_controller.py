@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_simulation.devices.ur.controller import Controller
+from texture_simulation.devices.ur.controller import EmulatedController
 from texture_simulation.devices.ur.dashboard import DashboardSession
 from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.tables import DONE, READY, Command, Safety
+from texture_simulation.devices.ur.tables import DONE, READY, SafetyMode, ScriptCommand
 
 SCRIPT = 'def rtde_control():\nend\n'
 
 
 @pytest.fixture
 def controller():
-    controller = Controller(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
+    controller = EmulatedController(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
     controller.upload(SCRIPT)
     run(controller, 0.1)
     return controller
@@ -31,7 +31,7 @@ def send(controller, command, doubles=(), ints=()):
     registers.double_in[: len(doubles)] = doubles
     registers.int_in[1 : 1 + len(ints)] = ints
     registers.int_in[0] = command
-    registers.fed_s = controller.time_s
+    registers.last_command_s = controller.time_s
 
 
 def state(controller):
@@ -39,11 +39,11 @@ def state(controller):
 
 
 def speed_l(controller, *velocity):
-    send(controller, Command.SPEED_L, [*velocity, 0.0, 0.0, 0.0, 1.0, 0.0])
+    send(controller, ScriptCommand.SPEED_L, [*velocity, 0.0, 0.0, 0.0, 1.0, 0.0])
 
 
 def test_a_program_starts_shortly_after_its_upload():
-    controller = Controller(UrControllerParams(), np.random.default_rng(0))
+    controller = EmulatedController(UrControllerParams(), np.random.default_rng(0))
     controller.upload(SCRIPT)
     controller.tick()
     assert not controller.playing
@@ -54,13 +54,13 @@ def test_a_program_starts_shortly_after_its_upload():
 
 def test_a_command_is_done_once_and_then_waits_for_0(controller):
     x = controller.robot.pose[0]
-    send(controller, Command.MOVE_L, [x + 0.01, *controller.robot.pose[1:], 0.1, 1.0], [0])
+    send(controller, ScriptCommand.MOVE_L, [x + 0.01, *controller.robot.pose[1:], 0.1, 1.0], [0])
     controller.tick()
     assert state(controller) == READY
     run(controller, 1.0)
     assert state(controller) == DONE
     assert controller.robot.pose[0] == pytest.approx(x + 0.01)
-    send(controller, Command.NONE)
+    send(controller, ScriptCommand.NONE)
     controller.tick()
     assert state(controller) == READY
 
@@ -74,14 +74,14 @@ def test_realtime_commands_leave_the_script_ready(controller):
 
 def test_a_command_that_is_overwritten_within_a_cycle_is_lost(controller):
     speed_l(controller, 0.05, 0.0, 0.0)
-    send(controller, Command.NONE)
+    send(controller, ScriptCommand.NONE)
     run(controller, 0.2)
     assert not controller.robot.velocity.any()
 
 
 def test_a_move_in_the_background_shows_its_progress(controller):
     x = controller.robot.pose[0]
-    send(controller, Command.MOVE_L, [x + 0.05, *controller.robot.pose[1:], 0.1, 1.0], [1])
+    send(controller, ScriptCommand.MOVE_L, [x + 0.05, *controller.robot.pose[1:], 0.1, 1.0], [1])
     run(controller, 0.02)
     assert state(controller) == DONE
     assert controller.registers.int_out[2] & 1 << 15
@@ -92,14 +92,14 @@ def test_a_move_in_the_background_shows_its_progress(controller):
 def test_the_end_of_force_control_does_not_end_a_speed(controller):
     speed_l(controller, 0.05, 0.0, 0.0)
     run(controller, 0.1)
-    send(controller, Command.FORCE_MODE_STOP)
+    send(controller, ScriptCommand.FORCE_MODE_STOP)
     run(controller, 0.2)
     assert controller.robot.velocity[0] == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize('frequency_hz', [4.0, 10.0])
 def test_the_watchdog_stops_a_program_that_hears_nothing(controller, frequency_hz):
-    send(controller, Command.SET_WATCHDOG, [frequency_hz])
+    send(controller, ScriptCommand.SET_WATCHDOG, [frequency_hz])
     run(controller, 0.01)
     speed_l(controller, 0.05, 0.0, 0.0)
     run(controller, 1 / frequency_hz - 0.01)
@@ -112,7 +112,7 @@ def test_the_watchdog_stops_a_program_that_hears_nothing(controller, frequency_h
 def test_a_stop_of_the_script_stops_the_arm(controller):
     speed_l(controller, 0.05, 0.0, 0.0)
     run(controller, 0.1)
-    send(controller, Command.STOP_SCRIPT)
+    send(controller, ScriptCommand.STOP_SCRIPT)
     run(controller, 0.1)
     assert not controller.playing
     assert not controller.robot.velocity.any()
@@ -123,7 +123,7 @@ def test_a_protective_stop_cannot_be_unlocked_before_its_time(controller):
     run(controller, 0.1)
     controller.protective_stop()
     run(controller, 4.9)
-    assert (controller.playing, controller.safety) == (False, Safety.PROTECTIVE_STOP)
+    assert (controller.playing, controller.safety) == (False, SafetyMode.PROTECTIVE_STOP)
     assert not controller.robot.velocity.any()
     controller.upload(SCRIPT)
     assert not controller.unlock()
@@ -132,20 +132,20 @@ def test_a_protective_stop_cannot_be_unlocked_before_its_time(controller):
     assert controller.unlock()
     controller.upload(SCRIPT)
     run(controller, 0.1)
-    assert (controller.playing, controller.safety) == (True, Safety.NORMAL)
+    assert (controller.playing, controller.safety) == (True, SafetyMode.NORMAL)
 
 
 def test_driving_hard_into_the_surface_is_a_protective_stop(controller):
     speed_l(controller, 0.0, 0.0, -0.2)
     run(controller, 0.5)
-    assert controller.safety is Safety.PROTECTIVE_STOP
+    assert controller.safety is SafetyMode.PROTECTIVE_STOP
 
 
-def test_a_stop_is_acknowledged_late_if_it_is_told_so_but_done_at_once(controller):
+def test_a_stop_is_acknowledged_late_if_it_is_reported_so_but_done_at_once(controller):
     controller.acknowledge_s = 0.3
     speed_l(controller, 0.05, 0.0, 0.0)
     run(controller, 0.2)
-    send(controller, Command.SPEED_STOP, [10.0])
+    send(controller, ScriptCommand.SPEED_STOP, [10.0])
     run(controller, 0.25)
     assert not controller.robot.velocity.any()
     assert state(controller) == READY
@@ -155,11 +155,11 @@ def test_a_stop_is_acknowledged_late_if_it_is_told_so_but_done_at_once(controlle
 
 def test_a_late_acknowledgement_trips_a_watchdog_that_does_not_wait_for_it(controller):
     controller.acknowledge_s = 0.15
-    send(controller, Command.SET_WATCHDOG, [10.0])
+    send(controller, ScriptCommand.SET_WATCHDOG, [10.0])
     run(controller, 0.01)
-    send(controller, Command.NONE)
+    send(controller, ScriptCommand.NONE)
     run(controller, 0.01)
-    send(controller, Command.ZERO_FT_SENSOR)
+    send(controller, ScriptCommand.ZERO_FT_SENSOR)
     run(controller, 0.2)
     assert not controller.playing
 
@@ -167,7 +167,7 @@ def test_a_late_acknowledgement_trips_a_watchdog_that_does_not_wait_for_it(contr
 def test_zeroing_under_load_hides_the_true_force(controller):
     controller.robot.pose[2] = controller.robot.surface.origin[2] - 0.0015
     controller.tick()
-    send(controller, Command.ZERO_FT_SENSOR)
+    send(controller, ScriptCommand.ZERO_FT_SENSOR)
     run(controller, 0.01)
     assert controller.robot.pressing_n == pytest.approx(3.0)
     assert controller.robot.force[2] == pytest.approx(0.0, abs=1e-9)

@@ -19,7 +19,7 @@ def graph():
         yield graph
 
 
-def test_the_controller_lives_and_ends_with_its_node_which_tells_if_it_dies(graph):
+def test_the_controller_lives_and_ends_with_its_node_which_reports_if_it_dies(graph):
     reports = graph.listen(DiagnosticArray, '/diagnostics')
     node = graph.add(UrControllerNode, ip=IP)
     controller = node._controller

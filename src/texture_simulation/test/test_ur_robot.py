@@ -3,10 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_simulation.devices.ur.motions import Line, Servo, Speed, Stop
+from texture_simulation.devices.ur.contact_plane import ContactPlane
+from texture_simulation.devices.ur.motions import LinearMove, ServoMove, SpeedMove, StopMove
 from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.robot import ForceMode, Robot
-from texture_simulation.devices.ur.surface import Surface
+from texture_simulation.devices.ur.robot import EmulatedRobot, ForceMode
 
 STEP_S = 0.002
 ORIGIN = np.array([0.4, 0.0, 0.1])
@@ -14,7 +14,7 @@ REST = np.zeros(3)
 
 
 def robot_over(**values):
-    return Robot(
+    return EmulatedRobot(
         UrControllerParams(**{'force_noise_n': 0.0, 'force_offset_n': 0.0, **values}), np.random.default_rng(0)
     )
 
@@ -42,25 +42,25 @@ def vector(*values):
 
 
 def test_the_force_is_stiffness_times_depth():
-    surface = Surface(UrControllerParams(stiffness_n_m=3000.0))
+    surface = ContactPlane(UrControllerParams(stiffness_n_m=3000.0))
     assert surface.force_n(place(0, 0, -0.001), REST) == pytest.approx([0, 0, 3.0])
     assert surface.force_n(place(0, 0, 1e-9), REST) == pytest.approx([0, 0, 0])
 
 
 def test_friction_acts_against_the_movement_with_its_share_of_the_force():
-    surface = Surface(UrControllerParams(friction=0.4))
+    surface = ContactPlane(UrControllerParams(friction=0.4))
     force = surface.force_n(place(0, 0, -0.001), np.array([0.03, 0.04, 0.0]))
     assert force == pytest.approx([-0.4 * 2.0 * 0.6, -0.4 * 2.0 * 0.8, 2.0])
 
 
 def test_a_slope_pushes_along_its_normal():
-    surface = Surface(UrControllerParams(slope_x=1.0))
+    surface = ContactPlane(UrControllerParams(slope_x=1.0))
     force = surface.force_n(place(0.01, 0.05, 0.009), REST)  # 1 mm below a plane of 45°
     assert force == pytest.approx(2000.0 * 0.001 / np.sqrt(2) * np.array([-1, 0, 1]) / np.sqrt(2))
 
 
 def test_a_bump_is_as_high_as_it_says():
-    surface = Surface(UrControllerParams(bump_height_m=0.004))
+    surface = ContactPlane(UrControllerParams(bump_height_m=0.004))
     assert surface.force_n(place(0, 0, 0.0035), REST) == pytest.approx([0, 0, 1.0])
     assert not surface.force_n(place(0.1, 0, 0.0001), REST).any()
 
@@ -68,7 +68,7 @@ def test_a_bump_is_as_high_as_it_says():
 def test_a_line_takes_the_time_of_its_trapezoid_and_ends_on_the_goal():
     robot = robot_over()
     goal = robot.pose + vector(0.03, 0.04)
-    robot.motion = Line(goal, 0.1, 1.0)
+    robot.motion = LinearMove(goal, 0.1, 1.0)
     steps = 0
     while not robot.motion.done:
         robot.step(STEP_S)
@@ -81,12 +81,12 @@ def test_a_line_takes_the_time_of_its_trapezoid_and_ends_on_the_goal():
 
 def test_a_speed_is_gained_and_lost_with_the_acceleration():
     robot = robot_over()
-    robot.motion = Speed(vector(0.1), 0.5)
+    robot.motion = SpeedMove(vector(0.1), 0.5)
     run(robot, 0.1)
     assert robot.velocity == pytest.approx(vector(0.05))
     run(robot, 0.2)
     assert robot.velocity == pytest.approx(vector(0.1))
-    robot.motion = Stop(1.0)
+    robot.motion = StopMove(1.0)
     run(robot, 0.05)
     assert robot.velocity == pytest.approx(vector(0.05))
     run(robot, 0.06)
@@ -97,7 +97,7 @@ def test_a_speed_is_gained_and_lost_with_the_acceleration():
 def test_a_servo_has_gone_63_percent_of_a_jump_after_its_look_ahead_time():
     robot = robot_over()
     start = robot.pose
-    robot.motion = Servo(start + vector(0.01), 0.1)
+    robot.motion = ServoMove(start + vector(0.01), 0.1)
     run(robot, 0.1)
     assert robot.pose[0] - start[0] == pytest.approx(0.01 * (1 - np.exp(-1)))
 
@@ -128,7 +128,7 @@ def test_force_control_comes_down_no_faster_than_allowed():
 def test_force_control_follows_a_slope_while_the_finger_slides():
     robot = robot_over(slope_x=0.1, start_height_m=0.0)
     robot.force_mode = pressing(2.0)
-    robot.motion = Speed(vector(0.02), 1.0)
+    robot.motion = SpeedMove(vector(0.02), 1.0)
     run(robot, 3.0)
     assert robot.velocity[0] == pytest.approx(0.02)
     assert robot.velocity[2] == pytest.approx(0.1 * 0.02, rel=0.05)
@@ -145,9 +145,9 @@ def test_zeroing_takes_the_offset_of_the_sensor_away():
     assert robot.force == pytest.approx(np.zeros(6))
 
 
-def test_a_contact_is_felt_against_its_direction_only():
+def test_a_contact_is_measured_against_its_direction_only():
     robot = robot_over(start_height_m=0.0)
-    robot.motion = Speed(vector(0, 0, -0.1), 100.0)
+    robot.motion = SpeedMove(vector(0, 0, -0.1), 100.0)
     run(robot, 0.05)
     down, up, any_direction = np.array([0, 0, -1.0]), np.array([0, 0, 1.0]), np.zeros(3)
     assert [robot.touches(direction, 3.0) for direction in (down, up, any_direction)] == [True, False, True]

@@ -5,17 +5,17 @@ import struct
 import numpy as np
 import pytest
 
-from texture_simulation.devices.ur.controller import Controller
+from texture_simulation.devices.ur.controller import EmulatedController
 from texture_simulation.devices.ur.dashboard import BANNER, DashboardSession
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.rtde import InputClaims, RtdeSession
 from texture_simulation.devices.ur.script import ScriptSession
-from texture_simulation.devices.ur.tables import VERSIONS, Message
+from texture_simulation.devices.ur.tables import VERSIONS, RtdeMessage
 
 
 @pytest.fixture
 def controller():
-    return Controller(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
+    return EmulatedController(UrControllerParams(force_noise_n=0.0), np.random.default_rng(0))
 
 
 @pytest.fixture
@@ -28,18 +28,20 @@ def message(kind, payload=b''):
 
 
 def outputs(names, frequency_hz=500.0):
-    return message(Message.SETUP_OUTPUTS, struct.pack('>d', frequency_hz) + names.encode())
+    return message(RtdeMessage.SETUP_OUTPUTS, struct.pack('>d', frequency_hz) + names.encode())
 
 
 def test_the_protocol_version_is_accepted_and_another_one_refused(session):
-    assert session.receive(message(Message.REQUEST_VERSION, b'\0\2')) == message(Message.REQUEST_VERSION, b'\1')
-    assert session.receive(message(Message.REQUEST_VERSION, b'\0\1')) == message(Message.REQUEST_VERSION, b'\0')
+    assert session.receive(message(RtdeMessage.REQUEST_VERSION, b'\0\2')) == message(RtdeMessage.REQUEST_VERSION, b'\1')
+    assert session.receive(message(RtdeMessage.REQUEST_VERSION, b'\0\1')) == message(RtdeMessage.REQUEST_VERSION, b'\0')
 
 
 @pytest.mark.parametrize('version', VERSIONS)
-def test_the_version_is_told_as_four_numbers(version):
-    session = RtdeSession(Controller(UrControllerParams(version=version), np.random.default_rng(0)), InputClaims())
-    answer = session.receive(message(Message.CONTROLLER_VERSION))
+def test_the_version_is_reported_as_four_numbers(version):
+    session = RtdeSession(
+        EmulatedController(UrControllerParams(version=version), np.random.default_rng(0)), InputClaims()
+    )
+    answer = session.receive(message(RtdeMessage.CONTROLLER_VERSION))
     major, minor, _, _ = struct.unpack('>4I', answer[3:])
     assert f'{major}.{minor}' == version
 
@@ -52,15 +54,15 @@ def test_an_unknown_variable_is_not_found(session):
 def test_data_come_once_started_and_say_what_was_asked(session, controller):
     session.receive(outputs('actual_TCP_pose,runtime_state,'))
     assert session.package() == b''
-    session.receive(message(Message.START))
+    session.receive(message(RtdeMessage.START))
     controller.tick()
     size, kind, recipe, *pose, runtime = struct.unpack('>HBB6dI', session.package())
-    assert (size, kind, recipe, runtime) == (56, Message.DATA, 1, 1)
+    assert (size, kind, recipe, runtime) == (56, RtdeMessage.DATA, 1, 1)
     assert pose == pytest.approx([0.4, 0.0, 0.11, 0.0, 0.0, 0.0])
 
 
 def test_data_come_at_the_wanted_rate(session, controller):
-    session.receive(outputs('timestamp', 125.0) + message(Message.START))
+    session.receive(outputs('timestamp', 125.0) + message(RtdeMessage.START))
     packages = 0
     for _ in range(500):
         controller.tick()
@@ -71,7 +73,7 @@ def test_data_come_at_the_wanted_rate(session, controller):
 def test_an_input_belongs_to_one_client_until_it_leaves(controller):
     claims = InputClaims()
     first, second = RtdeSession(controller, claims), RtdeSession(controller, claims)
-    setup = message(Message.SETUP_INPUTS, b'input_int_register_0,input_double_register_3,')
+    setup = message(RtdeMessage.SETUP_INPUTS, b'input_int_register_0,input_double_register_3,')
     assert first.receive(setup)[4:] == b'INT32,DOUBLE'
     assert b'IN_USE' in second.receive(setup)
     first.close()
@@ -79,34 +81,34 @@ def test_an_input_belongs_to_one_client_until_it_leaves(controller):
 
 
 def test_data_go_to_the_registers_of_their_recipe(session, controller):
-    session.receive(message(Message.SETUP_INPUTS, b'input_int_register_1'))
-    session.receive(message(Message.SETUP_INPUTS, b'input_int_register_0,input_double_register_3'))
-    session.receive(message(Message.DATA, struct.pack('>Bid', 2, 10, 0.5)))
+    session.receive(message(RtdeMessage.SETUP_INPUTS, b'input_int_register_1'))
+    session.receive(message(RtdeMessage.SETUP_INPUTS, b'input_int_register_0,input_double_register_3'))
+    session.receive(message(RtdeMessage.DATA, struct.pack('>Bid', 2, 10, 0.5)))
     assert (controller.registers.int_in[0], controller.registers.double_in[3]) == (10, 0.5)
 
 
 @pytest.mark.parametrize('payload', [b'', b'\0', b'\7abc', b'\1', b'\1' + bytes(50)])
 def test_data_of_no_recipe_or_another_length_change_nothing(session, controller, payload):
-    session.receive(message(Message.SETUP_INPUTS, b'input_int_register_1'))
+    session.receive(message(RtdeMessage.SETUP_INPUTS, b'input_int_register_1'))
     controller.registers.int_in[1] = 7
-    session.receive(message(Message.DATA, payload))
+    session.receive(message(RtdeMessage.DATA, payload))
     assert controller.registers.int_in[1] == 7
 
 
 def test_messages_may_come_in_pieces(session):
-    request = message(Message.REQUEST_VERSION, b'\0\2') * 2
+    request = message(RtdeMessage.REQUEST_VERSION, b'\0\2') * 2
     answers = b''.join(session.receive(request[place : place + 1]) for place in range(len(request)))
-    assert answers == message(Message.REQUEST_VERSION, b'\1') * 2
+    assert answers == message(RtdeMessage.REQUEST_VERSION, b'\1') * 2
 
 
-@pytest.mark.parametrize('kind', [*Message, 0, 255])
+@pytest.mark.parametrize('kind', [*RtdeMessage, 0, 255])
 @pytest.mark.parametrize('size', [0, 1, 8, 50])
-def test_a_message_of_nonsense_is_no_trouble(session, controller, kind, size):
+def test_a_message_of_nonsense_is_no_fault(session, controller, kind, size):
     session.receive(message(kind, bytes(size)))
     session.receive(b'\0\0\0')  # shorter than its own header
     controller.tick()
     session.package()
-    assert session.receive(message(Message.REQUEST_VERSION, b'\0\2')) == message(Message.REQUEST_VERSION, b'\1')
+    assert session.receive(message(RtdeMessage.REQUEST_VERSION, b'\0\2')) == message(RtdeMessage.REQUEST_VERSION, b'\1')
 
 
 def test_the_dashboard_answers_line_by_line(controller):

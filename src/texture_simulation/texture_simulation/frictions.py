@@ -8,10 +8,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_simulation.path import Path
 from texture_simulation.stick_slip.friction import StickSlip
 from texture_simulation.stick_slip.tip_drag import TipDrag
 from texture_simulation.surfaces.sliding_friction import SlidingDrag, SlidingFriction
+from texture_simulation.trajectory import Trajectory
 
 FRICTIONS: Mapping[str, type] = {
     'sliding_friction': SlidingFriction,  # a Stribeck curve, without memory
@@ -20,28 +20,32 @@ FRICTIONS: Mapping[str, type] = {
 
 
 class Drag(Protocol):
-    """What a finger feels of the friction along its path, block by block."""
+    """What a finger senses of the friction along its path, block by block."""
 
-    def advance(self, path: Path) -> Array:
-        """Return the force that the sensor feels beside the shape of the surface, (..., n) N."""
+    def advance(self, path: Trajectory) -> Array:
+        """Return the force that the sensor senses beside the shape of the surface, (..., n) N."""
 
 
-def _hanging(friction: StickSlip, rate_hz: float, rng: np.random.Generator, scans: tuple[int, ...]) -> Drag:
+def _stick_slip_drag(
+    friction: StickSlip, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]
+) -> Drag:
     # Slides that are cut out of longer ones begin with the skin at any point of its cycle, not all at the same.
-    return TipDrag(friction, rate_hz, stretched=rng.uniform(0.0, 1.0, scans))
+    return TipDrag(friction, rate_hz, stretched=rng.uniform(0.0, 1.0, batch_shape))
 
 
-def _sliding(friction: SlidingFriction, rate_hz: float, rng: np.random.Generator, scans: tuple[int, ...]) -> Drag:
+def _sliding_drag(
+    friction: SlidingFriction, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]
+) -> Drag:
     return SlidingDrag(friction, rate_hz)
 
 
-FOLLOW: Mapping[type, Callable[[Any, float, np.random.Generator, tuple[int, ...]], Drag]] = {
-    StickSlip: _hanging,
-    SlidingFriction: _sliding,
+DRAGS: Mapping[type, Callable[[Any, float, np.random.Generator, tuple[int, ...]], Drag]] = {
+    StickSlip: _stick_slip_drag,
+    SlidingFriction: _sliding_drag,
 }
 
 
-def follow(friction: Any, rate_hz: float, rng: np.random.Generator, scans: tuple[int, ...]) -> Drag:
+def make_drag(friction: Any, rate_hz: float, rng: np.random.Generator, batch_shape: tuple[int, ...]) -> Drag:
     """Return what follows a finger over a surface.
 
     Parameters
@@ -55,4 +59,4 @@ def follow(friction: Any, rate_hz: float, rng: np.random.Generator, scans: tuple
     scans
         () for one slide, (count,) for many at once.
     """
-    return FOLLOW[type(friction)](friction, rate_hz, rng, scans)
+    return DRAGS[type(friction)](friction, rate_hz, rng, batch_shape)

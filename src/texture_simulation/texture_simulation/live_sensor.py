@@ -1,4 +1,4 @@
-"""Sensors on the emulated bench: a model on its device, brought forward in real time."""
+"""Sensors on the emulator: a model on its device, brought forward in real time."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ from typing import Protocol
 
 import numpy as np
 
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_core.signal import NANOSECONDS
 from texture_drivers.biotac.tables import LAYOUTS
 from texture_drivers.tsf85.tables import LAYOUTS as TSF85S
 from texture_drivers.tsf85.tables import RATE_HZ
 from texture_simulation.devices.biotac import EmulatedBioTac
 from texture_simulation.devices.daq import EmulatedDaq
-from texture_simulation.devices.device import Device
+from texture_simulation.devices.device import EmulatedDevice
 from texture_simulation.devices.pvdf import EmulatedPvdf
 from texture_simulation.devices.tsf85 import EmulatedTsf85
-from texture_simulation.live import FingerTrack
-from texture_simulation.path import Path
+from texture_simulation.finger_track import FingerTrack
 from texture_simulation.scene import Scene
 from texture_simulation.sensors import biotac, daq, pvdf, tsf85
+from texture_simulation.skin_contact import SkinContact
 from texture_simulation.surfaces.surface import Surface
-from texture_simulation.touch import Touch
+from texture_simulation.trajectory import Trajectory
 
 # After a longer stall of the machine the rest is skipped, and the driver sees a loss: the line's buffer takes no more.
 LONGEST_BURST_S = 0.25
 
 
-class Model(Protocol):
-    """What a sensor model lets the bench change."""
+class ContactModel(Protocol):
+    """What a sensor model lets the emulator change."""
 
-    touch: Touch
+    touch: SkinContact
 
 
 class LiveSensor:
@@ -42,8 +42,8 @@ class LiveSensor:
     Parameters
     ----------
     model, device
-        What feels, and what sends.
-    feel
+        What senses, and what sends.
+    sense
         Measures along a piece of path and sends.
     pass_by
         Lets so many steps pass of which nothing is sent.
@@ -55,10 +55,10 @@ class LiveSensor:
 
     def __init__(
         self,
-        model: Model,
-        device: Device,
-        feel: Callable[[Path], None],
-        pass_by: Callable[[int], None],
+        model: ContactModel,
+        device: EmulatedDevice,
+        measure: Callable[[Trajectory], None],
+        skip: Callable[[int], None],
         *,
         rate_hz: float,
         points: int,
@@ -67,8 +67,8 @@ class LiveSensor:
         self.device = device
         self.done = 0  # steps, those that were skipped among them
         self.skipped = 0
-        self._feel = feel
-        self._pass_by = pass_by
+        self._measure = measure
+        self._skip = skip
         self._rate_hz = rate_hz
         self._points = points
         self._track = FingerTrack()
@@ -85,7 +85,7 @@ class LiveSensor:
         skipped = max(0, due - round(LONGEST_BURST_S * self._rate_hz))
         if skipped:
             self.skipped += skipped
-            self._pass_by(skipped)
+            self._skip(skipped)
         self.done += due
         if due > skipped:
             self._slide(due - skipped, self._start_ns + round(self.done / self._rate_hz * NANOSECONDS))
@@ -94,8 +94,8 @@ class LiveSensor:
         was_touching = self._track.touching
         path = self._track.advance(until_ns, self._points * steps, self._points * self._rate_hz)
         if not was_touching and self._track.touching:
-            self.model.touch.elsewhere()
-        self._feel(path)
+            self.model.touch.relocate()
+        self._measure(path)
 
 
 def live_tsf85(
@@ -115,7 +115,7 @@ def live_tsf85(
         model,
         device,
         lambda path: device.advance(*model.advance(path)),
-        device.pass_by,
+        device.skip,
         rate_hz=RATE_HZ,
         points=tsf85.OVERSAMPLING,
     )
@@ -129,7 +129,7 @@ def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.G
         model,
         device,
         lambda path: device.advance(model.advance(path)[:, :, None]),
-        device.pass_by,
+        device.skip,
         rate_hz=layout.frame_rate_hz,
         points=model.points_per_frame,
     )
@@ -141,8 +141,8 @@ def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Gene
     return LiveSensor(
         model,
         device,
-        lambda path: device.feel(model.advance(path)),
-        lambda samples: device.pass_by(samples / daq.RATE_HZ),
+        lambda path: device.sample(model.advance(path)),
+        lambda samples: device.skip(samples / daq.RATE_HZ),
         rate_hz=daq.RATE_HZ,
         points=daq.OVERSAMPLING,
     )
@@ -155,15 +155,15 @@ def live_pvdf(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Gen
     return LiveSensor(
         model,
         device,
-        lambda path: device.feel(*model.advance(path)),
-        lambda samples: device.pass_by(samples / rate_hz),
+        lambda path: device.sample(*model.advance(path)),
+        lambda samples: device.skip(samples / rate_hz),
         rate_hz=rate_hz,
         points=pvdf.OVERSAMPLING,
     )
 
 
-MakeLive = Callable[[Scene, Surface, FilePath, np.random.Generator], LiveSensor]
-LIVE_SENSORS: Mapping[str, MakeLive] = {
+MakeLiveSensor = Callable[[Scene, Surface, FilePath, np.random.Generator], LiveSensor]
+LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'tsf85': live_tsf85,
     'tsf85_3x4': partial(live_tsf85, layout='tsf85_3x4'),
     'biotac': live_biotac,

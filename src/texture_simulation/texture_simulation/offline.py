@@ -11,16 +11,23 @@ from texture_core.arrays import Array, Samples
 from texture_core.catalogue import find
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_simulation.effects.stages import SlideEffect
-from texture_simulation.scans import scan_streams, scans
+from texture_simulation.effects.protocols import SlideEffect
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sensors.model import SensorKind, Stream
-from texture_simulation.sliding import Sliding, along
+from texture_simulation.sensors.model import SensorKind, SimulatedStream
+from texture_simulation.simulated_slide import SimulatedSlide, trajectory_along
+from texture_simulation.slide_batches import simulate_slide_streams, simulate_slides
 
-__all__ = ['Recording', 'Sliding', 'record', 'scan_streams', 'scans', 'simulate_exploration']
+__all__ = [
+    'SimulatedRecording',
+    'SimulatedSlide',
+    'record',
+    'simulate_exploration',
+    'simulate_slide_streams',
+    'simulate_slides',
+]
 
-Recording = dict[str, list[TactileSignal]]
+SimulatedRecording = dict[str, list[TactileSignal]]
 BATCH_S = 0.05
 APPROACH_S, CONTACT_S, LIFT_S = 0.2, 0.4, 0.2
 PRESS_S = 0.1  # of the contact phase, from no force to all of it
@@ -41,11 +48,11 @@ def record(
     radius_m: float = 0.0,
     start_ns: int = 0,
     finger: int = 0,
-) -> Recording:
+) -> SimulatedRecording:
     """Return steady sliding alone, by topic; see `simulate_exploration` for the arguments."""
-    sliding = Sliding(speed_m_s, force_n, duration_s, direction_rad, radius_m)
+    sliding = SimulatedSlide(speed_m_s, force_n, duration_s, direction_rad, radius_m)
     kind = find(SENSORS, scene.sensor, 'sensor model')
-    streams = scan_streams(scene, surface, 1, sliding, rng, finger=finger)
+    streams = simulate_slide_streams(scene, surface, 1, sliding, rng, finger=finger)
     return {stream.topic: _batches(streams[stream.topic][0], stream, start_ns) for stream in kind.streams}
 
 
@@ -62,7 +69,7 @@ def simulate_exploration(
     direction_rad: float = 0.0,
     radius_m: float = 0.0,
     finger: int = 0,
-) -> tuple[list[ExplorationState], Recording]:
+) -> tuple[list[ExplorationState], SimulatedRecording]:
     """Return the states and the signals, by topic, of one exploration: approach, contact, slide, lift, done.
 
     Parameters
@@ -88,11 +95,17 @@ def simulate_exploration(
     speed, force = np.array([speed_m_s]), np.array([force_n])
     for effect in scene.effects_of(SlideEffect):
         speed, force = effect.slide(speed, force, rng)
-    way_m, pressed_n = _profile(float(speed[0]), float(force[0]), slide_s, kind)
-    path = along(way_m, pressed_n, Sliding(speed_m_s, force_n, slide_s, direction_rad, radius_m))
+    travelled_m, pressed_n = _profile(float(speed[0]), float(force[0]), slide_s, kind)
+    path = trajectory_along(
+        travelled_m, pressed_n, SimulatedSlide(speed_m_s, force_n, slide_s, direction_rad, radius_m)
+    )
     streams = kind.make(scene, scene.surface(surface), rng, finger=finger).streams(path)
-    story = _Story(exploration_id, surface, speed_m_s, force_n, slide_s, start_ns, direction_rad, radius_m)
-    return story.states(), {stream.topic: _batches(streams[stream.topic], stream, start_ns) for stream in kind.streams}
+    timeline = _ExplorationTimeline(
+        exploration_id, surface, speed_m_s, force_n, slide_s, start_ns, direction_rad, radius_m
+    )
+    return timeline.states(), {
+        stream.topic: _batches(streams[stream.topic], stream, start_ns) for stream in kind.streams
+    }
 
 
 def _profile(speed_m_s: float, force_n: float, slide_s: float, kind: SensorKind) -> tuple[Array, Array]:
@@ -107,7 +120,7 @@ def _profile(speed_m_s: float, force_n: float, slide_s: float, kind: SensorKind)
 
 
 @dataclass(frozen=True)
-class _Story:
+class _ExplorationTimeline:
     """What an exploration tells about itself."""
 
     exploration_id: str
@@ -152,7 +165,7 @@ class _Story:
         )
 
 
-def _batches(samples: Samples, stream: Stream, start_ns: int) -> list[TactileSignal]:
+def _batches(samples: Samples, stream: SimulatedStream, start_ns: int) -> list[TactileSignal]:
     """Cut (n_samples, n_channels) into batches."""
     values = samples.astype(np.float32)
     per_batch = max(1, round(BATCH_S * stream.rate_hz))

@@ -1,4 +1,4 @@
-"""A scene: the surfaces on the table, the sensor that feels them, its contact, and what disturbs it. Read from YAML."""
+"""A scene: the surfaces, the sensor, its contact and the disturbances, read from YAML."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 from texture_core.catalogue import find
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping
-from texture_core.plain_data import load_yaml, shown
+from texture_core.plain_data import load_yaml, safe_repr
 from texture_core.resources import find_file
 from texture_simulation.contact import Contact
 from texture_simulation.effects.catalogue import EFFECTS
@@ -25,7 +25,7 @@ SECTIONS = ('about', 'sensor', 'contact', 'effects', 'surfaces')
 
 @dataclass(frozen=True)
 class Scene:
-    """What there is to touch, and how it is felt.
+    """What there is to touch, and how it is measured.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Scene:
         return find(self.surfaces, name, 'surface')
 
     def effects_of(self, stage: Any) -> list[Any]:
-        """Return the effects that act at a stage (`effects/stages.py`), in the order of the catalogue."""
+        """Return the effects that act at a stage (`effects/protocols.py`), in the order of the catalogue."""
         return [self.effects[name] for name in EFFECTS if name in self.effects and _acts_at(EFFECTS[name], stage)]
 
     def without(self, effect: str) -> Scene:
@@ -84,9 +84,9 @@ def scene_from(name: str, content: Any) -> Scene:
     where = f"scene '{name}'"
     if not isinstance(content, Mapping) or not isinstance(content.get('surfaces'), Mapping):
         raise InvalidParameter(f'{where} has no mapping `surfaces` of names to lists of terms; add one')
-    strange = set(content) - set(SECTIONS)
-    if strange:
-        raise InvalidParameter(f'{where} has the sections {sorted(strange)}; allowed are {", ".join(SECTIONS)}')
+    unexpected = set(content) - set(SECTIONS)
+    if unexpected:
+        raise InvalidParameter(f'{where} has the sections {sorted(unexpected)}; allowed are {", ".join(SECTIONS)}')
     return Scene(
         name=name,
         surfaces={str(key): _surface(str(key), terms, where) for key, terms in content['surfaces'].items()},
@@ -100,7 +100,7 @@ def scene_from(name: str, content: Any) -> Scene:
 def _effects(effects: Any, where: str) -> dict[str, Any]:
     if not isinstance(effects, Mapping):
         raise InvalidParameter(
-            f'{where}, effects: came {shown(effects)}; a mapping of effects to their parameters is needed'
+            f'{where}, effects: came {safe_repr(effects)}; a mapping of effects to their parameters is needed'
         )
     return {
         name: from_mapping(find(EFFECTS, str(name), 'effect'), values or {}, f"{where}, effect '{name}'")
@@ -111,7 +111,7 @@ def _effects(effects: Any, where: str) -> dict[str, Any]:
 def _surface(name: str, terms: Any, where: str) -> Surface:
     place = f"{where}, surface '{name}'"
     if not isinstance(terms, list) or not all(isinstance(term, Mapping) and 'kind' in term for term in terms):
-        raise InvalidParameter(f'{place} is {shown(terms)}; a list of terms, each with a `kind`, is needed')
+        raise InvalidParameter(f'{place} is {safe_repr(terms)}; a list of terms, each with a `kind`, is needed')
     made = [_term(dict(term), place) for term in terms]
     frictions = [term for term in made if type(term) in FRICTIONS.values()]
     if len(frictions) > 1:

@@ -13,18 +13,18 @@ from scipy.signal import welch
 from texture_core.arrays import Array
 from texture_core.catalogue import find
 from texture_core.parameters import param
-from texture_simulation.path import Path
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 from texture_simulation.surfaces.circles import Circles
 from texture_simulation.surfaces.grating import Grating
 from texture_simulation.surfaces.grid import Grid
-from texture_simulation.surfaces.surface import LEAST_BLUR_M, Surface
+from texture_simulation.surfaces.surface import MIN_BLUR_M, Surface
 from texture_simulation.surfaces.weave import Weave
+from texture_simulation.trajectory import Trajectory
 
-LEAST_SIDE_M = 8e-3  # of the relief that is shown
-MOST_POINTS = 700  # of the relief along its longer side
+MIN_SIDE_M = 8e-3  # of the relief that is shown
+MAX_POINTS = 700  # of the relief along its longer side
 PROFILE_M = 15e-3  # as much of the way is shown as a profile
 SEGMENT_S = 0.25  # of the spectrum
 
@@ -33,16 +33,28 @@ SEGMENT_S = 0.25  # of the spectrum
 class ViewPlan:
     """The slide that is shown."""
 
-    speed_m_s: float = param(0.1, 'Speed along the surface.', unit='m/s', low=0.001, high=1.0)
-    force_n: float = param(2.0, 'Normal force.', unit='N', low=0.01, high=20.0)
-    duration_s: float = param(0.5, 'Length of the slide.', unit='s', low=0.05, high=20.0)
-    direction_rad: float = param(0.0, 'Direction of travel.', unit='rad', low=-2 * math.pi, high=2 * math.pi)
-    radius_m: float = param(0.0, 'Of a circle; 0: a straight line.', unit='m', low=0.0, high=0.5)
+    speed_m_s: float = param(
+        0.1,
+        'Sets the speed along the surface; a higher speed raises all frequencies of the signal.',
+        unit='m/s',
+        low=0.001,
+        high=1.0,
+    )
+    force_n: float = param(
+        2.0, 'Sets the normal force; a larger force gives a stronger signal.', unit='N', low=0.01, high=20.0
+    )
+    duration_s: float = param(
+        0.5, 'Sets the duration of the slide; a longer slide shows more of the surface.', unit='s', low=0.05, high=20.0
+    )
+    direction_rad: float = param(
+        0.0, 'Sets the direction of travel, from +x towards +y.', unit='rad', low=-2 * math.pi, high=2 * math.pi
+    )
+    radius_m: float = param(0.0, 'Sets the radius of a circle; 0 is a straight line.', unit='m', low=0.0, high=0.5)
 
     @property
-    def sliding(self) -> Sliding:
+    def sliding(self) -> SimulatedSlide:
         """The same as the simulation takes it."""
-        return Sliding(self.speed_m_s, self.force_n, self.duration_s, self.direction_rad, self.radius_m)
+        return SimulatedSlide(self.speed_m_s, self.force_n, self.duration_s, self.direction_rad, self.radius_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +86,7 @@ class SceneView:
     channel: str
     relief_m: Array
     extent_m: tuple[float, float, float, float]
-    way: Path
+    way: Trajectory
     along_m: Array
     sharp_m: Array
     felt_m: Array
@@ -115,7 +127,7 @@ def view(scene: Scene, surface: str, plan: ViewPlan, rng: np.random.Generator) -
         extent_m=extent_m,
         way=way,
         along_m=plan.speed_m_s / kind.path_rate_hz * np.arange(len(shown), dtype=np.float64),
-        sharp_m=_height(touched, shown, LEAST_BLUR_M),
+        sharp_m=_height(touched, shown, MIN_BLUR_M),
         felt_m=_height(touched, shown, model.touch.blur_m(plan.force_n)),
         time_s=np.arange(len(signal), dtype=np.float64) / kind.fast.rate_hz,
         signal=signal,
@@ -126,20 +138,20 @@ def view(scene: Scene, surface: str, plan: ViewPlan, rng: np.random.Generator) -
     )
 
 
-def _height(surface: Surface, way: Path, blur_m: float) -> Array:
+def _height(surface: Surface, way: Trajectory, blur_m: float) -> Array:
     return surface.height_m(way.x_m, way.y_m, np.full(1, blur_m))
 
 
-def _relief(surface: Surface, way: Path) -> tuple[Array, tuple[float, float, float, float]]:
+def _relief(surface: Surface, way: Trajectory) -> tuple[Array, tuple[float, float, float, float]]:
     """Return the height over a rectangle around a way, and its edges."""
     edges = []
     for place in (way.x_m, way.y_m):
-        middle, half = (place.max() + place.min()) / 2, max(LEAST_SIDE_M, np.ptp(place) + LEAST_SIDE_M / 4) / 2
+        middle, half = (place.max() + place.min()) / 2, max(MIN_SIDE_M, np.ptp(place) + MIN_SIDE_M / 4) / 2
         edges.append((float(middle - half), float(middle + half)))
     longest = max(high - low for low, high in edges)
-    x_m, y_m = (np.linspace(low, high, round(MOST_POINTS * (high - low) / longest)) for low, high in edges)
+    x_m, y_m = (np.linspace(low, high, round(MAX_POINTS * (high - low) / longest)) for low, high in edges)
     grid_x, grid_y = np.meshgrid(x_m, y_m)
-    return surface.height_m(grid_x, grid_y, np.full((1, 1), LEAST_BLUR_M)), (*edges[0], *edges[1])
+    return surface.height_m(grid_x, grid_y, np.full((1, 1), MIN_BLUR_M)), (*edges[0], *edges[1])
 
 
 def lines_hz(surface: Surface, speed_m_s: float, direction_rad: float) -> list[float]:

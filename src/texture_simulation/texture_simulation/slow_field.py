@@ -8,10 +8,10 @@ import numpy as np
 
 from texture_core.arrays import AnyArray, Array
 
-MOST_POINTS = 16  # from one reckoned point to the next
+MAX_POINTS = 16  # from one reckoned point to the next
 
 
-def slowly(field: Callable[[Array, Array], AnyArray], x_m: Array, y_m: Array, within_m: float) -> AnyArray:
+def interpolated_field(field: Callable[[Array, Array], AnyArray], x_m: Array, y_m: Array, within_m: float) -> AnyArray:
     """Return a field at places along ways, (..., n), straight between places that are `within_m` apart or nearer.
 
     Between places h apart, a wave of wave number k is wrong by at most (k·h)²/8 of its amplitude.
@@ -25,7 +25,7 @@ def slowly(field: Callable[[Array, Array], AnyArray], x_m: Array, y_m: Array, wi
     """
     n_points = x_m.shape[-1]
     longest_m = np.abs(np.diff(x_m)).max(initial=0.0) + np.abs(np.diff(y_m)).max(initial=0.0)
-    every = MOST_POINTS if longest_m * MOST_POINTS <= within_m else max(1, int(within_m / longest_m))
+    every = MAX_POINTS if longest_m * MAX_POINTS <= within_m else max(1, int(within_m / longest_m))
     if every == 1 or n_points <= every:
         return field(x_m, y_m)
     knots = np.append(np.arange(0, n_points - 1, every), n_points - 1)

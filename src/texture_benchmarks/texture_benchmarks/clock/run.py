@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from texture_benchmarks.clock.trial import ClockTrial, try_clock
+from texture_benchmarks.clock.trial import ClockErrors, simulate_clock_errors
 from texture_benchmarks.result import Bench, BenchResult
 from texture_core.arrays import Array
 from texture_evaluation.charts import error_chart
@@ -19,7 +19,7 @@ TARGET_MS = 0.5
 def run(bench: Bench) -> BenchResult:
     """Stamp simulated streams with 5 ms of arrival jitter and 50 ppm of drift."""
     duration_s = QUICK_S if bench.quick else DURATION_S
-    trials = [try_clock(np.random.default_rng(bench.seed + k), duration_s=duration_s) for k in range(SEEDS)]
+    trials = [simulate_clock_errors(np.random.default_rng(bench.seed + k), duration_s=duration_s) for k in range(SEEDS)]
     shown = trials[0]
     chart = error_chart(
         {
@@ -47,5 +47,5 @@ def run(bench: Bench) -> BenchResult:
     )
 
 
-def _largest_ms(trial: ClockTrial, error_s: Array) -> float:
+def _largest_ms(trial: ClockErrors, error_s: Array) -> float:
     return float(1000 * np.abs(error_s[trial.time_s > WARM_UP_S]).max())

@@ -13,7 +13,7 @@ START_NS = 1_700_000_000 * NANOSECONDS  # some day
 
 
 @dataclass(frozen=True, eq=False)
-class ClockTrial:
+class ClockErrors:
     """True time of each batch's first sample since the start, and the errors of three ways to stamp it, s.
 
     All arrays are of shape (n_batches,).
@@ -25,7 +25,7 @@ class ClockTrial:
     nominal_error_s: Array  # of counting from the first arrival at the nominal rate
 
 
-def try_clock(
+def simulate_clock_errors(
     rng: np.random.Generator,
     *,
     duration_s: float = 600.0,
@@ -33,14 +33,14 @@ def try_clock(
     batch: int = 10,
     drift: float = 50e-6,
     jitter_s: float = 5e-3,
-) -> ClockTrial:
+) -> ClockErrors:
     """Return the errors of stamping a stream whose batches arrive late by an exponential delay of mean `jitter_s`."""
     last: AnyArray = np.arange(1, int(duration_s * rate_hz / batch) + 1) * batch - 1
     period_s = (1 + drift) / rate_hz
     # A line delivers in order: who is late holds up all behind.
     arrival_s = np.maximum.accumulate(last * period_s + rng.exponential(jitter_s, len(last)))
     first_s = (last - batch + 1) * period_s
-    return ClockTrial(
+    return ClockErrors(
         time_s=first_s,
         clock_error_s=_stamps_s(last, arrival_s, rate_hz, batch) - first_s,
         arrival_error_s=arrival_s - (batch - 1) / rate_hz - first_s,

@@ -1,4 +1,4 @@
-"""`texture endurance`: explore on the emulated bench for hours while faults strike at random."""
+"""`texture endurance`: explore on the emulator for hours while faults strike at random."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Endurance: hours of explorations on the emulated bench while faults strike at random."""
+"""Endurance: hours of explorations on the emulator while faults strike at random."""

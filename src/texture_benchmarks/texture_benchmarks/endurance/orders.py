@@ -34,7 +34,7 @@ def orders(rng: np.random.Generator, surfaces: Sequence[str]) -> Iterator[Order]
     while True:
         if rng.random() < NEW_SURFACE:
             surface = surfaces[int(rng.integers(len(surfaces)))]
-        request = replace(_motion(rng), surface=surface, stop_when_certain=bool(rng.random() < 0.5))
+        request = replace(_motion(rng), surface=surface, early_stopping=bool(rng.random() < 0.5))
         if rng.random() < MISTAKEN:
             request = replace(request, speed_m_s=IMPOSSIBLE_M_S)
         yield Order(request, float(rng.uniform(0.1, 1.5)) if rng.random() < STOPPED else math.nan)

@@ -83,7 +83,7 @@ def as_page(record: Record, verdicts: Sequence[Verdict]) -> list[str]:
     return [
         '# Endurance',
         '',
-        f'{minutes:.0f} minutes on the emulated bench, {len(record.explored)} explorations, {len(record.struck)} '
+        f'{minutes:.0f} minutes on the emulator, {len(record.explored)} explorations, {len(record.struck)} '
         f'faults; seed {record.seed}; {machine()}.',
         '',
         *_table(('asked', 'seen', 'holds'), [(v.asked, v.seen, 'yes' if v.holds else '**no**') for v in verdicts]),

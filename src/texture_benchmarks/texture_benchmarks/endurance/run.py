@@ -40,7 +40,7 @@ from texture_launch.child import ChildLauncher
 from texture_simulation.scene import load_scene
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
-SCENE, SURFACE = 'bench', 'glass'
+SCENE, SURFACE = 'twelve_textures', 'glass'
 LOOK_S = 10.0  # between two looks at the processes
 TOLD_S = 60.0  # between two lines about how it goes
 PAUSE_S, LOOK_AFTER_S = 0.2, 1.0  # between two explorations, the latter after one that did not succeed

@@ -12,7 +12,7 @@ from texture_evaluation.charts import COLOURS, chart
 
 AXES = {'windows': 'windows learnt from', 'labels': 'surfaces'}
 COSTS = {'seconds': 'computing time of a training (s)', 'mebibytes': 'memory beyond the examples (MiB)'}
-LEAST_MIB = 0.1  # nothing measurable
+MIN_MIB = 0.1  # nothing measurable
 
 
 def early_chart(
@@ -56,7 +56,7 @@ def size_chart(
         for axes, (cost, axis) in zip(grid.ravel(), product(COSTS, AXES), strict=True):
             for (learner, found), colour in zip(panels[axis].items(), COLOURS, strict=False):
                 x = [getattr(size, axis) for size in found]
-                y = [max(getattr(item, cost), LEAST_MIB if cost == 'mebibytes' else 0.0) for item in found.values()]
+                y = [max(getattr(item, cost), MIN_MIB if cost == 'mebibytes' else 0.0) for item in found.values()]
                 axes.loglog(x, y, marker='.', color=colour, label=learner)
             axes.set(xlabel=f'{AXES[axis]} ({fixed[axis]})', ylabel=COSTS[cost])
         grid[0, 0].legend(loc='best')

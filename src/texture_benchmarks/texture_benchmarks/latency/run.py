@@ -37,7 +37,7 @@ def run(bench: Bench) -> BenchResult:
 
     plan = QUICK_PLAN if bench.quick else PLAN
     with tempfile.TemporaryDirectory() as folder:
-        surfaces = tuple(load_scene('bench').surfaces)[:CLASSES]
+        surfaces = tuple(load_scene('twelve_textures').surfaces)[:CLASSES]
         bags = write_simulated(Path(folder) / 'bags', plan, np.random.default_rng(bench.seed), surfaces=surfaces)
         timings = {recipe: _time(recipe, bags, plan.slides, Path(folder), bench) for recipe in RECIPES}
     driver = driver_cpu()

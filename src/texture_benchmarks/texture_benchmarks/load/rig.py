@@ -1,4 +1,4 @@
-"""A sensor on its emulated device, which samples numbers that tell their own place: what goes wrong shows."""
+"""A sensor on its emulated device, whose samples encode their own index, so that every fault is detected."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from texture_drivers.catalogue import SENSORS
 from texture_drivers.params import SensorParams
 from texture_simulation.devices.catalogue import DEVICES
 from texture_simulation.devices.daq import EmulatedDaq
-from texture_simulation.devices.device import Device
+from texture_simulation.devices.device import EmulatedDevice
 
 DEADLINE_S = 30.0
 STEP_S = 0.003
-MOST_TICKS_PER_S = 5000.0  # beyond this rate as many
-MOST_AT_ONCE_S = 0.04  # after a stall of the machine the line's buffer must not run over
+MAX_TICKS_PER_S = 5000.0  # beyond this rate as many
+MAX_AT_ONCE_S = 0.04  # after a stall of the machine the line's buffer must not run over
 DAQ = '{channels: [' + ', '.join(f'{{name: c{i}, unit: count}}' for i in range(8)) + ']}'
 
 
@@ -33,7 +33,7 @@ Feed = Callable[[Any, int, int], None]
 
 
 @dataclass(frozen=True)
-class Case:
+class RigCase:
     """How a device is fed, and how what arrives is to be read.
 
     Sample i of `topic` holds `slope` · i and a constant, modulo `modulus`.
@@ -91,37 +91,37 @@ def feed_biotac(slots: int, fingers: int) -> Feed:
 def feed_daq(device: Any, first: int, ticks: int) -> None:
     """Feed all channels alike."""
     numbers = np.arange(first, first + ticks) % 30_000
-    device.feel(np.outer(numbers, np.ones(8)).astype(np.int16))
+    device.sample(np.outer(numbers, np.ones(8)).astype(np.int16))
 
 
 def feed_pvdf(device: Any, first: int, ticks: int) -> None:
     """Feed the film, and the force with every 64th tick."""
     numbers = np.arange(first, first + ticks)
-    device.feel((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16))
+    device.sample((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16))
 
 
-def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> Case:
+def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
     """Return how a TSF-85 is fed."""
     imu = 'm/s², m/s², m/s², rad/s, rad/s, rad/s'
     units = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count', f'{prefix}imu': imu}
-    return Case(f'{prefix}signal', 1000.0, 1, feed_tsf85(shape), units, 1000)
+    return RigCase(f'{prefix}signal', 1000.0, 1, feed_tsf85(shape), units, 1000)
 
 
-def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> Case:
+def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
     """Return how a BioTac is fed."""
     units = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
-    return Case(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, slope=2)
+    return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, slope=2)
 
 
-CASES: Mapping[str, Case] = {
+CASES: Mapping[str, RigCase] = {
     'tsf85': tsf85(),
     'tsf85_pair': tsf85('finger1/', (2, 28)),
     'tsf85_3x4': tsf85(shape=(12,)),
     'biotac': biotac(),
     'biotac_sp': biotac(slots=54),
     'biotac_hand': biotac('finger2/', fingers=3),
-    'daq': Case('signal', 2500.0, 1, feed_daq, {'signal': 'count'}, 30_000, config=DAQ),
-    'pvdf': Case(
+    'daq': RigCase('signal', 2500.0, 1, feed_daq, {'signal': 'count'}, 30_000, config=DAQ),
+    'pvdf': RigCase(
         'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
         config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
     ),
@@ -153,7 +153,12 @@ class Rig:
     """
 
     def __init__(
-        self, name: str, link: Path, pace: float = 1.0, case: Case | None = None, device: Device | None = None
+        self,
+        name: str,
+        link: Path,
+        pace: float = 1.0,
+        case: RigCase | None = None,
+        device: EmulatedDevice | None = None,
     ) -> None:
         self.case = case or CASES[name]
         self.link = link
@@ -186,7 +191,7 @@ class Rig:
         self.device.unplug()
 
     def _run(self) -> None:
-        done, most = 0, max(1, round(MOST_AT_ONCE_S * min(self.case.ticks_per_s, MOST_TICKS_PER_S)))
+        done, most = 0, max(1, round(MAX_AT_ONCE_S * min(self.case.ticks_per_s, MAX_TICKS_PER_S)))
         while not self._stop.wait(STEP_S):
             due = int((time.time_ns() - self.start_ns) / NANOSECONDS * self.case.ticks_per_s * self._pace)
             ticks = min(due - done, most)
@@ -201,10 +206,10 @@ class Rig:
             for name, value in switches.items():
                 setattr(self.device, name, value)
 
-    def do(self, act: Callable[[], None]) -> None:
+    def run_locked(self, action: Callable[[], None]) -> None:
         """Do something to the device between two of its steps."""
         with self._lock:
-            act()
+            action()
 
     def read_s(self, seconds: float) -> dict[str, list[TactileSignal]]:
         """Return, by topic, what comes until so many seconds of samples have; a device that is gone is opened again."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.motion.trial import Trial
+from texture_benchmarks.motion.trial import ForceControlMetrics
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 
@@ -49,21 +49,21 @@ def robot_table(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, f
     )
 
 
-def surface_table(surfaces: Mapping[str, Mapping[float, Trial]]) -> str:
+def surface_table(surfaces: Mapping[str, Mapping[float, ForceControlMetrics]]) -> str:
     """Return a Markdown table of the error of the force by surface and stiffness, in percent."""
     stiffnesses = list(next(iter(surfaces.values())))
     rows = [[name, *(_cell(trial.force_rms, 100) for trial in trials.values())] for name, trials in surfaces.items()]
     return _table(['force error, rms (%)', *(f'{stiffness:.0f} N/m' for stiffness in stiffnesses)], rows)
 
 
-def hazard_table(hazards: Mapping[str, Mapping[float, Mapping[float, Trial]]]) -> str:
+def hazard_table(hazards: Mapping[str, Mapping[float, Mapping[float, ForceControlMetrics]]]) -> str:
     """Return a Markdown table of the highest true force and what became of the slide, by hazard and undeclared lag."""
     lags = list(next(iter(hazards.values())))
     rows = [[name, *(_hazard_cell(by_lag[lag].values()) for lag in lags)] for name, by_lag in hazards.items()]
     return _table(['hazard, over all stiffnesses', *(f'{1e3 * lag:.0f} ms undeclared lag' for lag in lags)], rows)
 
 
-def lag_table(lags: Mapping[float, Mapping[float, Trial]]) -> str:
+def lag_table(lags: Mapping[float, Mapping[float, ForceControlMetrics]]) -> str:
     """Return a Markdown table of the overshoot by stiffness and undeclared lag, in percent."""
     stiffnesses = list(next(iter(lags.values())))
     rows = [
@@ -74,8 +74,8 @@ def lag_table(lags: Mapping[float, Mapping[float, Trial]]) -> str:
 
 
 def hazard_chart(
-    lags: Mapping[float, Mapping[float, Trial]],
-    hazards: Mapping[str, Mapping[float, Mapping[float, Trial]]],
+    lags: Mapping[float, Mapping[float, ForceControlMetrics]],
+    hazards: Mapping[str, Mapping[float, Mapping[float, ForceControlMetrics]]],
     targets: Mapping[str, float],
     path: str | Path,
 ) -> Path:
@@ -123,7 +123,7 @@ def robot_chart(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, f
 
 
 def surface_chart(
-    surfaces: Mapping[str, Mapping[float, Trial]], targets: Mapping[str, float], path: str | Path
+    surfaces: Mapping[str, Mapping[float, ForceControlMetrics]], targets: Mapping[str, float], path: str | Path
 ) -> Path:
     """Draw force and speed errors over stiffness, a line for each surface."""
     with chart(path, (9.0, 4.4), 'An arm without a force mode over simulated surfaces: 1 N, 0.05 m/s') as figure:
@@ -179,7 +179,7 @@ def _number(row: Mapping[str, Mapping[str, float]], motions: Sequence[str], numb
     return next((row[motion].get(number, np.nan) for motion in motions if motion in row), np.nan)
 
 
-def _hazard_cell(trials: Iterable[Trial]) -> str:
+def _hazard_cell(trials: Iterable[ForceControlMetrics]) -> str:
     tried = list(trials)
     ended = sum(trial.success for trial in tried)
     times = [1e3 * trial.noticed_s for trial in tried if not trial.success and np.isfinite(trial.noticed_s)]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from texture_benchmarks.motion.trial import ARM, SLIDE, Injection, Trial, slide_trial
+from texture_benchmarks.motion.trial import ARM, SLIDE, ForceControlMetrics, Injection, simulate_force_controlled_slide
 from texture_core.exploration import Phase
 from texture_exploration.arms.simulated import SimulatedArm
 
@@ -48,7 +48,7 @@ HAZARDS: Mapping[str, Hazard] = {
 
 def hazard_trials(
     lags_s: Sequence[float] = LAGS_S, most: int | None = None
-) -> dict[str, dict[float, dict[float, Trial]]]:
+) -> dict[str, dict[float, dict[float, ForceControlMetrics]]]:
     """Return the trials by hazard, undeclared lag in s and stiffness in N/m, with an arm that knows velocities alone.
 
     Parameters
@@ -64,12 +64,14 @@ def hazard_trials(
     }
 
 
-def lag_trials(stiffnesses_n_m: Sequence[float], lags_s: Sequence[float] = LAGS_S) -> dict[float, dict[float, Trial]]:
+def lag_trials(
+    stiffnesses_n_m: Sequence[float], lags_s: Sequence[float] = LAGS_S
+) -> dict[float, dict[float, ForceControlMetrics]]:
     """Return the trials on a flat surface by undeclared lag in s and stiffness in N/m."""
     flat = HAZARDS['none']
     return {lag_s: {k: _trial(flat, lag_s, k) for k in stiffnesses_n_m} for lag_s in lags_s}
 
 
-def _trial(hazard: Hazard, lag_s: float, stiffness_n_m: float) -> Trial:
+def _trial(hazard: Hazard, lag_s: float, stiffness_n_m: float) -> ForceControlMetrics:
     arm = replace(ARM, stiffness_n_m=stiffness_n_m, undeclared_lag_s=lag_s, **hazard.surface)
-    return slide_trial(arm, SLIDE, injection=hazard.injection)
+    return simulate_force_controlled_slide(arm, SLIDE, injection=hazard.injection)

@@ -12,9 +12,9 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
-from texture_benchmarks.motion.trial import CIRCLE, SLIDE, Trial, judge
+from texture_benchmarks.motion.trial import CIRCLE, SLIDE, ForceControlMetrics, force_control_metrics
 from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.protocol import Arm, ArmState
 from texture_exploration.arms.rails import RailsArm, RailsParams
@@ -32,7 +32,7 @@ from texture_simulation.devices.ur.process import ControllerProcess
 
 HEIGHT_M = 0.002
 UR_IP = '127.0.0.66'
-LIMITS = SafetyLimits(stale_s=1.0)  # a busy machine is not what is tried here
+LIMITS = SafetyLimits(state_timeout_s=1.0)  # a busy machine is not what is tried here
 DEADLINE_S = 60.0
 GRIP_S = 20.0
 TOUCH = TouchParams()
@@ -126,18 +126,18 @@ ROBOTS: Mapping[str, Robot] = {
 }
 
 
-def typical_trial(name: str, stiffness_n_m: float, request: ExplorationRequest, repeats: int) -> Trial:
+def typical_trial(name: str, stiffness_n_m: float, request: ExplorationRequest, repeats: int) -> ForceControlMetrics:
     """Return the median of each number of several trials, or one that failed: the machine may have been busy once."""
     trials = [robot_trial(name, stiffness_n_m, request) for _ in range(repeats)]
     failed = [trial for trial in trials if not trial.success]
     if failed:
         return failed[0]
-    names = [field.name for field in fields(Trial) if field.name not in ('success', 'message')]
+    names = [field.name for field in fields(ForceControlMetrics) if field.name not in ('success', 'message')]
     medians = {name: statistics.median(getattr(trial, name) for trial in trials) for name in names}
-    return Trial(True, trials[0].message, **medians)
+    return ForceControlMetrics(True, trials[0].message, **medians)
 
 
-def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) -> Trial:
+def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) -> ForceControlMetrics:
     """Explore once with one of `ROBOTS`, over a surface of that stiffness."""
     robot = ROBOTS[name]
     states: list[ExplorationState] = []
@@ -149,7 +149,7 @@ def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) ->
         explorer.connect()
         exploration = explorer.begin('trial', request)
         exploration.ended.wait(DEADLINE_S)
-        return judge(_by_phase(log.fingers, states), request, exploration.outcome)
+        return force_control_metrics(_by_phase(log.fingers, states), request, exploration.outcome)
 
 
 def _by_phase(fingers: list[FingerState], states: list[ExplorationState]) -> list[tuple[Phase, ArmState]]:

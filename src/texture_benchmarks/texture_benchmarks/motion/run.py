@@ -22,12 +22,20 @@ from texture_benchmarks.motion.chart import (
 )
 from texture_benchmarks.motion.hazards import LAGS_S, hazard_trials, lag_trials
 from texture_benchmarks.motion.robot_trials import ROBOTS, typical_trial
-from texture_benchmarks.motion.trial import ARM, CIRCLE, SLIDE, SURFACES, Trial, slide_trial, surface_trials
+from texture_benchmarks.motion.trial import (
+    ARM,
+    CIRCLE,
+    SLIDE,
+    SURFACES,
+    ForceControlMetrics,
+    simulate_force_controlled_slide,
+    simulate_slides_on_surfaces,
+)
 from texture_benchmarks.result import Bench, BenchResult
 from texture_core.arrays import Array
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArmParams
 from texture_exploration.force_control import ForceController, ForceLoopParams
-from texture_exploration.stability import Loop, border_gain, stability_chart
+from texture_exploration.stability import LoopModel, stability_chart, stability_limit_gain
 
 STIFFNESSES_N_M = (200.0, 2000.0, 20000.0)
 FINE_STIFFNESSES_N_M = tuple(float(k) for k in np.geomspace(200.0, 20000.0, 9))
@@ -55,7 +63,7 @@ def run(bench: Bench) -> BenchResult:
     """Slide straight and in a circle with every robot, over every surface; draw the border of stability."""
     stiffnesses = STIFFNESSES_N_M[1:2] if bench.quick else STIFFNESSES_N_M
     fine = STIFFNESSES_N_M if bench.quick else FINE_STIFFNESSES_N_M
-    surfaces = surface_trials(fine)
+    surfaces = simulate_slides_on_surfaces(fine)
     lags_s = LAGS_S[::3] if bench.quick else LAGS_S
     lags, hazards = lag_trials(fine, lags_s), hazard_trials(lags_s, 2 if bench.quick else None)
     border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if bench.quick else DELAYS_S, _controller)
@@ -99,14 +107,14 @@ def run(bench: Bench) -> BenchResult:
     )
 
 
-def _controller(loop: Loop) -> ForceController:
+def _controller(loop: LoopModel) -> ForceController:
     return ForceController(loop.gain_m_s_n, loop.integral_s)
 
 
 def _simulated(arm: SimulatedArmParams, stiffnesses: Sequence[float]) -> dict[str, Any]:
     arms = {k: replace(arm, stiffness_n_m=k) for k in stiffnesses}
     return {
-        _newtons(k): {request.motion: _row(slide_trial(at, request)) for request in (SLIDE, CIRCLE)}
+        _newtons(k): {request.motion: _row(simulate_force_controlled_slide(at, request)) for request in (SLIDE, CIRCLE)}
         for k, at in arms.items()
     }
 
@@ -119,11 +127,11 @@ def _emulated(name: str, stiffnesses: Sequence[float], repeats: int) -> dict[str
     }
 
 
-def _rows(trials: Mapping[float, Trial]) -> dict[str, Any]:
+def _rows(trials: Mapping[float, ForceControlMetrics]) -> dict[str, Any]:
     return {_newtons(stiffness): _row(trial) for stiffness, trial in trials.items()}
 
 
-def _row(trial: Trial) -> dict[str, Any]:
+def _row(trial: ForceControlMetrics) -> dict[str, Any]:
     """Return the numbers of a trial; what there is none of is left out, as is the message of a success."""
     numbers = {name: value for name, value in asdict(trial).items() if isinstance(value, float) and isfinite(value)}
     return {'success': trial.success, **numbers, **({} if trial.success else {'message': trial.message})}
@@ -140,7 +148,11 @@ def _milliseconds(time_s: float) -> str:
 def _bump_speed_m_s(stiffness_n_m: float) -> float:
     """Return the highest of `SPEEDS_M_S` at which a bump of 2 mm is followed as well as asked, without a force mode."""
     arm = replace(ARM, stiffness_n_m=stiffness_n_m, **SURFACES['bump of 2 mm'])
-    fits = (v for v in SPEEDS_M_S if slide_trial(arm, replace(SLIDE, speed_m_s=v)).force_rms <= TARGETS['force_rms'])
+    fits = (
+        v
+        for v in SPEEDS_M_S
+        if simulate_force_controlled_slide(arm, replace(SLIDE, speed_m_s=v)).force_rms <= TARGETS['force_rms']
+    )
     return next(fits, 0.0)
 
 
@@ -148,7 +160,7 @@ def _defaults(border: Mapping[str, Array]) -> Array:
     """Return the gains that are chosen for the stiffnesses and delays of a chart, (s, d)."""
     return np.array(
         [
-            [ForceLoopParams(loop_delay_s=delay).best_gain(stiffness, 1 / RATE_HZ) for delay in border['delay_s']]
+            [ForceLoopParams(loop_delay_s=delay).default_gain(stiffness, 1 / RATE_HZ) for delay in border['delay_s']]
             for stiffness in border['stiffness_n_m']
         ]
     )
@@ -157,13 +169,16 @@ def _defaults(border: Mapping[str, Array]) -> Array:
 def _margins() -> dict[str, float]:
     """Return how many times stiffer, and later, the contact may be than expected before the chosen gain is unstable."""
     params, period_s = ForceLoopParams(), 1 / RATE_HZ
-    gain = params.best_gain(params.stiffest_n_m, period_s)
+    gain = params.default_gain(params.max_stiffness_n_m, period_s)
     delays = np.linspace(1.0, 20.0, 191)
     late = [
-        border_gain(replace(params.loop(params.stiffest_n_m, period_s), delay_s=float(f) * params.loop_delay_s)) > gain
+        stability_limit_gain(
+            replace(params.loop(params.max_stiffness_n_m, period_s), delay_s=float(f) * params.loop_delay_s)
+        )
+        > gain
         for f in delays
     ]
     return {
-        'stiffness': border_gain(params.loop(params.stiffest_n_m, period_s)) / gain,
+        'stiffness': stability_limit_gain(params.loop(params.max_stiffness_n_m, period_s)) / gain,
         'delay': float(delays[np.argmin(late)]),
     }

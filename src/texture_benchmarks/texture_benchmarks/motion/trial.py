@@ -13,7 +13,7 @@ from texture_core.arrays import Array
 from texture_core.exploration import ExplorationRequest, Phase
 from texture_exploration.arms.protocol import ArmState
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArm, SimulatedArmParams
-from texture_exploration.exploration import Exploration, Outcome
+from texture_exploration.exploration import Exploration, ExplorationOutcome
 from texture_exploration.explorer import PERIOD_S
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.touch import TouchParams
@@ -23,7 +23,7 @@ ARM_PERIOD_NS = round(1e9 / RATE_HZ)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
 CIRCLE = ExplorationRequest('circular', speed_m_s=0.1, force_n=1.0, radius_m=0.02, turns=2.0)
 # One configuration for all stiffnesses: the stiffest contact is expected throughout.
-ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, stiffest_n_m=20000.0)
+ARM = SimulatedArmParams(force_mode=False, start_height_m=0.002, max_stiffness_n_m=20000.0)
 TOUCH = TouchParams(approach_stiffness_n_m=20000.0)
 LIMITS = SafetyLimits()
 APART_S = 0.05
@@ -31,7 +31,7 @@ LIFTED = (Phase.LIFT, Phase.ABORTED, Phase.DONE)
 
 
 @dataclass(frozen=True)
-class Trial:
+class ForceControlMetrics:
     """How an exploration went; shares of the wanted force and speed.
 
     `overshoot` is the highest force from the approach to the beginning of the slide, above the wanted; negative if it
@@ -64,12 +64,12 @@ class Injection:
 Log = Sequence[tuple[Phase, ArmState]]
 
 
-def slide_trial(
+def simulate_force_controlled_slide(
     arm: SimulatedArmParams = ARM,
     request: ExplorationRequest = SLIDE,
     touch: TouchParams = TOUCH,
     injection: Injection | None = None,
-) -> Trial:
+) -> ForceControlMetrics:
     """Explore once with a simulated arm, under the real exploration loop; judged by the true force."""
     log: list[tuple[Phase, ArmState]] = []
     now_ns = due_ns = 0
@@ -99,7 +99,7 @@ def slide_trial(
     outcome = exploration.run(pace)
     moving.close()
     log.append((exploration.state.phase, replace(moving.state(), force_n=moving.true_force_n)))
-    return replace(judge(log, request, outcome), noticed_s=_noticed_s(log, injected_ns))
+    return replace(force_control_metrics(log, request, outcome), noticed_s=_noticed_s(log, injected_ns))
 
 
 def _noticed_s(log: Log, begin_ns: int | None) -> float:
@@ -113,18 +113,18 @@ def _noticed_s(log: Log, begin_ns: int | None) -> float:
     return (next(lifted, log[-1][1].time_ns) - begin_ns) * 1e-9
 
 
-def judge(log: Log, request: ExplorationRequest, outcome: Outcome) -> Trial:
+def force_control_metrics(log: Log, request: ExplorationRequest, outcome: ExplorationOutcome) -> ForceControlMetrics:
     """Return how an exploration went, from the states of the arm in each phase."""
     before = [state.force_n for phase, state in log if phase in (Phase.APPROACH, Phase.CONTACT)]
     sliding = [state for phase, state in log if phase is Phase.SLIDE]
     peak_n = max((state.force_n for _, state in log), default=math.nan)
     if not sliding:
-        return Trial(outcome.success, outcome.message, peak_n=peak_n)
+        return ForceControlMetrics(outcome.success, outcome.message, peak_n=peak_n)
     force = np.array([state.force_n for state in sliding]) / request.force_n
     speed = np.array([math.hypot(*state.velocity) for state in sliding]) / request.speed_m_s
     times_s = np.array([state.time_ns for state in sliding]) * 1e-9
     places = np.array([state.position for state in sliding])
-    return Trial(
+    return ForceControlMetrics(
         success=outcome.success,
         message=outcome.message,
         overshoot=max(before) / request.force_n - 1,
@@ -167,11 +167,14 @@ SURFACES: Mapping[str, Mapping[str, Any]] = {
 }
 
 
-def surface_trials(
+def simulate_slides_on_surfaces(
     stiffness_n_m: Sequence[float] = (200.0, 2000.0, 20000.0), arm: SimulatedArmParams = ARM
-) -> dict[str, dict[float, Trial]]:
+) -> dict[str, dict[float, ForceControlMetrics]]:
     """Return the trials on all `SURFACES` by name and stiffness."""
     return {
-        name: {stiffness: slide_trial(replace(arm, stiffness_n_m=stiffness, **changes)) for stiffness in stiffness_n_m}
+        name: {
+            stiffness: simulate_force_controlled_slide(replace(arm, stiffness_n_m=stiffness, **changes))
+            for stiffness in stiffness_n_m
+        }
         for name, changes in SURFACES.items()
     }

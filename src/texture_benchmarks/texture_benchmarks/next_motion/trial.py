@@ -15,10 +15,10 @@ from texture_estimation.log_probabilities import log_softmax
 from texture_estimation.next_motion.choice import Explorations
 from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import CutWindow
-from texture_simulation.scans import scans
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.slide_batches import simulate_slides
 
 # Chooses a motion, by the log-posterior and the number of the slide.
 Choose = Callable[[Array, int], Motion]
@@ -134,8 +134,8 @@ def _values(
     scene: Scene, texture: str, motion: Motion, count: int, *, features: FeatureSet, rng: np.random.Generator
 ) -> Array:
     """Return the features of slides over one texture with one motion, (count, n_features)."""
-    sliding = Sliding(motion.speed_m_s, motion.force_n, motion.duration_s, motion.direction_rad)
-    pieces = _pieces(scene, motion, scans(scene, texture, count, sliding, rng))
+    sliding = SimulatedSlide(motion.speed_m_s, motion.force_n, motion.duration_s, motion.direction_rad)
+    pieces = _pieces(scene, motion, simulate_slides(scene, texture, count, sliding, rng))
     return np.stack([vector.values for vector in features.describe_many(pieces)])
 
 

@@ -28,10 +28,10 @@ from texture_estimation.search.spread import over_cores
 from texture_estimation.search.task import Task
 from texture_estimation.search.telling_apart import TellingApart
 from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
-from texture_simulation.offline import scans
+from texture_simulation.offline import simulate_slides
 from texture_simulation.scene import load_scene
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 Draw = Callable[[Mapping[str, Optimised[Any]], Path], tuple[Path, ...]]
 
@@ -158,7 +158,13 @@ def _feel(data: Data, bench: Bench) -> Scans:
     conditions = [(speed, force) for speed in data.speeds_m_s for force in data.forces_n]
     speed, force = np.repeat(np.array(conditions), count, axis=0).T
     samples = [
-        scans(scene, surface, len(speed), Sliding(speed, force, data.scan_s), np.random.default_rng([bench.seed, n]))
+        simulate_slides(
+            scene,
+            surface,
+            len(speed),
+            SimulatedSlide(speed, force, data.scan_s),
+            np.random.default_rng([bench.seed, n]),
+        )
         for n, surface in enumerate(surfaces)
     ]
     return Scans(

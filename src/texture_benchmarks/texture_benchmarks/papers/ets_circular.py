@@ -21,7 +21,7 @@ from texture_benchmarks.papers.protocol import (
     Visits,
     halves,
 )
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 SPEED_M_S, FORCE_N, SLIDE_S, RADIUS_M = 0.10, 2.5, 0.5, 0.02
 ANGLES_DEG = (0, 30, 45, 90)
@@ -71,7 +71,7 @@ def _visits(radius_m: float) -> tuple[Visits, ...]:
         Visits(
             f'{angle} degrees{" at the start" if radius_m else ""}',
             50,
-            Sliding(SPEED_M_S, FORCE_N, SLIDE_S, math.radians(ACROSS_DEG - angle), radius_m),
+            SimulatedSlide(SPEED_M_S, FORCE_N, SLIDE_S, math.radians(ACROSS_DEG - angle), radius_m),
         )
         for angle in ANGLES_DEG
     )

@@ -18,7 +18,7 @@ from texture_benchmarks.papers.protocol import (
     Visits,
     halves,
 )
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 TASK = 'ten textures'
 ANN, SVM = 'ets-fine-ann', 'ets-fine-svm'
@@ -54,7 +54,7 @@ PROTOCOL = Protocol(
     tasks=(
         Task(
             TASK,
-            (Visits('0.125 m/s, 2 N', 200, Sliding(0.125, 2.0, 0.8)),),
+            (Visits('0.125 m/s, 2 N', 200, SimulatedSlide(0.125, 2.0, 0.8)),),
             (
                 Method(ANN, Figures(0.963, 0.949, 0.007)),
                 Method(SVM, Figures(0.960, 0.958, 0.014), confusion=TABLE_3),

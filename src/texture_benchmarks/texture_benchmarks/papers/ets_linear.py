@@ -18,12 +18,12 @@ from texture_benchmarks.papers.protocol import (
     Visits,
     halves,
 )
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 SLIDE_S = 0.5
 TASK = 'linear slides'
 VISITS = tuple(
-    Visits(f'{speed:.2f} m/s, {force:g} N', 50, Sliding(speed, force, SLIDE_S))
+    Visits(f'{speed:.2f} m/s, {force:g} N', 50, SimulatedSlide(speed, force, SLIDE_S))
     for speed in (0.10, 0.15, 0.20)
     for force in (1.0, 2.5, 5.0)
 )

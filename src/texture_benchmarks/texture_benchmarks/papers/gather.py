@@ -18,7 +18,7 @@ from texture_estimation.learners.learner import Codes
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.scans import Scans, Stream
 from texture_features.feature_set import FeatureSet
-from texture_simulation.offline import scan_streams
+from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
 
@@ -103,4 +103,4 @@ def _felt(scene: Scene, surface: str, visits: Visits, number: int, seed: int, *,
     sliding = replace(
         visits.sliding, duration_s=duration_s, direction_rad=visits.sliding.direction_rad + view.turned_rad
     )
-    return scan_streams(scene, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)
+    return simulate_slide_streams(scene, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)

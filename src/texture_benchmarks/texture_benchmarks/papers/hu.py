@@ -21,7 +21,7 @@ from texture_benchmarks.papers.protocol import (
     drawn,
 )
 from texture_features.windowing.windows import WindowParams
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 TASK = 'five linens'
 SLIDE_S = 3.0
@@ -52,7 +52,7 @@ PROTOCOL = Protocol(
     tasks=(
         Task(
             TASK,
-            (Visits('25.5 mm/s, 1.5 N', 60, Sliding(0.0255, 1.5, SLIDE_S), ALONG_X_AND_Y),),
+            (Visits('25.5 mm/s, 1.5 N', 60, SimulatedSlide(0.0255, 1.5, SLIDE_S), ALONG_X_AND_Y),),
             (
                 Method('hu-pca-svm', Figures(test=0.92), WHOLE, {**PLAIN, 'blocks': 2}, POWER),
                 Method('hu-pca-svm', windows=WHOLE, learner=PLAIN, features=POWER, label=X_ONLY, views=(0,)),

@@ -16,7 +16,7 @@ from texture_benchmarks.papers.protocol import (
     folds,
 )
 from texture_features.windowing.windows import WindowParams
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 TASK = 'eight surfaces'
 SLIDE_S = 2.0
@@ -83,7 +83,7 @@ PROTOCOL = Protocol(
     tasks=(
         Task(
             TASK,
-            (Visits('1 N', 50, Sliding(0.05, 1.0, SLIDE_S)),),
+            (Visits('1 N', 50, SimulatedSlide(0.05, 1.0, SLIDE_S)),),
             (
                 Method(THREE, Figures(test=0.78), WHOLE, NORMAL, FREQUENCIES, confusion=TABLE_1),
                 Method(FIVE, Figures(test=0.835), WHOLE, NORMAL, FREQUENCIES, confusion=TABLE_2),

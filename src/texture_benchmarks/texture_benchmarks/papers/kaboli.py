@@ -22,11 +22,11 @@ from texture_benchmarks.papers.protocol import (
     learnt_in,
 )
 from texture_features.windowing.windows import WindowParams
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 SLIDE_S = 2.0
 WHOLE = WindowParams(length_s=SLIDE_S, hop_s=SLIDE_S)
-SLIDING = Sliding(0.05, 1.0, SLIDE_S)
+SLIDING = SimulatedSlide(0.05, 1.0, SLIDE_S)
 THUMB, INDEX, MIDDLE = View(finger=0), View(finger=1), View(finger=2)
 TRAINED = 'index and middle finger'
 VISITS = (Visits(TRAINED, 10, SLIDING, (INDEX, MIDDLE)), Visits('thumb and index finger', 20, SLIDING, (THUMB, INDEX)))

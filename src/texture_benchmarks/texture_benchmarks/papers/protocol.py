@@ -14,7 +14,7 @@ from texture_benchmarks.papers.outcome import Outcome
 from texture_estimation.learners.learner import Codes
 from texture_estimation.search.halves import random_halves
 from texture_features.windowing.windows import WindowParams
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 Mask = NDArray[np.bool_]
 # (surface and condition of each slide, randomness, whether to hurry) -> which slides are learnt from, by division
@@ -48,7 +48,7 @@ class Visits:
 
     condition: str
     count: int
-    sliding: Sliding
+    sliding: SimulatedSlide
     views: tuple[View, ...] = (View(),)
 
 

@@ -18,10 +18,10 @@ from texture_estimation.search.scans import Scans, Stream
 from texture_features.feature_set import FeatureSet
 from texture_features.labelled_features import LabelledFeatures
 from texture_features.windowing.windows import CutWindow
-from texture_simulation.offline import scans
+from texture_simulation.offline import simulate_slides
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
 
 SPEED_M_S, FORCE_N, SCAN_S, USED_S = 0.15, 2.5, 0.7, 0.5
 
@@ -63,7 +63,7 @@ class Felt:
         if key not in self._scans:
             place = list(self._scene.surfaces).index(texture)
             rng = np.random.default_rng([self._seed, place, round(1e4 * speed_m_s), round(1e3 * force_n), count])
-            samples = scans(self._scene, texture, count, Sliding(speed_m_s, force_n, SCAN_S), rng)
+            samples = simulate_slides(self._scene, texture, count, SimulatedSlide(speed_m_s, force_n, SCAN_S), rng)
             self._scans[key] = samples[:, : round(USED_S * self._rate_hz)].astype(np.float64)
         return self._scans[key]
 

@@ -17,14 +17,14 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
 from texture_recordings.slides import Slide
 from texture_simulation.effects.finger_spread import FingerSpread
-from texture_simulation.scans import scans
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sensors.model import Stream
-from texture_simulation.sliding import Sliding
+from texture_simulation.sensors.model import SimulatedStream
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.slide_batches import simulate_slides
 from texture_simulation.stick_slip.friction import StickSlip
 
-SCENE = 'bench'
+SCENE = 'twelve_textures'
 SPEED_M_S, FORCE_N, SLIDE_S = 0.1, 2.0, 2.0
 KINETIC = 0.5  # coefficient of friction where there is friction
 STRIBECK_M_S = 0.2  # so wide that the skin hangs at SPEED_M_S, too
@@ -36,7 +36,7 @@ class Felt:
     """How the surfaces of a scene are felt."""
 
     scene: Scene
-    sliding: Sliding
+    sliding: SimulatedSlide
     fingers: Sequence[int] = TAUGHT_BY
 
 
@@ -63,7 +63,7 @@ class Condition:
 
 
 def _usual() -> Felt:
-    return Felt(load_scene(SCENE), Sliding(SPEED_M_S, FORCE_N, SLIDE_S))
+    return Felt(load_scene(SCENE), SimulatedSlide(SPEED_M_S, FORCE_N, SLIDE_S))
 
 
 def _pressed(strength: float) -> Felt:
@@ -111,7 +111,7 @@ def felt_slides(felt: Felt, count: int, rng: np.random.Generator) -> list[Record
     slides = []
     for surface in felt.scene.surfaces:
         for finger in felt.fingers:
-            samples = scans(felt.scene, surface, each, felt.sliding, rng, finger=finger)
+            samples = simulate_slides(felt.scene, surface, each, felt.sliding, rng, finger=finger)
             slides += [
                 _recorded(stream, surface, felt.sliding, each * finger + number, own)
                 for number, own in enumerate(samples)
@@ -119,7 +119,9 @@ def felt_slides(felt: Felt, count: int, rng: np.random.Generator) -> list[Record
     return slides
 
 
-def _recorded(stream: Stream, surface: str, sliding: Sliding, number: int, samples: Samples) -> Recorded:
+def _recorded(
+    stream: SimulatedStream, surface: str, sliding: SimulatedSlide, number: int, samples: Samples
+) -> Recorded:
     slide = Slide(Path(), f'{surface}/{number}', surface, number, 0, None)
     state = ExplorationState(
         0, slide.exploration_id, 'linear_slide', Phase.SLIDE, steady_s=sliding.duration_s, surface=surface

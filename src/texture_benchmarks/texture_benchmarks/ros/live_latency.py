@@ -68,7 +68,7 @@ def measure(model_path: Path, seed: int, slide_s: float) -> Live:
     """Stream one long simulated slide through feature extractor and classifier, and time the estimates."""
     model = load_model(model_path)
     states, signals = simulate_exploration(
-        load_scene('bench'), SURFACE, SPEED_M_S, FORCE_N, slide_s,
+        load_scene('twelve_textures'), SURFACE, SPEED_M_S, FORCE_N, slide_s,
         start_ns=0, exploration_id='long', rng=np.random.default_rng(seed),
     )  # fmt: skip
     batches = {topic: rebatch(signals[topic]) for topic in signals}
@@ -116,7 +116,7 @@ def driver_cpu() -> float:
         heard: list[TactileSignal] = []
         with (
             Graph(DOMAIN) as graph,
-            NodeProcess('texture_simulation', 'bench', {'tsf85_link': device, 'finger_port': 0}, domain_id=DOMAIN),
+            NodeProcess('texture_simulation', 'bench', {'sensor_link': device, 'finger_port': 0}, domain_id=DOMAIN),
             NodeProcess('texture_drivers', 'sensor', {'device': device}, domain_id=DOMAIN) as sensor,
         ):
             graph.listen('signal', heard.append)

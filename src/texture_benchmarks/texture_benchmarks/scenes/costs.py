@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_core.finger import FingerSender, FingerState
+from texture_core.finger_state import FingerSender, FingerState
 from texture_core.signal import NANOSECONDS
 from texture_drivers.tsf85.protocol import start_command
-from texture_simulation.bench import Bench, BenchParams
-from texture_simulation.scans import scan_streams
+from texture_simulation.emulator import Emulator, EmulatorParams
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sliding import Sliding
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.slide_batches import simulate_slide_streams
 
 SCAN_S = 0.5
-SLIDE = Sliding(0.1, 2.0, SCAN_S)
+SLIDE = SimulatedSlide(0.1, 2.0, SCAN_S)
 MANY = 100  # slides at once
 ARM_PERIOD_S = 0.008  # as often as an arm tells where it is, and the line is read
 READ_BYTES = 1 << 16
@@ -83,8 +83,8 @@ def live_load(name: str, surface: str, seconds: float) -> Load:
     stream = SENSORS[scene.sensor].fast
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / 'device'
-        params = BenchParams(scene=name, surface=surface, tsf85_link=str(link), finger_port=0)
-        with Bench(params) as bench, _Arm(bench.finger_port, link) as arm:
+        params = EmulatorParams(scene=name, surface=surface, sensor_link=str(link), finger_port=0)
+        with Emulator(params) as bench, _Arm(bench.finger_port, link) as arm:
             arm.slide(SETTLE_S)
             before, unread = bench.counts, bench.device.dropped_bytes
             cpu_s, began_s = time.process_time(), time.monotonic()
@@ -104,11 +104,11 @@ def live_load(name: str, surface: str, seconds: float) -> Load:
 def _scan_ms(scene: Scene, surface: str, count: int, repeats: int) -> float:
     """Return the median computing time of one of `count` slides at once."""
     rng = np.random.default_rng(0)
-    scan_streams(scene, surface, 1, SLIDE, rng)  # makes what is made once: tiles of random relief
+    simulate_slide_streams(scene, surface, 1, SLIDE, rng)  # makes what is made once: tiles of random relief
     times = []
     for _ in range(repeats):
         began = time.thread_time()
-        scan_streams(scene, surface, count, SLIDE, rng)
+        simulate_slide_streams(scene, surface, count, SLIDE, rng)
         times.append(time.thread_time() - began)
     return 1000 * float(np.median(times)) / count
 

@@ -17,22 +17,22 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from texture_core.arrays import Array, Samples
 from texture_simulation.contact import Contact
 from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.effects.contact_growth import ForceGain, PatchGrowth
 from texture_simulation.effects.finger_spread import FingerSpread
-from texture_simulation.effects.growth import ForceGain, PatchGrowth
+from texture_simulation.effects.protocols import GrowthEffect
 from texture_simulation.effects.slide_error import SlideError
-from texture_simulation.effects.stages import GrowthEffect
 from texture_simulation.effects.unevenness import Unevenness
-from texture_simulation.scans import scan_streams
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
-from texture_simulation.sliding import Sliding
-from texture_simulation.surfaces.surface import LEAST_BLUR_M
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.slide_batches import simulate_slide_streams
+from texture_simulation.surfaces.surface import MIN_BLUR_M
 
 BANDS = 24  # of the spectrum, each of equal width on a logarithmic scale
 LOWEST_HZ = 5.0
-LEAST_POWER = 1e-12
+MIN_POWER = 1e-12
 CONFIDENCE = 0.95
-LEAST_CHANGE = 0.01  # of the accuracy, or of the decisions: what is less is not worth a term
+MIN_CHANGE = 0.01  # of the accuracy, or of the decisions: what is less is not worth a term
 PATCH = 'patch filter'
 FRICTION = 'friction'
 
@@ -132,7 +132,7 @@ class Difference:
     @property
     def matters(self) -> bool:
         """Whether it is certain, and large enough to be seen."""
-        return bool(abs(self.mean) > self.half and abs(self.mean) >= LEAST_CHANGE)
+        return bool(abs(self.mean) > self.half and abs(self.mean) >= MIN_CHANGE)
 
     @property
     def most(self) -> float:
@@ -174,7 +174,7 @@ class Worth:
         known = [self.easier, self.unprepared, *([self.paper] if self.paper else [])]
         if any(item.matters for item in known) or (self.changed.matters and self.changed.mean > 0):
             return 'decides'
-        return 'idle' if max(item.most for item in known) < LEAST_CHANGE else 'open'
+        return 'idle' if max(item.most for item in known) < MIN_CHANGE else 'open'
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +220,7 @@ def variants(scene: Scene, touching: Touching) -> dict[str, Scene]:
         name: replace(_without(scene, name), contact=_grown(scene.contact, effect, touching, 1))
         for name, effect in scene.effects.items()
     }
-    made[PATCH] = replace(scene, contact=replace(scene.contact, blur_m=LEAST_BLUR_M))
+    made[PATCH] = replace(scene, contact=replace(scene.contact, blur_m=MIN_BLUR_M))
     if any(surface.friction for surface in scene.surfaces.values()):
         bare = {name: replace(surface, friction=None) for name, surface in scene.surfaces.items()}
         made[FRICTION] = replace(scene, surfaces=bare)
@@ -278,7 +278,7 @@ def scan_s(scene: Scene, touching: Touching, count: int) -> float:
     rng = np.random.default_rng(0)
     began = time.thread_time()
     for surface in scene.surfaces:
-        scan_streams(scene, surface, count, _sliding(touching, count, 0.0), rng)
+        simulate_slide_streams(scene, surface, count, _sliding(touching, count, 0.0), rng)
     return (time.thread_time() - began) / (count * len(scene.surfaces))
 
 
@@ -315,7 +315,7 @@ def describe(samples: Samples, rate_hz: float) -> Array:
     total = np.concatenate([np.zeros_like(samples[:, :1]), np.cumsum(np.abs(spectrum) ** 2, axis=1)], axis=1)
     ends = np.minimum(ends, total.shape[1] - 1)
     power = (total[:, ends] - total[:, np.minimum(starts, ends - 1)]) / n_samples
-    return np.asarray(np.log10(np.maximum(power, 0.0) + LEAST_POWER).reshape(len(samples), -1), dtype=np.float64)
+    return np.asarray(np.log10(np.maximum(power, 0.0) + MIN_POWER).reshape(len(samples), -1), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -390,15 +390,15 @@ def _described(scene: Scene, surface: str, touching: Touching, count: int, who: 
     parts = []
     for turned_rad in touching.turned_rad:
         sliding = _sliding(touching, count, turned_rad)
-        felt = scan_streams(scene, surface, count, sliding, rng, finger=finger, slow=touching.slow)
+        felt = simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=touching.slow)
         parts.append(describe(felt[fast.topic], fast.rate_hz))
         for stream in others if touching.slow else ():
             parts += [felt[stream.topic].mean(axis=1), np.log10(felt[stream.topic].std(axis=1) + 1.0)]
     return np.concatenate(parts, axis=1)
 
 
-def _sliding(touching: Touching, count: int, turned_rad: float) -> Sliding:
+def _sliding(touching: Touching, count: int, turned_rad: float) -> SimulatedSlide:
     """Return slides that meet all conditions in turn."""
     conditions = list(itertools.product(touching.speeds_m_s, touching.forces_n, touching.directions_rad))
     rows = np.array([conditions[number % len(conditions)] for number in range(count)])
-    return Sliding(rows[:, 0], rows[:, 1], touching.duration_s, rows[:, 2] + turned_rad, touching.radius_m)
+    return SimulatedSlide(rows[:, 0], rows[:, 1], touching.duration_s, rows[:, 2] + turned_rad, touching.radius_m)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.result import Bench, BenchResult
-from texture_benchmarks.sensors.trial import CHECKED, LINES, LineFigures, line_figures
+from texture_benchmarks.sensors.trial import CHECKSUMMED, PROTOCOLS, LinkStatistics, link_statistics
 from texture_core.arrays import Array
 from texture_evaluation.charts import fault_chart
 from texture_simulation.devices.faults import ByteFaults
@@ -24,12 +24,12 @@ def run(bench: Bench) -> BenchResult:
     found = {
         sensor: {
             kind: {
-                rate: line_figures(ByteFaults(**{kind: rate}), np.random.default_rng(bench.seed), n_packets, sensor)
+                rate: link_statistics(ByteFaults(**{kind: rate}), np.random.default_rng(bench.seed), n_packets, sensor)
                 for rate in RATES
             }
             for kind in KINDS
         }
-        for sensor in LINES
+        for sensor in PROTOCOLS
     }
     chart = fault_chart(
         {text: _lines(found, kind) for kind, text in KINDS.items()},
@@ -44,7 +44,7 @@ def run(bench: Bench) -> BenchResult:
         split='none: nothing is trained',
         numbers={
             sensor: {
-                'checksum': sensor in CHECKED,
+                'checksum': sensor in CHECKSUMMED,
                 **{kind: {f'{rate:g}': _numbers(row) for rate, row in rows.items()} for kind, rows in kinds.items()},
             }
             for sensor, kinds in found.items()
@@ -53,24 +53,24 @@ def run(bench: Bench) -> BenchResult:
     )
 
 
-def _numbers(figures: LineFigures) -> Mapping[str, Any]:
+def _numbers(figures: LinkStatistics) -> Mapping[str, Any]:
     return {
         'sent': figures.sent,
-        'recovered': figures.genuine_share,
-        'bogus': figures.bogus,
+        'recovered': figures.correct_share,
+        'bogus': figures.false_packets,
         'refused': figures.refused,
     }
 
 
 def _lines(
-    found: Mapping[str, Mapping[str, Mapping[float, LineFigures]]], kind: str
+    found: Mapping[str, Mapping[str, Mapping[float, LinkStatistics]]], kind: str
 ) -> Mapping[str, tuple[Array, Array, Array]]:
     """Return what is drawn for a kind of fault: rates, share recovered and share of false packets of each sensor."""
     return {
         sensor: (
             np.array(RATES),
-            np.array([row.genuine_share for row in kinds[kind].values()]),
-            np.array([row.bogus / row.sent for row in kinds[kind].values()]),
+            np.array([row.correct_share for row in kinds[kind].values()]),
+            np.array([row.false_packets / row.sent for row in kinds[kind].values()]),
         )
         for sensor, kinds in found.items()
     }

@@ -1,4 +1,4 @@
-"""How many packets of a sensor survive a bad line, and whether anything false is believed."""
+"""How many packets of a sensor survive a disturbed line, and whether false packets are accepted."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Protocol
 import numpy as np
 
 from texture_core.catalogue import find
-from texture_core.framing import Deframer, Frame
+from texture_core.framing import Frame, FrameDecoder
 from texture_drivers.tsf85.protocol import Packet, PacketParser
 from texture_simulation.devices import daq, pvdf
 from texture_simulation.devices.biotac_encoder import encode_replies, reply_frame
 from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.devices.sampler import MICROSECONDS, Sampled, encode
+from texture_simulation.devices.sampler import MICROSECONDS, SampledStream, encode
 from texture_simulation.devices.tsf85_encoder import TAXELS, Tsf85Encoder
 
 MILLISECONDS_PER_IMAGE = 16
@@ -24,25 +24,26 @@ CHUNK_BYTES = 512  # as a driver reads: the parser sees no more at once
 
 
 @dataclass(frozen=True)
-class LineFigures:
+class LinkStatistics:
     """What came of the packets that were sent.
 
-    `bogus` are accepted packets that were never sent. A checksum refuses them all. The TSF-85 has none: with bytes lost
-    or added, the strict walk can refuse them; a changed value byte inside an intact packet cannot be seen by anyone.
+    `false_packets` are accepted packets that were never sent. A checksum refuses them all. The TSF-85 has none: with
+    bytes lost or added, the strict walk can refuse them; a changed value byte inside an intact packet cannot be seen by
+    anyone.
     """
 
     sent: int
-    genuine: int
-    bogus: int
+    correct_packets: int
+    false_packets: int
     refused: int
 
     @property
-    def genuine_share(self) -> float:
+    def correct_share(self) -> float:
         """Share of the packets that arrived unharmed."""
-        return self.genuine / self.sent
+        return self.correct_packets / self.sent
 
 
-class Listener(Protocol):
+class PacketReceiver(Protocol):
     """A driver's parser."""
 
     def feed(self, data: bytes) -> Sequence[Hashable]:
@@ -53,7 +54,7 @@ class Listener(Protocol):
         """How many candidates were refused."""
 
 
-class Tsf85Listener:
+class Tsf85Receiver:
     """The TSF-85's parser."""
 
     def __init__(self) -> None:
@@ -69,11 +70,11 @@ class Tsf85Listener:
         return self._parser.refused
 
 
-class FrameListener:
+class FrameReceiver:
     """The parser of all devices with framed lines."""
 
     def __init__(self) -> None:
-        self._deframer = Deframer()
+        self._deframer = FrameDecoder()
 
     def feed(self, data: bytes) -> list[Frame]:
         """Return frames, whatever was missing before them."""
@@ -86,7 +87,7 @@ class FrameListener:
 
 
 @dataclass(frozen=True)
-class Line:
+class ProtocolUnderTest:
     """What a device sends, and what hears it.
 
     Parameters
@@ -98,12 +99,12 @@ class Line:
     """
 
     packets: Callable[[np.random.Generator, int], Iterator[bytes]]
-    listener: Callable[[], Listener]
+    receiver: Callable[[], PacketReceiver]
 
 
-def line_figures(
+def link_statistics(
     faults: ByteFaults, rng: np.random.Generator, n_packets: int = 20_000, sensor: str = 'tsf85'
-) -> LineFigures:
+) -> LinkStatistics:
     """Send packets of random content over a bad line and parse what arrives.
 
     Raises
@@ -111,19 +112,19 @@ def line_figures(
     UnknownName
         If no such sensor has a line.
     """
-    line = find(LINES, sensor, 'line of a sensor')
+    line = find(PROTOCOLS, sensor, 'line of a sensor')
     packets = list(line.packets(rng, n_packets))
-    sent = _heard(line.listener(), b''.join(packets))
-    listener = line.listener()
-    came = _heard(listener, faults.apply(b''.join(packets), rng))
-    genuine = (sent & came).total()
-    return LineFigures(len(packets), genuine, came.total() - genuine, listener.refused)
+    sent = _received(line.receiver(), b''.join(packets))
+    receiver = line.receiver()
+    received = _received(receiver, faults.apply(b''.join(packets), rng))
+    correct_packets = (sent & received).total()
+    return LinkStatistics(len(packets), correct_packets, received.total() - correct_packets, receiver.refused)
 
 
-def _heard(listener: Listener, wire: bytes) -> Counter[Hashable]:
+def _received(receiver: PacketReceiver, wire: bytes) -> Counter[Hashable]:
     # The start byte after the end lets the very last packet of a TSF-85 out, which waits for its successor.
     chunks = [wire[first : first + CHUNK_BYTES] for first in range(0, len(wire), CHUNK_BYTES)]
-    return Counter(packet for chunk in [*chunks, b'\x9a'] for packet in listener.feed(chunk))
+    return Counter(packet for chunk in [*chunks, b'\x9a'] for packet in receiver.feed(chunk))
 
 
 def _tsf85(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
@@ -142,7 +143,7 @@ def _biotac(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
         yield reply_frame(number, number * BIOTAC_FRAME_US, values[number], reply.tobytes())
 
 
-def _sampled(stream: Sampled) -> Callable[[np.random.Generator, int], Iterator[bytes]]:
+def _sampled(stream: SampledStream) -> Callable[[np.random.Generator, int], Iterator[bytes]]:
     """Return what yields frames of a stream."""
 
     def packets(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
@@ -154,10 +155,10 @@ def _sampled(stream: Sampled) -> Callable[[np.random.Generator, int], Iterator[b
     return packets
 
 
-LINES: Mapping[str, Line] = {
-    'tsf85': Line(_tsf85, Tsf85Listener),
-    'biotac': Line(_biotac, FrameListener),
-    'daq': Line(_sampled(daq.STREAM), FrameListener),
-    'pvdf': Line(_sampled(pvdf.FILM), FrameListener),
+PROTOCOLS: Mapping[str, ProtocolUnderTest] = {
+    'tsf85': ProtocolUnderTest(_tsf85, Tsf85Receiver),
+    'biotac': ProtocolUnderTest(_biotac, FrameReceiver),
+    'daq': ProtocolUnderTest(_sampled(daq.STREAM), FrameReceiver),
+    'pvdf': ProtocolUnderTest(_sampled(pvdf.FILM), FrameReceiver),
 }
-CHECKED = frozenset({'biotac', 'daq', 'pvdf'})  # lines with a checksum
+CHECKSUMMED = frozenset({'biotac', 'daq', 'pvdf'})  # lines with a checksum

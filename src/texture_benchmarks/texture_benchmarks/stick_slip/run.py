@@ -13,16 +13,16 @@ import numpy as np
 from texture_benchmarks.result import Bench, BenchResult
 from texture_benchmarks.stick_slip.chart import Borders, Costs, Vibration, border_chart, cost_chart, vibration_chart
 from texture_core.arrays import Array
-from texture_simulation.path import Path
-from texture_simulation.stick_slip.border import BORDERS, MARGIN, Phase, border_s
 from texture_simulation.stick_slip.friction import StickSlip
 from texture_simulation.stick_slip.integrators import INTEGRATORS
 from texture_simulation.stick_slip.limit_cycle import slow_drag
 from texture_simulation.stick_slip.reference import SOLVERS, solve
 from texture_simulation.stick_slip.simulate import DEFAULT, drag, drag_unchecked, pull_n
+from texture_simulation.stick_slip.simulated_limit import nudged, simulated_max_stable_step_s
+from texture_simulation.stick_slip.stability_limit import MARGIN, STEP_LIMITS, ContactRegime, max_stable_step_s
 from texture_simulation.stick_slip.stribeck import critical_speed_m_s
 from texture_simulation.stick_slip.tip_drag import TipDrag
-from texture_simulation.stick_slip.trial import found_border_s, nudged
+from texture_simulation.trajectory import Trajectory
 
 FRICTION = StickSlip()
 SPEED_M_S, FORCE_N = 0.05, 1.5  # of the drag whose cost and error are measured
@@ -81,8 +81,8 @@ def run(bench: Bench) -> BenchResult:
 
 def _margins() -> dict[str, float]:
     return {
-        'border_us': 1e6 * border_s(DEFAULT, FRICTION, SPEED_M_S, FORCE_N),
-        'allowed_us': 1e6 * MARGIN * border_s(DEFAULT, FRICTION, SPEED_M_S, FORCE_N),
+        'border_us': 1e6 * max_stable_step_s(DEFAULT, FRICTION, SPEED_M_S, FORCE_N),
+        'allowed_us': 1e6 * MARGIN * max_stable_step_s(DEFAULT, FRICTION, SPEED_M_S, FORCE_N),
         'provably_passive_up_to_us': 1e6 * FRICTION.passive_step_s,
     }
 
@@ -90,9 +90,9 @@ def _margins() -> dict[str, float]:
 def _scan_ms(repeats: int) -> dict[str, float]:
     """Return what one scan costs at the path rates of the sensors, and one of many at once: medians."""
 
-    def path(rate_hz: float, scans: tuple[int, ...] = ()) -> Path:
+    def path(rate_hz: float, scans: tuple[int, ...] = ()) -> Trajectory:
         x_m = np.arange(round(SCAN_S * rate_hz)) * SPEED_M_S / rate_hz * np.ones((*scans, 1))
-        return Path(x_m, np.zeros_like(x_m), np.full_like(x_m, FORCE_N))
+        return Trajectory(x_m, np.zeros_like(x_m), np.full_like(x_m, FORCE_N))
 
     def felt_n(rate_hz: float, scans: tuple[int, ...] = ()) -> Callable[[], Array]:
         way = path(rate_hz, scans)
@@ -122,7 +122,7 @@ def _costs(compared_s: float, thin: int) -> Costs:
     measure = _Measure(compared_s, 1 if thin > 1 else REPEATS)
     rows = {}
     for method in INTEGRATORS:
-        border = border_s(method, FRICTION, SPEED_M_S, FORCE_N)
+        border = max_stable_step_s(method, FRICTION, SPEED_M_S, FORCE_N)
         steps_s = STEPS_S if method == DEFAULT else [share * border for share in SHARES]
         rows[method] = [measure.fixed_step(method, step_s) for step_s in steps_s[::thin]]
     for method in SOLVERS:
@@ -169,9 +169,9 @@ class _Measure:
 def _borders(stiffnesses_1_m: tuple[float, ...]) -> Borders:
     """Return the borders of all methods over the stiffness of the bristles."""
     predicted, found = {}, {}
-    for phase in Phase:
-        slip_m_s = 0.0 if phase is Phase.STICK else SLIDE_M_S
-        for method, border in BORDERS.items():
+    for phase in ContactRegime:
+        slip_m_s = 0.0 if phase is ContactRegime.STICK else SLIDE_M_S
+        for method, border in STEP_LIMITS.items():
             pairs = []
             for stiffness in stiffnesses_1_m:
                 friction = replace(FRICTION, bristle_1_m=stiffness)
@@ -180,7 +180,9 @@ def _borders(stiffnesses_1_m: tuple[float, ...]) -> Borders:
                 pairs.append(
                     (
                         expected_s,
-                        found_border_s(method, friction, phase, FORCE_N, slip_m_s=SLIDE_M_S, between_s=between_s),
+                        simulated_max_stable_step_s(
+                            method, friction, phase, FORCE_N, slip_m_s=SLIDE_M_S, between_s=between_s
+                        ),
                     )
                 )
             predicted[phase.value, method], found[phase.value, method] = np.array(pairs).T

@@ -255,7 +255,7 @@ at('explore').addEventListener('submit', (event) => {
   say('exploring');
   ask('explore', {
     motion: at('motion').value, ...Object.fromEntries(numbers), direction_rad: Number(at('direction').value),
-    surface: at('surface').value.trim(), stop_when_certain: at('certain').checked,
+    surface: at('surface').value.trim(), early_stopping: at('certain').checked,
   });
 });
 at('learn').addEventListener('submit', (event) => {

@@ -1,4 +1,4 @@
-"""`texture demo`: the whole thing on an emulated bench: explore, learn, recognise, report."""
+"""`texture demo`: the whole thing on an emulator: explore, learn, recognise, report."""
 
 from __future__ import annotations
 

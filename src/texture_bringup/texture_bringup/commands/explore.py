@@ -41,9 +41,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         'several: one exploration after the other',
     )
     parser.add_argument('--surface', default='', help='true name of the surface, if known; it labels a recording')
-    parser.add_argument(
-        '--stop-when-certain', action='store_true', help='end the slide as soon as the texture is certain'
-    )
+    parser.add_argument('--early-stopping', action='store_true', help='end the slide as soon as the texture is certain')
     parser.add_argument(
         '--timeout',
         type=float,
@@ -90,7 +88,7 @@ def requests_of(options: argparse.Namespace) -> list[ExplorationRequest]:
     request = ExplorationRequest(
         options.motion,
         surface=options.surface,
-        stop_when_certain=options.stop_when_certain,
+        early_stopping=options.early_stopping,
         timeout_s=options.timeout,
         **numbers,
     )

@@ -15,7 +15,7 @@ from texture_core.errors import InvalidParameter
 
 TOKEN_VARIABLE = 'TEXTURE_DASHBOARD_TOKEN'
 COOKIE = 'texture_token'
-LEAST_TOKEN = 16
+MIN_TOKEN = 16
 
 
 @dataclass(frozen=True)
@@ -42,10 +42,10 @@ class Access:
     names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if (self.token and len(self.token) < LEAST_TOKEN) or (not self.token and not is_loopback(self.host)):
+        if (self.token and len(self.token) < MIN_TOKEN) or (not self.token and not is_loopback(self.host)):
             raise InvalidParameter(
                 f"the token of the dashboard has {len(self.token)} characters; beyond loopback (host is '{self.host}') "
-                f'at least {LEAST_TOKEN} are needed'
+                f'at least {MIN_TOKEN} are needed'
             )
 
     @classmethod

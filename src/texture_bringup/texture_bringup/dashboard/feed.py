@@ -21,7 +21,7 @@ from texture_core.signal import TactileSignal
 FRAME_PERIOD_S = 0.1
 SIGNAL_S, SPECTRUM_S = 2.0, 0.5
 POINTS, BINS = 240, 128
-MOST_LABELS = 200
+MAX_LABELS = 200
 DIGITS = 4
 IDLE = ExplorationState(0, '', '', Phase.IDLE)
 
@@ -113,7 +113,7 @@ class Feed:
     def _evidence(self) -> dict[str, Any]:
         """Return the estimate with the most probable labels first."""
         estimate = self._texture
-        pairs = sorted(zip(estimate.probabilities, estimate.labels, strict=False), reverse=True)[:MOST_LABELS]
+        pairs = sorted(zip(estimate.probabilities, estimate.labels, strict=False), reverse=True)[:MAX_LABELS]
         shown = {name: _plain(value) for name, value in asdict(estimate).items()}
         shown['labels'] = [label for _, label in pairs]
         shown['probabilities'] = _numbers(probability for probability, _ in pairs)

@@ -7,8 +7,8 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Any
 
-MOST_EXPLORATIONS = 12
-MOST_FRAMES = 300  # of one exploration; a longer one is thinned to every second frame, again and again
+MAX_EXPLORATIONS = 12
+MAX_FRAMES = 300  # of one exploration; a longer one is thinned to every second frame, again and again
 
 
 @dataclass
@@ -25,7 +25,7 @@ class Past:
         if self.seen % self.stride == 0:
             self.frames.append(zlib.compress(frame.encode(), 1))
         self.seen += 1
-        if len(self.frames) > MOST_FRAMES:
+        if len(self.frames) > MAX_FRAMES:
             self.frames, self.stride = self.frames[::2], self.stride * 2
 
 
@@ -41,7 +41,7 @@ class History:
         past.summary = {**past.summary, **summary, 'id': exploration_id}
         if frame:
             past.add(frame)
-        while len(self._past) > MOST_EXPLORATIONS:
+        while len(self._past) > MAX_EXPLORATIONS:
             self._past.popitem(last=False)
 
     def __contains__(self, exploration_id: str) -> bool:

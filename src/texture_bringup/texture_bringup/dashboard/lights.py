@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 SILENT_S = 5.0  # nodes report once a second
-MOST_LIGHTS = 64
-MOST_CHARACTERS = 300
+MAX_LIGHTS = 64
+MAX_CHARACTERS = 300
 COLOURS = {'OK': 'green', 'WARN': 'yellow', 'ERROR': 'red'}
 
 
@@ -28,8 +28,8 @@ class Lights:
     def update(self, name: str, level: str, message: str, time_s: float) -> None:
         """Take note of a report; when there are too many names, the one silent for longest is forgotten."""
         self._lights.pop(name, None)
-        self._lights[name[:MOST_CHARACTERS]] = Light(level, message[:MOST_CHARACTERS], time_s)
-        if len(self._lights) > MOST_LIGHTS:
+        self._lights[name[:MAX_CHARACTERS]] = Light(level, message[:MAX_CHARACTERS], time_s)
+        if len(self._lights) > MAX_LIGHTS:
             del self._lights[next(iter(self._lights))]
 
     def shown(self, time_s: float) -> list[dict[str, str]]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from texture_core.signal import TactileSignal
 
-MOST_SAMPLES = 100_000
+MAX_SAMPLES = 100_000
 
 
 class Ring:
@@ -48,7 +48,7 @@ class Ring:
         return np.roll(self._samples, -self._at)[len(self._samples) - count :]
 
     def _begin(self, signal: TactileSignal) -> None:
-        size = int(np.clip(round(self._length_s * signal.sampling_rate_hz), 1, MOST_SAMPLES))
+        size = int(np.clip(round(self._length_s * signal.sampling_rate_hz), 1, MAX_SAMPLES))
         self._samples = np.full(size, np.nan)
         self._at, self._next = 0, None
         self.rate_hz, self.sensor = signal.sampling_rate_hz, signal.sensor

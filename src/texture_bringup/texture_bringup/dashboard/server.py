@@ -13,9 +13,9 @@ from texture_bringup.dashboard.access import COOKIE, Access
 from texture_core.errors import TextureError
 from texture_core.plain_data import parse_json
 
-MOST_BODY_BYTES = 4096
-MOST_MESSAGE_BYTES = 1024
-MOST_VIEWERS = 16
+MAX_BODY_BYTES = 4096
+MAX_MESSAGE_BYTES = 1024
+MAX_VIEWERS = 16
 HEARTBEAT_S = 10.0
 CLOSING_S = 1.0
 PAGE: Mapping[str, tuple[str, str]] = {
@@ -85,7 +85,7 @@ VIEWERS: web.AppKey[Viewers] = web.AppKey('viewers', Viewers)
 
 def make_app(commands: Commands, access: Access, page: Path) -> web.Application:
     """Return the application; `page` is the folder of the static files."""
-    app = web.Application(middlewares=[_guard(access)], client_max_size=MOST_BODY_BYTES)
+    app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
     viewers = app[VIEWERS] = Viewers()
     app.router.add_get('/ws', _watch(viewers))
     app.router.add_get('/api/motions', _motions(commands))
@@ -137,10 +137,10 @@ def _refusal(access: Access, request: web.Request) -> web.StreamResponse | None:
 
 def _watch(viewers: Viewers) -> Handler:
     async def watch(request: web.Request) -> web.StreamResponse:
-        if len(viewers.sockets) >= MOST_VIEWERS:
-            return _said(503, f'{MOST_VIEWERS} pages are open already; close one')
+        if len(viewers.sockets) >= MAX_VIEWERS:
+            return _said(503, f'{MAX_VIEWERS} pages are open already; close one')
         before = viewers.number  # old by now, as no frames are made while nobody looks
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MOST_MESSAGE_BYTES, timeout=CLOSING_S)
+        socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, max_msg_size=MAX_MESSAGE_BYTES, timeout=CLOSING_S)
         await socket.prepare(request)
         viewers.sockets.add(socket)
         sending = asyncio.create_task(viewers.send_to(socket, before))

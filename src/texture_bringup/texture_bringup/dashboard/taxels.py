@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from texture_core.signal import TactileSignal
 
 PLACE = re.compile(r'.*_(\d+)_(\d+)')  # 'taxel_6_3': row and column
-MOST_CHANNELS = 1024
+MAX_CHANNELS = 1024
 RESTING_SHARE = 0.05  # of a batch in the resting value: follows a drift of seconds, not a touch
 
 
@@ -26,11 +26,11 @@ class Taxels:
 
     def update(self, signal: TactileSignal, touching: bool) -> None:
         """Take the newest sample; while nothing is touched it moves the resting image."""
-        newest = signal.samples[-1:, :MOST_CHANNELS].astype(np.float64)
+        newest = signal.samples[-1:, :MAX_CHANNELS].astype(np.float64)
         if not len(newest):
             return
-        if signal.channels[:MOST_CHANNELS] != self.channels:
-            self.channels, self.unit = signal.channels[:MOST_CHANNELS], signal.unit
+        if signal.channels[:MAX_CHANNELS] != self.channels:
+            self.channels, self.unit = signal.channels[:MAX_CHANNELS], signal.unit
             self.places = places_of(self.channels)
             self._resting = newest[0]
         self._newest = newest[0]

@@ -1,1 +1,1 @@
-"""The demonstration: the whole suite on an emulated bench, from touch to report."""
+"""The demonstration: the whole suite on an emulator, from touch to report."""

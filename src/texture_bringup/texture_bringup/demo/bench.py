@@ -1,4 +1,4 @@
-"""The emulated bench of the demonstration: its processes, and what the operator does with it."""
+"""The emulator of the demonstration: its processes, and what the operator does with it."""
 
 from __future__ import annotations
 

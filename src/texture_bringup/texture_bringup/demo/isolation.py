@@ -10,8 +10,8 @@ from pathlib import Path
 
 from texture_core.errors import LaunchFailed
 
-# Domains whose ports lie below the ephemeral ports of Linux: https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html
-# The tests of the suite have those above 60.
+# Domains whose ports lie below the ephemeral ports of Linux:
+# https://docs.ros.org/en/jazzy/Concepts/Intermediate/About-Domain-ID.html The tests of the suite have those above 60.
 DOMAINS = range(1, 61)
 # Ports of the first participant of domain d (DDSI-RTPS 2.2, 9.6.1.1): 7400 + 250·d + 10 and + 11.
 FIRST_PORT, PORTS_PER_DOMAIN, FIRST_UNICAST = 7400, 250, 10

@@ -11,7 +11,7 @@ from texture_core.exploration import ExplorationRequest
 
 @dataclass(frozen=True)
 class Plan:
-    """Surfaces of the scene `bench`, slides over each, and the slide itself.
+    """Surfaces of the scene `twelve_textures`, slides over each, and the slide itself.
 
     The finger touches each time at another place; every second slide goes the other way.
     """
@@ -24,7 +24,7 @@ class Plan:
     force_n: float = 1.0
     distance_m: float = 0.06
 
-    def requests(self, surface: str, slides: int, stop_when_certain: bool = False) -> Iterator[ExplorationRequest]:
+    def requests(self, surface: str, slides: int, early_stopping: bool = False) -> Iterator[ExplorationRequest]:
         """Yield the explorations of one surface."""
         for number in range(slides):
             yield ExplorationRequest(
@@ -34,5 +34,5 @@ class Plan:
                 distance_m=self.distance_m,
                 direction_rad=math.pi * (number % 2),
                 surface=surface,
-                stop_when_certain=stop_when_certain,
+                early_stopping=early_stopping,
             )

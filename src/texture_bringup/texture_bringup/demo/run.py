@@ -79,10 +79,10 @@ class Places:
 
 
 def demonstrate(out: Path, recipe: str, seed: int, plan: Plan, story: Story) -> bool:
-    """Explore, learn, recognise and report on the emulated bench; return whether every slide was recognised."""
+    """Explore, learn, recognise and report on the emulator; return whether every slide was recognised."""
     places = Places(out)
     places.clear()
-    story.chapter('Starting the emulated bench: simulated surfaces, arm and sensor; the other nodes are the real ones')
+    story.chapter('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')
     with (
         tempfile.TemporaryDirectory(prefix='texture_demo_') as folder,
         DemoBench(Path(folder), places.log, recipe, seed) as bench,
@@ -120,7 +120,7 @@ def _recognise(bench: DemoBench, places: Places, plan: Plan, story: Story) -> li
     with bench.recording(places.recognition_bag):
         for surface in plan.surfaces:
             story.part(f'{surface:<18}', first=True)
-            felt = bench.explore(surface, plan.requests(surface, plan.recognition_slides, stop_when_certain=True))
+            felt = bench.explore(surface, plan.requests(surface, plan.recognition_slides, early_stopping=True))
             for number, explored in enumerate(felt):
                 rows.append(Row(surface, explored.texture))
                 story.part(f'{", " if number else "felt as "}{explored.texture.label or "nothing"}')

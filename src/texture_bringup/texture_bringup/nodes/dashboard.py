@@ -30,7 +30,7 @@ from texture_core.exploration import ExplorationRequest
 from texture_core.parameters import from_mapping, param
 from texture_core.resources import folder
 from texture_core.ros.conversions import from_msg, request_to_msg
-from texture_core.ros.diagnostics import LEVELS, Diagnostics, Report
+from texture_core.ros.diagnostics import LEVELS, DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
@@ -39,7 +39,7 @@ from texture_exploration.safety import SafetyLimits
 ANSWER_DEADLINE_S = 30.0
 ASKED_AGAIN_S = 2.0
 GONE_S = 10.0  # so long the explorer may be away before an exploration is given up
-MOST_CHARACTERS = 200
+MAX_CHARACTERS = 200
 LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 
 
@@ -108,7 +108,7 @@ class Dashboard(Node):
         label, exploration = (_short(str(asked.get(name, ''))).strip() for name in ('label', 'id'))
         if not label:
             raise InvalidParameter('the texture to learn has no name; give one')
-        request = srv.LearnTexture.Request(label=label, exploration_id=exploration)
+        request = srv.AddTexture.Request(label=label, exploration_id=exploration)
         return await self._ask(self._learn, request, 'classifier')
 
     async def record(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -139,7 +139,7 @@ class Dashboard(Node):
     def _make_clients(self) -> None:
         self._explorer = ActionClient(self, action.Explore, 'explore')
         self._stop = self.create_client(Trigger, 'stop')
-        self._learn = self.create_client(srv.LearnTexture, 'learn')
+        self._learn = self.create_client(srv.AddTexture, 'add_texture')
         self._undo = self.create_client(Trigger, 'undo_learning')
         self._limits = AsyncParameterClient(self, 'explorer')
 
@@ -175,7 +175,7 @@ class Dashboard(Node):
         if self._serving.watched or self._feed.exploring:
             self._serving.show(self._feed.frame(time.monotonic()))
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         trouble = self._recorder.trouble
         return 'WARN' if trouble or self._bad else 'OK', trouble or 'the page is served', {'bad_messages': self._bad}
 
@@ -186,8 +186,8 @@ class Dashboard(Node):
 
 
 def _short(value: Any) -> Any:
-    if isinstance(value, str) and len(value) > MOST_CHARACTERS:
-        raise InvalidParameter(f'a text has {len(value)} characters; allowed are {MOST_CHARACTERS}')
+    if isinstance(value, str) and len(value) > MAX_CHARACTERS:
+        raise InvalidParameter(f'a text has {len(value)} characters; allowed are {MAX_CHARACTERS}')
     return value
 
 

@@ -103,7 +103,7 @@ class Operator:
             If the explorer does not appear in time.
         """
         self._until(self._explore.server_is_ready, deadline_s, 'no explorer answers; start one, such as the emulated '
-                    'bench with `texture launch bench`')  # fmt: skip
+                    'bench with `texture launch emulator`')  # fmt: skip
 
     def wait_for_signal(self, deadline_s: float) -> None:
         """Wait until the sensor delivers samples."""
@@ -214,8 +214,8 @@ class Operator:
         InvalidData
             If it could not be learnt, with the reason.
         """
-        request = srv.LearnTexture.Request(label=label, exploration_id=exploration_id)
-        answer = self._ask_classifier(srv.LearnTexture, 'learn', request, deadline_s)
+        request = srv.AddTexture.Request(label=label, exploration_id=exploration_id)
+        answer = self._ask_classifier(srv.AddTexture, 'add_texture', request, deadline_s)
         return int(answer.examples), str(answer.message)
 
     def undo_learning(self, deadline_s: float = 30.0) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 LEVELS = {'OK': DiagnosticStatus.OK, 'WARN': DiagnosticStatus.WARN, 'ERROR': DiagnosticStatus.ERROR}
-Report = tuple[str, str, Mapping[str, Any]]
+DiagnosticReport = tuple[str, str, Mapping[str, Any]]
 
 
 class Diagnostics:
@@ -24,7 +24,9 @@ class Diagnostics:
         Serial number or device path; '' for a node that owns no device.
     """
 
-    def __init__(self, node: Any, report: Callable[[], Report], hardware_id: str = '', period_s: float = 1.0) -> None:
+    def __init__(
+        self, node: Any, report: Callable[[], DiagnosticReport], hardware_id: str = '', period_s: float = 1.0
+    ) -> None:
         self._node = node
         self._report = report
         self.hardware_id = hardware_id

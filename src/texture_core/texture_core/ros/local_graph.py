@@ -53,13 +53,13 @@ class LocalGraph:
 
     def listen(self, kind: type, topic: str, qos: Any = 10) -> list[Any]:
         """Return the list to which the messages of a topic will be added."""
-        heard: list[Any] = []
-        self.peer.create_subscription(kind, topic, heard.append, qos)
-        return heard
+        received: list[Any] = []
+        self.peer.create_subscription(kind, topic, received.append, qos)
+        return received
 
-    def spin_once(self, most_s: float = POLL_S) -> None:
+    def spin_once(self, timeout_s: float = POLL_S) -> None:
         """Let one thing happen."""
-        self._executor.spin_once(timeout_sec=most_s)
+        self._executor.spin_once(timeout_sec=timeout_s)
 
     def until(self, condition: Callable[[], Any]) -> None:
         """Let things happen until the condition holds."""

@@ -10,7 +10,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.parameter import Parameter as RosParameter
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import Parameter, from_mapping, parameters_of
 
@@ -84,7 +84,7 @@ def warn_of_unknown(node: Any) -> None:
     declared = set(node._parameters)
     for name in sorted(set(node._parameter_overrides) - declared):
         if not name.startswith('qos_overrides.'):
-            node.get_logger().warning(f'this has no effect: {unknown(name, declared, "parameter")}')
+            node.get_logger().warning(f'this has no effect: {unknown_name(name, declared, "parameter")}')
 
 
 def _needed(item: Parameter) -> str:

@@ -1,4 +1,4 @@
-"""Run a node until it is told to stop, and leave nothing behind."""
+"""Run a node until a signal stops it, and release all its resources."""
 
 from __future__ import annotations
 

@@ -10,17 +10,17 @@ import time
 from collections.abc import Mapping, Sequence
 
 from texture_core.errors import DeviceError
-from texture_core.framing import SEQUENCE_BITS, TIME_BITS, Deframer, Frame, WrappingCounter
+from texture_core.framing import SEQUENCE_BITS, TIME_BITS, CounterUnwrapper, Frame, FrameDecoder
 from texture_drivers.biotac.link import SpiFrame
-from texture_drivers.biotac.tables import ECHO_BYTES, WORD_BYTES, Layout
+from texture_drivers.biotac.tables import ECHO_BYTES, WORD_BYTES, BioTacLayout
 from texture_drivers.serial_port import SerialPort
 
 VERSION = 1
 REPLY, SERIALS = 0x42, 0x53  # kinds of frames: 'B' and 'S'
 POLLS = 5  # looks at the port per waiting time: a frame's arrival tells the time
-LATE_FRAMES = 0.5  # a frame further than this from where its number puts it: the bridge stopped or began anew
-PACE_CHECK_S = 1.0
-PACE_TOLERANCE = 0.02  # far more than clocks differ, far less than slots made of delays instead of by a timer
+LATE_FRAMES = 0.5  # a frame further than this from where its number puts it: the bridge stopped or restarted
+RATE_CHECK_S = 1.0
+RATE_TOLERANCE = 0.02  # far more than clocks differ, far less than slots made of delays instead of by a timer
 
 
 class SerialBridge:
@@ -38,22 +38,22 @@ class SerialBridge:
 
     max_drift = 5e-3  # the internal oscillator of a microcontroller on USB is right to 0.25 %
 
-    def __init__(self, device: str, layout: Layout, wait_s: float = 0.01) -> None:
+    def __init__(self, device: str, layout: BioTacLayout, wait_s: float = 0.01) -> None:
         self.serials: tuple[str, ...] = ()
         self._device = device
         self._layout = layout
         self._wait_s = wait_s
         self._port: SerialPort | None = None
-        self._deframer = Deframer()
-        self._run = Run(layout)
-        self._misfits = 0
+        self._deframer = FrameDecoder()
+        self._tracker = FrameTracker(layout)
+        self._unknown_frames = 0
 
     def open(self) -> None:
         """Open the port; DeviceError if it is not there."""
         self.close()
         self._port = SerialPort(self._device)
         self._deframer.restart()
-        self._run.restart()
+        self._tracker.restart()
 
     def read(self) -> Sequence[SpiFrame]:
         """Wait for bytes and return the replies they complete."""
@@ -65,7 +65,7 @@ class SerialBridge:
             data += self._port.read()
             if data:
                 break
-        return [reply for frame in self._deframer.feed(data) if (reply := self._take(frame)) is not None]
+        return [reply for frame in self._deframer.feed(data) if (reply := self._decode(frame)) is not None]
 
     def close(self) -> None:
         """Close the port."""
@@ -77,38 +77,38 @@ class SerialBridge:
     def counts(self) -> Mapping[str, int]:
         """Damaged or unknown frames, frames that came twice, and stops or resets of the device."""
         return {
-            'bogus': self._deframer.bad_frames + self._misfits,
+            'bogus': self._deframer.bad_frames + self._unknown_frames,
             'repeated': self._deframer.repeated,
-            'restarts': self._run.restarts,
+            'restarts': self._tracker.restarts,
         }
 
-    def _take(self, frame: Frame) -> SpiFrame | None:
+    def _decode(self, frame: Frame) -> SpiFrame | None:
         """Return the reply in a frame, if it is one."""
         if frame.version == VERSION and frame.kind == SERIALS:
             self.serials = tuple(frame.body.decode('ascii', 'replace').split(','))
             return None
         fits = frame.columns > 0 and len(frame.body) == frame.rows * (ECHO_BYTES + WORD_BYTES * frame.columns)
         if frame.version != VERSION or frame.kind != REPLY or not fits:
-            self._misfits += 1
+            self._unknown_frames += 1
             return None
         if frame.rows != len(self._layout.slots):
             raise DeviceError(
                 f"the bridge on '{self._device}' samples frames of {frame.rows} slots, and this kind of BioTac has "
                 f'{len(self._layout.slots)}; choose the sensor with the right one, or change the bridge'
             )
-        return self._run.place(frame)
+        return self._tracker.place(frame)
 
 
-class Run:
-    """Follow the numbers and the clock of a device beyond their wrapping, and notice when they begin anew.
+class FrameTracker:
+    """Unwrap the numbers and the clock of a device, and detect when they restart.
 
     Parameters
     ----------
     layout
-        What is sampled: tells how long a frame takes.
+        What is sampled; it determines the duration of a frame.
     """
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: BioTacLayout) -> None:
         self.restarts = 0
         self._epoch = 0
         self._frame_us = layout.frame_s * 1e6
@@ -117,8 +117,8 @@ class Run:
     def restart(self) -> None:
         """Begin a new epoch: another stream."""
         self._epoch += 1
-        self._number = WrappingCounter(SEQUENCE_BITS)
-        self._time_us = WrappingCounter(TIME_BITS)
+        self._number = CounterUnwrapper(SEQUENCE_BITS)
+        self._time_us = CounterUnwrapper(TIME_BITS)
         self._checked: SpiFrame | None = None
 
     def place(self, frame: Frame) -> SpiFrame:
@@ -131,24 +131,24 @@ class Run:
         """
         steps, elapsed_us = self._number.step(frame.sequence), self._time_us.step(frame.time_us)
         late_us = abs(elapsed_us - steps * self._frame_us)
-        steady = steps > 0 and late_us <= (LATE_FRAMES + PACE_TOLERANCE * steps) * self._frame_us
+        steady = steps > 0 and late_us <= (LATE_FRAMES + RATE_TOLERANCE * steps) * self._frame_us
         if self._number.value is not None and not steady:
             self.restarts += 1
             self.restart()
         number, time_us = self._number.advance(frame.sequence), self._time_us.advance(frame.time_us)
-        placed = SpiFrame(self._epoch, number, time_us, frame.columns, frame.body)
-        self._check_pace(placed)
-        return placed
+        unwrapped = SpiFrame(self._epoch, number, time_us, frame.columns, frame.body)
+        self._check_rate(unwrapped)
+        return unwrapped
 
-    def _check_pace(self, frame: SpiFrame) -> None:
+    def _check_rate(self, frame: SpiFrame) -> None:
         before = self._checked or frame
         elapsed_us = frame.time_us - before.time_us
-        if elapsed_us < PACE_CHECK_S * 1e6:
+        if elapsed_us < RATE_CHECK_S * 1e6:
             self._checked = before
             return
         self._checked = frame
         frame_us = elapsed_us / (frame.number - before.number)
-        if abs(frame_us / self._frame_us - 1) > PACE_TOLERANCE:
+        if abs(frame_us / self._frame_us - 1) > RATE_TOLERANCE:
             raise DeviceError(
                 f'the bridge takes {frame_us / 1000:.2f} ms for a frame, and {self._frame_us / 1000:.2f} ms are needed'
                 '; let a timer of the bridge start a slot every 227.27 µs'

@@ -14,7 +14,7 @@ from typing import Any
 
 from texture_core.errors import DeviceError
 from texture_drivers.biotac.link import SpiFrame
-from texture_drivers.biotac.tables import ECHO_BYTES, SLOT_RATE_HZ, WORD_BYTES, Layout, sampling_command
+from texture_drivers.biotac.tables import ECHO_BYTES, SLOT_RATE_HZ, WORD_BYTES, BioTacLayout, sampling_command
 
 MODULE = 'cheetah_py'
 BITRATE_KHZ = 4400
@@ -43,7 +43,7 @@ class Cheetah:
 
     max_drift = 2e-2  # the slots are made of delays, whose sum is nominal
 
-    def __init__(self, layout: Layout, now_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, layout: BioTacLayout, now_s: Callable[[], float] = time.monotonic) -> None:
         self.serials: tuple[str, ...] = ()
         self._layout = layout
         self._now_s = now_s

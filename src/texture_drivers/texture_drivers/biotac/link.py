@@ -12,7 +12,7 @@ class SpiFrame(NamedTuple):
     Parameters
     ----------
     epoch
-        Changes when `number` and `time_us` begin anew, as after opening or a reset.
+        Changes when `number` and `time_us` begin again, as after opening or a reset.
     number
         Running number of the frame; a jump is a loss.
     time_us

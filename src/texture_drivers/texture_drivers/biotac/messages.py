@@ -21,15 +21,15 @@ from numpy.typing import NDArray
 
 from texture_core.errors import InvalidData
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_drivers.biotac.tables import LAYOUTS, PAC, PAC_SENSOR, SLOW_SENSOR, UNIT, Layout
+from texture_drivers.biotac.tables import LAYOUTS, PAC, PAC_SENSOR, SLOW_SENSOR, UNIT, BioTacLayout
 from texture_drivers.clock import StreamClock
 
 LATE_S = 0.015  # host stamps jitter by some ms; what is later than that has gaps before it
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
-    """What one message says about one finger.
+class BioTacReading:
+    """What one message holds about one finger.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Reading:
         Stamp of the message: time just after the last sample.
     pac : (n,) counts
     slow : (n_channels,) counts
-        In the order of `Layout.slow_channels`.
+        In the order of `BioTacLayout.slow_channels`.
     serial
         Serial number of the finger, '' if not told.
     """
@@ -64,14 +64,14 @@ class MessageLayout:
         From there to the time given to the slow channels.
     """
 
-    read: Callable[[Any, int], Reading]
+    read: Callable[[Any, int], BioTacReading]
     pac_rate_hz: float
     message_rate_hz: float
     pac_delay_s: float
     slow_delay_s: float
 
 
-def read_biotac_hand(message: Any, finger: int) -> Reading:
+def read_biotac_hand(message: Any, finger: int) -> BioTacReading:
     """Return what a `biotac_sensors/BioTacHand` says about the finger at a place of the board, 0 for position 1.
 
     Raises
@@ -88,12 +88,12 @@ def read_biotac_hand(message: Any, finger: int) -> Reading:
             'give the message type that is published'
         )
     slow = [data.tdc_data, data.tac_data, data.pdc_data]
-    return Reading(
+    return BioTacReading(
         _stamp_ns(message), _counts(data.pac_data), _slow(slow, data.electrode_data, layout), str(data.bt_serial)
     )
 
 
-def read_biotac_all(message: Any, finger: int) -> Reading:
+def read_biotac_all(message: Any, finger: int) -> BioTacReading:
     """Return what a `sr_robot_msgs/BiotacAll` says about a finger, 0 is the first of the hand.
 
     Raises
@@ -103,7 +103,7 @@ def read_biotac_all(message: Any, finger: int) -> Reading:
     """
     data = _finger(dict(enumerate(message.tactiles)), finger)
     slow = _slow([data.tdc, data.tac, data.pdc], data.electrodes, LAYOUTS['biotac'])
-    return Reading(_stamp_ns(message), _counts(data.pac), slow)
+    return BioTacReading(_stamp_ns(message), _counts(data.pac), slow)
 
 
 def _finger(found: Mapping[int, Any], finger: int) -> Any:
@@ -120,7 +120,7 @@ def _counts(values: Any) -> NDArray[np.float32]:
     return np.array(values, dtype=np.float32)
 
 
-def _slow(first: list[int], electrodes: Any, layout: Layout) -> NDArray[np.float32]:
+def _slow(first: list[int], electrodes: Any, layout: BioTacLayout) -> NDArray[np.float32]:
     if len(electrodes) != layout.electrodes:
         raise InvalidData(f'the message has {len(electrodes)} electrodes; a BioTac has {layout.electrodes}')
     return np.concatenate([_counts(first), _counts(electrodes)])
@@ -134,7 +134,7 @@ MESSAGES: Mapping[str, MessageLayout] = {
 }
 
 
-class MessageStream:
+class BioTacMessageConverter:
     """Make the messages of one topic into batches of one finger, with running indices and times free of jitter.
 
     These messages have no numbers, so a loss is seen in the stamps alone: a message that is later than 15 ms leaves a
@@ -198,7 +198,7 @@ class MessageStream:
     def _length_ns(self, n_samples: int) -> int:
         return round(n_samples / self._layout.pac_rate_hz * NANOSECONDS)
 
-    def _pac(self, reading: Reading, first: int, start_ns: int) -> TactileSignal:
+    def _pac(self, reading: BioTacReading, first: int, start_ns: int) -> TactileSignal:
         return TactileSignal(
             stamp_ns=start_ns + round(self._layout.pac_delay_s * NANOSECONDS),
             sensor=PAC_SENSOR,
@@ -210,7 +210,7 @@ class MessageStream:
             frame_id=self._frame_id,
         )
 
-    def _slow(self, reading: Reading, row: int, start_ns: int) -> TactileSignal:
+    def _slow(self, reading: BioTacReading, row: int, start_ns: int) -> TactileSignal:
         return TactileSignal(
             stamp_ns=start_ns + round(self._layout.slow_delay_s * NANOSECONDS),
             sensor=SLOW_SENSOR,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.errors import InvalidData
-from texture_drivers.biotac.tables import ECHO_BYTES, ERROR_WORDS, WORD_BYTES, Layout
+from texture_drivers.biotac.tables import ECHO_BYTES, ERROR_WORDS, WORD_BYTES, BioTacLayout
 
 ODD_PARITY = np.array([byte.bit_count() % 2 == 1 for byte in range(256)])
 
@@ -22,7 +22,7 @@ class Replies:
     pac : (n_frames * pac_per_frame, n_fingers) float32
         The fast pressure, in the order of time.
     slow : (n_frames, n_slow_channels, n_fingers) float32
-        The other channels, in the order of `Layout.slow_channels`.
+        The other channels, in the order of `BioTacLayout.slow_channels`.
     damaged : (n_fingers,)
         Words with a wrong parity.
     refused : (n_fingers,)
@@ -35,7 +35,7 @@ class Replies:
     refused: NDArray[np.int64]
 
 
-def decode(frames: bytes, layout: Layout, fingers: int) -> Replies:
+def decode(frames: bytes, layout: BioTacLayout, fingers: int) -> Replies:
     """Return what the BioTacs measured in one or several whole frames.
 
     A word is 12 bits: seven in the upper bits of the first byte, five in the upper bits of the second; bit 0 of each

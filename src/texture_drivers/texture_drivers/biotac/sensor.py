@@ -12,7 +12,7 @@ from texture_drivers.biotac.bridge import SerialBridge
 from texture_drivers.biotac.cheetah import Cheetah
 from texture_drivers.biotac.link import SpiFrame, SpiLink
 from texture_drivers.biotac.protocol import Replies, decode
-from texture_drivers.biotac.tables import LAYOUTS, NANOSECONDS, PAC, PAC_SENSOR, SLOW_SENSOR, UNIT, Layout
+from texture_drivers.biotac.tables import LAYOUTS, NANOSECONDS, PAC, PAC_SENSOR, SLOW_SENSOR, UNIT, BioTacLayout
 from texture_drivers.clock import StreamClock
 from texture_drivers.params import SensorParams
 
@@ -27,9 +27,9 @@ class BioTac:
     """Read BioTacs of one board: 'signal' is PAC at 2200 Hz, 'signal_static' all else at 100 Hz, in counts.
 
     The stamp of a PAC batch is the time of its first sample, one slot (227 µs) after the start of the frame; that of
-    a static row is the start of its frame, and its channels were sampled up to a frame later (`Layout.slow_slots`).
-    The device's numbers tell losses exactly, its clock tells the times; over an interruption the host's clock does.
-    See `texture_core.protocols.Sensor`.
+    a static row is the start of its frame, and its channels were sampled up to a frame later
+    (`BioTacLayout.slow_slots`). The device's numbers tell losses exactly, its clock tells the times; over an
+    interruption the host's clock does. See `texture_core.protocols.Sensor`.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class BioTac:
         params: SensorParams,
         now_ns: Callable[[], int] = time.time_ns,
         *,
-        layout: Layout = LAYOUTS['biotac'],
+        layout: BioTacLayout = LAYOUTS['biotac'],
         fingers: Sequence[int] = (),
         link: SpiLink | None = None,
     ) -> None:
@@ -61,16 +61,16 @@ class BioTac:
         self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
         self._link = link or make_link(params, layout)
         self._clock = StreamClock(MICROSECONDS_PER_S, max_drift=self._link.max_drift)
-        self._numbers = FrameNumbers(layout)
+        self._numbers = FrameCounter(layout)
         self._epoch: int | None = None
-        self._last_heard: dict[int, int] = {}  # finger: when it last sent a good word; -1 for the board
+        self._last_received_ns: dict[int, int] = {}  # finger: when it last sent a good word; -1 for the board
         self._opened = self._samples = self._damaged = self._refused = 0
 
     def open(self) -> None:
         """Open the link; DeviceError if it is not there."""
         self._link.open()
         self._opened += 1
-        self._last_heard = dict.fromkeys([-1, *self._prefixes], self._now_ns())
+        self._last_received_ns = dict.fromkeys([-1, *self._prefixes], self._now_ns())
 
     def read(self) -> Mapping[str, Sequence[TactileSignal]]:
         """Wait for about one frame and return what arrived."""
@@ -78,7 +78,7 @@ class BioTac:
         now_ns = self._now_ns()
         topics: Topics = {topic: [] for topic in self.expected_rates_hz}
         for run in consecutive(frames):
-            self._take(run, now_ns, topics)
+            self._process(run, now_ns, topics)
         self._watch_silence(now_ns)
         return topics
 
@@ -111,11 +111,11 @@ class BioTac:
         rates = {'signal': self._layout.pac_rate_hz, 'signal_static': self._layout.frame_rate_hz}
         return {f'{prefix}{topic}': rate for prefix in self._prefixes.values() for topic, rate in rates.items()}
 
-    def _take(self, run: Sequence[SpiFrame], now_ns: int, topics: Topics) -> None:
+    def _process(self, run: Sequence[SpiFrame], now_ns: int, topics: Topics) -> None:
         """Make batches of consecutive frames, once their times are certain."""
         first, last = run[0], run[-1]
         self._check_places(last.fingers)
-        self._last_heard[-1] = now_ns
+        self._last_received_ns[-1] = now_ns
         if first.epoch != self._epoch:
             self._epoch = first.epoch
             self._numbers.interrupt()
@@ -133,7 +133,7 @@ class BioTac:
             self._refused += int(replies.refused[finger])
             if replies.damaged[finger] == len(run) * len(self._layout.slots):
                 continue  # nobody there
-            self._last_heard[finger] = now_ns
+            self._last_received_ns[finger] = now_ns
             topics[f'{prefix}signal'].append(self._pac(start_ns, index, replies, finger))
             topics[f'{prefix}signal_static'].append(self._slow(start_ns, index, replies, finger))
 
@@ -172,12 +172,12 @@ class BioTac:
     def _watch_silence(self, now_ns: int) -> None:
         """Raise DeviceError when the board, or every finger asked for, has not been heard for a while."""
         limit_ns = now_ns - SILENCE_S * NANOSECONDS
-        if self._last_heard[-1] < limit_ns:
+        if self._last_received_ns[-1] < limit_ns:
             raise DeviceError(
                 f"device '{self._params.device}' is open but sends no whole frames; check that it is a BioTac bridge "
                 'and runs, or replug it'
             )
-        if all(self._last_heard[finger] < limit_ns for finger in self._prefixes):
+        if all(self._last_received_ns[finger] < limit_ns for finger in self._prefixes):
             places = ' or '.join(str(finger) for finger in self._prefixes)
             raise DeviceError(
                 f"no BioTac answers as finger {places} at '{self._params.device}'; "
@@ -185,10 +185,10 @@ class BioTac:
             )
 
 
-class FrameNumbers:
+class FrameCounter:
     """Give each frame its running index: a jump is what was lost, over an interruption by the time that passed."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: BioTacLayout) -> None:
         self.lost = 0
         self._rate_hz = layout.frame_rate_hz
         self._next_index = 0
@@ -196,7 +196,7 @@ class FrameNumbers:
         self._next_number: int | None = None  # none after an interruption
 
     def interrupt(self) -> None:
-        """Forget the device's numbers: they begin anew."""
+        """Forget the device's numbers: they begin again."""
         self._next_number = None
 
     def place(self, number: int, count: int, start_ns: int) -> int:
@@ -229,7 +229,7 @@ def consecutive(frames: Sequence[SpiFrame]) -> Iterator[list[SpiFrame]]:
         yield [frame for _, frame in run]
 
 
-def make_link(params: SensorParams, layout: Layout) -> SpiLink:
+def make_link(params: SensorParams, layout: BioTacLayout) -> SpiLink:
     """Return the link that a device's name means: 'cheetah', or the path of a serial bridge."""
     if params.device == CHEETAH:
         return Cheetah(layout)

@@ -52,7 +52,7 @@ def sampling_command(channel: str) -> int:
 
 
 @dataclass(frozen=True)
-class Layout:
+class BioTacLayout:
     """In which order the channels of one kind of BioTac are sampled: every second slot is PAC."""
 
     electrodes: int
@@ -102,8 +102,8 @@ class Layout:
         return len(self.slots) * (ECHO_BYTES + WORD_BYTES * fingers)
 
 
-LAYOUTS: Mapping[str, Layout] = {
-    'biotac': Layout(electrodes=19),  # 44 slots, 100 frames/s
-    'biotac_sp': Layout(electrodes=24),  # 54 slots, 81.5 frames/s
+LAYOUTS: Mapping[str, BioTacLayout] = {
+    'biotac': BioTacLayout(electrodes=19),  # 44 slots, 100 frames/s
+    'biotac_sp': BioTacLayout(electrodes=24),  # 54 slots, 81.5 frames/s
 }
 FINGERS = 5  # most that one board holds

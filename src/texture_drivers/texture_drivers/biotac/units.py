@@ -18,17 +18,49 @@ from texture_drivers.biotac.tables import FULL_SCALE, PAC, UNIT
 
 
 @dataclass(frozen=True)
-class Scales:
+class BioTacScales:
     """Size of a count, and the count that means zero."""
 
-    pac_pa: float = param(0.37, 'Dynamic pressure of a count.', unit='Pa', low=1e-3, high=10.0)
-    pac_rest: float = param(2030.0, 'PAC without vibration.', unit='count', low=0.0, high=FULL_SCALE)
-    pdc_pa: float = param(36.5, 'Static pressure of a count.', unit='Pa', low=1.0, high=1000.0)
-    pdc_rest: float = param(0.0, 'PDC without load; measure yours.', unit='count', low=0.0, high=FULL_SCALE)
-    electrode_v: float = param(3.3 / FULL_SCALE, 'Voltage of a count of an electrode.', unit='V', low=1e-5, high=0.1)
+    pac_pa: float = param(
+        0.37,
+        'Sets the dynamic pressure (PAC) of one count; a larger value scales the pressures up.',
+        unit='Pa',
+        low=1e-3,
+        high=10.0,
+    )
+    pac_baseline: float = param(
+        2030.0,
+        'Sets the PAC count without vibration, which is subtracted before scaling.',
+        unit='count',
+        low=0.0,
+        high=FULL_SCALE,
+    )
+    pdc_pa: float = param(
+        36.5,
+        'Sets the static pressure (PDC) of one count; a larger value scales the pressures up.',
+        unit='Pa',
+        low=1.0,
+        high=1000.0,
+    )
+    pdc_baseline: float = param(
+        0.0,
+        'Sets the PDC count without load, which is subtracted before scaling; measure it on your own sensor.',
+        unit='count',
+        low=0.0,
+        high=FULL_SCALE,
+    )
+    electrode_v: float = param(
+        3.3 / FULL_SCALE,
+        'Sets the electrode voltage of one count; a larger value scales the voltages up.',
+        unit='V',
+        low=1e-5,
+        high=0.1,
+    )
 
 
-def to_physical(samples: Samples, channels: Sequence[str], scales: Scales | None = None) -> tuple[Samples, list[str]]:
+def to_physical(
+    samples: Samples, channels: Sequence[str], scales: BioTacScales | None = None
+) -> tuple[Samples, list[str]]:
     """Return samples in physical units, and the unit of each channel.
 
     Parameters
@@ -41,9 +73,9 @@ def to_physical(samples: Samples, channels: Sequence[str], scales: Scales | None
     -------
     (n_samples, n_channels), and 'Pa', 'V' or 'count' for each channel
     """
-    scales = scales or Scales()
-    known = {PAC: (scales.pac_rest, scales.pac_pa, 'Pa'), 'pdc': (scales.pdc_rest, scales.pdc_pa, 'Pa')}
+    scales = scales or BioTacScales()
+    known = {PAC: (scales.pac_baseline, scales.pac_pa, 'Pa'), 'pdc': (scales.pdc_baseline, scales.pdc_pa, 'Pa')}
     electrode, other = (0.0, scales.electrode_v, 'V'), (0.0, 1.0, UNIT)
     rows = [known.get(name, electrode if name.startswith('electrode') else other) for name in channels]
-    rest, size, units = zip(*rows, strict=True)
-    return (np.asarray(samples, dtype=np.float64) - rest) * size, list(units)
+    baseline, size, units = zip(*rows, strict=True)
+    return (np.asarray(samples, dtype=np.float64) - baseline) * size, list(units)

@@ -10,12 +10,12 @@ import numpy as np
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
-from texture_core.plain_data import shown
+from texture_core.plain_data import safe_repr
 from texture_drivers.daq import tables
 from texture_drivers.framed_sensor import FramedSensor
 from texture_drivers.params import SensorParams
-from texture_drivers.sample_line import Stream
 from texture_drivers.settings import read_settings
+from texture_drivers.stream_decoder import FramedStream
 
 DEFAULT_SETTINGS = 'daq'
 
@@ -24,18 +24,29 @@ DEFAULT_SETTINGS = 'daq'
 class DaqChannel:
     """What is wired to one input of the converter: sample = gain · count + offset."""
 
-    name: str = param('', 'Name of the channel.')
-    unit: str = param('V', 'Unit of the samples.')
-    gain: float = param(1.0, 'Unit per count.')
-    offset: float = param(0.0, 'What 0 counts mean, in the unit.')
+    name: str = param('', 'Sets the name of the channel, which must be unique in the file.')
+    unit: str = param('V', 'Sets the unit of the published samples.')
+    gain: float = param(1.0, 'Sets the factor from counts to the unit; a larger value gives larger samples.')
+    offset: float = param(0.0, 'Sets the value of 0 counts in the unit, which is added to every sample.')
 
 
 @dataclass(frozen=True)
 class DaqSettings:
     """The converter; its channels stand beside it in the file."""
 
-    baud: int = param(tables.BAUD, 'Baud rate of a real UART; USB ignores it.', low=9600, high=12_000_000)
-    rate_hz: float = param(tables.RATE_HZ, 'Samples of each channel a second.', unit='Hz', low=1.0, high=1e5)
+    baud: int = param(
+        tables.BAUD,
+        'Sets the baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
+        low=9600,
+        high=12_000_000,
+    )
+    rate_hz: float = param(
+        tables.RATE_HZ,
+        'Sets the nominal sampling rate of every channel; it must equal that of the device.',
+        unit='Hz',
+        low=1.0,
+        high=1e5,
+    )
 
 
 def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> FramedSensor:
@@ -49,17 +60,17 @@ def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:
     content = read_settings(config)
     listed = content.pop('channels', None)
     if not isinstance(listed, list) or not listed:
-        raise InvalidParameter(f'settings {config} have the `channels` {shown(listed)}; list one for each input')
+        raise InvalidParameter(f'settings {config} have the `channels` {safe_repr(listed)}; list one for each input')
     channels = [from_mapping(DaqChannel, item, f'settings {config}, channel {i + 1}') for i, item in enumerate(listed)]
     if len({channel.name for channel in channels} - {''}) < len(channels):
         raise InvalidParameter(f'settings {config}: give each channel a `name` of its own')
     return from_mapping(DaqSettings, content, f'settings {config}'), channels
 
 
-def stream(rate_hz: float, channels: Sequence[DaqChannel]) -> Stream:
+def stream(rate_hz: float, channels: Sequence[DaqChannel]) -> FramedStream:
     """Return what the device sends, as the line understands it; units that differ are listed in one text."""
     units = [channel.unit for channel in channels]
-    return Stream(
+    return FramedStream(
         topic=tables.TOPIC,
         kind=tables.KIND,
         sensor=tables.SENSOR,

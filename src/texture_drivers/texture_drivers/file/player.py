@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from texture_core.errors import DeviceError, InvalidData
 from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_drivers.file.recording import Recording, load_recording
+from texture_drivers.file.recording import FileRecording, load_recording
 from texture_drivers.params import SensorParams
 from texture_drivers.settings import load_settings
 
@@ -25,11 +25,24 @@ LONGEST_DELAY_S = 1.0  # after a longer stall of the machine the rest comes late
 class FileSettings:
     """How a recording is played; its path is the `device`."""
 
-    rate_hz: float = param(0.0, 'Samples of each channel a second; 0: as the file says.', unit='Hz', low=0.0, high=1e6)
-    speed: float = param(1.0, 'How much faster than real time; 0: as fast as it is read.', low=0.0, high=1000.0)
-    loop: bool = param(False, 'Begin again at the end.')
-    topic: str = param('signal', 'Topic of the samples.', choices=('signal', 'signal_static'))
-    unit: str = param('', 'Unit of the samples.')
+    rate_hz: float = param(
+        0.0,
+        'Sets the sampling rate of every channel; 0 takes the rate that the file states.',
+        unit='Hz',
+        low=0.0,
+        high=1e6,
+    )
+    speed: float = param(
+        1.0,
+        'Sets how many times faster than real time the file is played; 0 plays it as fast as it can be read.',
+        low=0.0,
+        high=1000.0,
+    )
+    loop: bool = param(False, 'Starts the file again from the beginning when its end is reached.')
+    topic: str = param(
+        'signal', 'Sets the topic on which the samples are published.', choices=('signal', 'signal_static')
+    )
+    unit: str = param('', 'Sets the unit of the published samples; the file does not state one.')
 
 
 class FilePlayer:
@@ -75,12 +88,12 @@ class FilePlayer:
         samples = self._samples
         if samples is None:
             raise DeviceError(f"recording '{self._params.device}' is not open; open it before reading")
-        if self._settings.speed == 0 and self._goes_on(samples):
+        if self._settings.speed == 0 and self._has_more(samples):
             return {self._settings.topic: [self._batch(samples)]}
         time.sleep(self._params.batch_s)
         due = min(self._due(self._now_ns()), self._position + round(LONGEST_DELAY_S * self._pace_hz))
         batches = []
-        while self._goes_on(samples) and self._position + self._per_batch <= due:
+        while self._has_more(samples) and self._position + self._per_batch <= due:
             batches.append(self._batch(samples))
         return {self._settings.topic: batches}
 
@@ -107,7 +120,7 @@ class FilePlayer:
     def _pace_hz(self) -> float:
         return self._rate_hz * (self._settings.speed or 1.0)
 
-    def _load(self) -> Recording:
+    def _load(self) -> FileRecording:
         try:
             recording = load_recording(Path(self._params.device).expanduser())
         except InvalidData as error:
@@ -118,7 +131,7 @@ class FilePlayer:
             )
         return recording
 
-    def _goes_on(self, samples: NDArray[np.float32]) -> bool:
+    def _has_more(self, samples: NDArray[np.float32]) -> bool:
         return self._position < len(samples) or self._settings.loop
 
     def _due(self, now_ns: int) -> int:

@@ -17,11 +17,11 @@ from texture_core.errors import InvalidData
 from texture_core.files import MB, Arrays, Budget, open_regular, read_array, take_all
 
 TIME_COLUMNS = ('time_s', 'time', 't')
-MOST_BYTES = 2000 * MB  # of a file
-MOST_COLUMNS = 10_000
-MOST_LINE = 16 * MOST_COLUMNS
+MAX_BYTES = 2000 * MB  # of a file
+MAX_COLUMNS = 10_000
+MAX_LINE = 16 * MAX_COLUMNS
 # What the readers of numpy and scipy raise at files that are damaged or something else, found by trying.
-FAULTS = (
+READ_ERRORS = (
     ValueError,
     KeyError,
     EOFError,
@@ -36,7 +36,7 @@ UNEVEN = 0.1  # deviation of a time step from their median above which a recordi
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class FileRecording:
     """Samples from a file.
 
     Parameters
@@ -53,7 +53,7 @@ class Recording:
     channels: tuple[str, ...] = ()
 
 
-def load_recording(path: Path) -> Recording:
+def load_recording(path: Path) -> FileRecording:
     """Return what is recorded in a .csv, .wav, .npy or .npz file; no file can run code.
 
     Raises
@@ -68,12 +68,12 @@ def load_recording(path: Path) -> Recording:
             recording = LOADERS[path.suffix.lower()](file)
     except OSError as error:
         raise InvalidData(f"recording '{path}' cannot be read: {error.strerror or error}; give another path") from error
-    except FAULTS as error:
+    except READ_ERRORS as error:
         raise InvalidData(f"recording '{path}' is not usable: {error}") from error
     return _checked(path, recording)
 
 
-def _checked(path: Path, recording: Recording) -> Recording:
+def _checked(path: Path, recording: FileRecording) -> FileRecording:
     if recording.samples.ndim != 2 or 0 in recording.samples.shape:
         raise InvalidData(
             f"recording '{path}' holds an array of shape {recording.samples.shape}; (n_samples, n_channels) is needed"
@@ -88,7 +88,7 @@ def _checked(path: Path, recording: Recording) -> Recording:
     return recording
 
 
-def load_csv(file: BinaryIO) -> Recording:
+def load_csv(file: BinaryIO) -> FileRecording:
     """Return a table: one column for each channel, comma, semicolon or blanks between, names in the first line or none.
 
     A column `time_s` gives the rate and is no channel. Lines with # are passed over.
@@ -106,21 +106,21 @@ def load_csv(file: BinaryIO) -> Recording:
         warnings.simplefilter('ignore')  # an empty table is refused below, in our words
         table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, dtype=np.float64)
     if not named:
-        return Recording(table)
+        return FileRecording(table)
     if table.size and table.shape[1] != len(names):
         raise ValueError(f'its first line has {len(names)} names and the others {table.shape[1]} numbers')
     time = next((i for i, name in enumerate(names) if name.lower() in TIME_COLUMNS), None)
     if time is None or not table.size:
-        return Recording(table, None, tuple(names))
+        return FileRecording(table, None, tuple(names))
     del names[time]
-    return Recording(np.delete(table, time, axis=1), rate_of(table[:, time]), tuple(names))
+    return FileRecording(np.delete(table, time, axis=1), rate_from_times(table[:, time]), tuple(names))
 
 
 def _lines(text: TextIO) -> Iterator[str]:
     """Yield the lines of a table that hold something; one that never ends is refused while it is read."""
-    while line := text.readline(MOST_LINE + 1):
-        if len(line) > MOST_LINE:
-            raise ValueError(f'it has a line of more than {MOST_LINE} characters; that is no table')
+    while line := text.readline(MAX_LINE + 1):
+        if len(line) > MAX_LINE:
+            raise ValueError(f'it has a line of more than {MAX_LINE} characters; that is no table')
         if line.strip() and not line.startswith('#'):
             yield line
 
@@ -133,7 +133,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def rate_of(time_s: Array) -> float:
+def rate_from_times(time_s: Array) -> float:
     """Return the rate of evenly spaced times, (n,); ValueError if they are not."""
     steps = np.diff(time_s)
     if not len(steps) or not np.median(steps) > 0:
@@ -146,24 +146,24 @@ def rate_of(time_s: Array) -> float:
     return float(len(steps) / (time_s[-1] - time_s[0]))
 
 
-def load_wav(file: BinaryIO) -> Recording:
+def load_wav(file: BinaryIO) -> FileRecording:
     """Return a WAV file; whole numbers are scaled so that full scale is 1."""
     from scipy.io import wavfile  # noqa: PLC0415 – no other recording and no device needs scipy
 
     with warnings.catch_warnings():
         warnings.simplefilter('ignore', wavfile.WavFileWarning)  # chunks of no interest
-        rate_hz, samples = wavfile.read(io.BytesIO(take_all(file, MOST_BYTES)))
+        rate_hz, samples = wavfile.read(io.BytesIO(take_all(file, MAX_BYTES)))
     if samples.dtype == np.uint8:  # WAV's only unsigned format
         samples = samples.astype(np.int16) - 128
         full_scale = 128.0
     else:
         full_scale = -float(np.iinfo(samples.dtype).min) if samples.dtype.kind == 'i' else 1.0
-    return Recording(_columns(samples) / full_scale, float(rate_hz))
+    return FileRecording(_columns(samples) / full_scale, float(rate_hz))
 
 
-def load_npy(file: BinaryIO) -> Recording:
+def load_npy(file: BinaryIO) -> FileRecording:
     """Return an array of shape (n_samples, n_channels) or (n_samples,)."""
-    return Recording(_columns(read_array(file, Budget(_values_bytes(file)))))
+    return FileRecording(_columns(read_array(file, Budget(_values_bytes(file)))))
 
 
 def _values_bytes(file: BinaryIO) -> int:
@@ -176,14 +176,14 @@ def _values_bytes(file: BinaryIO) -> int:
     return 8 * n_bytes
 
 
-def load_npz(file: BinaryIO) -> Recording:
+def load_npz(file: BinaryIO) -> FileRecording:
     """Return the array `samples`; `rate_hz` and `channels` beside it are used if they are there."""
     arrays = Arrays(file)
     if 'samples' not in arrays:
         raise ValueError(f"it holds {', '.join(arrays.names) or 'nothing'}; an array called 'samples' is needed")
     rate_hz = float(arrays['rate_hz']) if 'rate_hz' in arrays else None
     channels = tuple(str(name) for name in np.atleast_1d(arrays['channels'])) if 'channels' in arrays else ()
-    return Recording(_columns(arrays['samples']), rate_hz, channels)
+    return FileRecording(_columns(arrays['samples']), rate_hz, channels)
 
 
 def _columns(values: AnyArray) -> Samples:
@@ -193,7 +193,7 @@ def _columns(values: AnyArray) -> Samples:
     return samples[:, None] if samples.ndim == 1 else samples
 
 
-LOADERS: Mapping[str, Callable[[BinaryIO], Recording]] = {
+LOADERS: Mapping[str, Callable[[BinaryIO], FileRecording]] = {
     '.csv': load_csv,
     '.wav': load_wav,
     '.npy': load_npy,

@@ -12,24 +12,28 @@ from texture_core.catalogue import find
 from texture_core.errors import InvalidData
 from texture_core.parameters import param
 from texture_core.ros.conversions import to_msg
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.qos import SENSOR_QOS
 from texture_core.ros.run import run
-from texture_drivers.biotac.messages import MESSAGES, MessageStream
+from texture_drivers.biotac.messages import MESSAGES, BioTacMessageConverter
 from texture_drivers.message_types import import_message
 
 TOPICS = ('signal', 'signal_static')
 
 
 @dataclass(frozen=True)
-class AdaptorParams:
-    """Whose messages are read."""
+class BiotacAdaptorParams:
+    """Which messages are converted."""
 
-    message_type: str = param('biotac_sensors/msg/BioTacHand', 'Type of the messages, package/msg/Type.')
-    topic: str = param('biotac_pub', 'Topic of the messages.')
-    finger: int = param(0, 'Place of the finger: 0 is the first.', low=0, high=4)
-    frame_id: str = param('fingertip', 'Frame of the fingertip, for the headers.')
+    message_type: str = param(
+        'biotac_sensors/msg/BioTacHand', 'Sets the type of the subscribed messages, written as package/msg/Type.'
+    )
+    topic: str = param('biotac_pub', 'Sets the topic on which the other driver publishes.')
+    finger: int = param(
+        0, 'Sets the index of the finger that is converted; 0 is the first one of the message.', low=0, high=4
+    )
+    frame_id: str = param('fingertip', 'Sets the frame of the fingertip in the headers of the published messages.')
 
 
 class BiotacAdaptor(Node):
@@ -37,9 +41,9 @@ class BiotacAdaptor(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('biotac_adaptor', **kwargs)
-        self._params = declare(self, AdaptorParams)
+        self._params = declare(self, BiotacAdaptorParams)
         layout = find(MESSAGES, self._params.message_type.rpartition('/')[2], 'layout of BioTac messages')
-        self._stream = MessageStream(layout, self._params.finger, self._params.frame_id)
+        self._stream = BioTacMessageConverter(layout, self._params.finger, self._params.frame_id)
         self._messages = self._refused = 0
         self._fault = ''
         self._signals = {topic: self.create_publisher(msg.TactileSignal, topic, SENSOR_QOS) for topic in TOPICS}
@@ -59,16 +63,16 @@ class BiotacAdaptor(Node):
         for topic, batch in batches.items():
             self._signals[topic].publish(to_msg(batch))
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         if self._stream.serial:
             self._diagnostics.hardware_id = self._stream.serial
         new, self._messages = self._messages, 0
         numbers = {'samples': self._stream.samples, 'lost': self._stream.lost, 'refused messages': self._refused}
-        verdicts = (
+        conditions = (
             (bool(self._fault), 'ERROR', self._fault),
             (new == 0, 'ERROR', f"no message on '{self._params.topic}'; start the driver, or set the parameter topic"),
         )
-        level, sentence = next(((level, text) for holds, level, text in verdicts if holds), ('OK', 'converting'))
+        level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
         return level, sentence, numbers
 
 

@@ -20,17 +20,21 @@ from texture_core.ros.qos import SENSOR_QOS
 from texture_core.ros.run import run
 from texture_core.signal import TactileSignal
 from texture_drivers.catalogue import SENSORS
-from texture_drivers.health import Health
 from texture_drivers.params import SensorParams
-from texture_drivers.reader import Reader
+from texture_drivers.sensor_health import SensorHealth
+from texture_drivers.sensor_reader import SensorReader
 
 
 @dataclass(frozen=True)
 class SensorNodeParams(SensorParams):
     """Parameters of the sensor node."""
 
-    sensor: str = param('tsf85', "Name of the sensor, or 'module:Class' of your own.")
-    autostart: bool = param(True, 'Configure and activate at start-up, without a lifecycle manager.')
+    sensor: str = param(
+        'tsf85', "Sets the sensor that is read: a name of the catalogue, or 'module:Class' of your own."
+    )
+    autostart: bool = param(
+        True, 'Configures and activates the node at start-up, so that no lifecycle manager is needed.'
+    )
 
 
 class SensorNode(LifecycleNode):
@@ -40,7 +44,7 @@ class SensorNode(LifecycleNode):
         super().__init__('sensor', **kwargs)
         params = declare(self, SensorNodeParams)
         self._make(params)  # what is wrong in the parameters ends the node here, with a sentence
-        self._reader: Reader | None = None
+        self._reader: SensorReader | None = None
         self._topics: dict[str, Any] = {}
         self._diagnostics = Diagnostics(self, self._report, hardware_id=params.device)
         if params.autostart:
@@ -67,8 +71,8 @@ class SensorNode(LifecycleNode):
         """Start reading; a sensor that is not there yet is waited for."""
         result = super().on_activate(state)
         log = self.get_logger()
-        self._reader = Reader(self._sensor, self._publish, log.warning, log.info)
-        self._health = Health(self._reader, time.monotonic())
+        self._reader = SensorReader(self._sensor, self._publish, log.warning, log.info)
+        self._health = SensorHealth(self._reader, time.monotonic())
         self._reader.start()
         return result
 

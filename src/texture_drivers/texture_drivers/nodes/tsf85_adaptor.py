@@ -12,12 +12,12 @@ from texture_msgs import msg
 from texture_core.errors import InvalidData
 from texture_core.parameters import param
 from texture_core.ros.conversions import to_msg
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.qos import SENSOR_QOS
 from texture_core.ros.run import run
 from texture_drivers.message_types import import_message
-from texture_drivers.tsf85.messages import MessageStream
+from texture_drivers.tsf85.messages import Tsf85MessageConverter
 from texture_drivers.tsf85.settings import Tsf85Settings
 
 NEEDED = ('Dynamic', 'Timestamp', 'StaticData')
@@ -25,16 +25,30 @@ INERTIAL = ('Accelerometer', 'Gyroscope')
 
 
 @dataclass(frozen=True)
-class AdaptorParams:
-    """Whose messages are read."""
+class Tsf85AdaptorParams:
+    """Which messages are converted."""
 
-    package: str = param('robotiq_tsf', 'Package of the messages.')
-    prefix: str = param('TactileSensor', 'What the names of the topics begin with.')
-    finger: int = param(0, 'Which finger: 0 is the first.', low=0, high=1)
-    imu: bool = param(False, 'Convert acceleration and rotation too; two more messages each millisecond.')
-    static_rate_hz: float = param(60.0, 'Rate at which images are published.', unit='Hz', low=1.0, high=1000.0)
-    batch_s: float = param(0.01, 'Length of one batch of samples.', unit='s', low=0.001, high=0.1)
-    frame_id: str = param('fingertip', 'Frame of the fingertip, for the headers.')
+    package: str = param('robotiq_tsf', "Sets the package that defines the messages of the vendor's driver.")
+    prefix: str = param('TactileSensor', 'Sets the first part of the names of the subscribed topics.')
+    finger: int = param(0, 'Sets the index of the finger that is converted; 0 is the first one.', low=0, high=1)
+    imu: bool = param(
+        False, 'Converts acceleration and angular rate too, which costs two more messages in each millisecond.'
+    )
+    static_rate_hz: float = param(
+        60.0,
+        'Sets the rate at which taxel images are published; a higher rate repeats images more often.',
+        unit='Hz',
+        low=1.0,
+        high=1000.0,
+    )
+    batch_s: float = param(
+        0.01,
+        'Sets the duration of one published batch; a longer batch costs less computing time and adds latency.',
+        unit='s',
+        low=0.001,
+        high=0.1,
+    )
+    frame_id: str = param('fingertip', 'Sets the frame of the fingertip in the headers of the published messages.')
 
 
 class Tsf85Adaptor(Node):
@@ -42,10 +56,10 @@ class Tsf85Adaptor(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('tsf85_adaptor', **kwargs)
-        params = self._params = declare(self, AdaptorParams)
+        params = self._params = declare(self, Tsf85AdaptorParams)
         settings = Tsf85Settings(imu=params.imu)
-        self._stream = MessageStream(params.finger, settings, params.static_rate_hz, params.frame_id)
-        self._refused = self._heard = 0
+        self._stream = Tsf85MessageConverter(params.finger, settings, params.static_rate_hz, params.frame_id)
+        self._refused = self._received = 0
         self._fault = ''
         self._counts = dict(self._stream.counts)
         self._signals = {
@@ -61,7 +75,7 @@ class Tsf85Adaptor(Node):
         """Return the callback of a topic."""
 
         def take(message: Any, info: Mapping[str, int]) -> None:
-            self._heard += 1
+            self._received += 1
             try:
                 self._stream.take(name, message, info['source_timestamp'])
             except InvalidData as error:
@@ -75,20 +89,20 @@ class Tsf85Adaptor(Node):
             for batch in batches:
                 self._signals[topic].publish(to_msg(batch))
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         counts = dict(self._stream.counts)
         new = {name: total - self._counts[name] for name, total in counts.items()}
-        heard, fault = self._heard, self._fault
-        self._counts, self._heard, self._fault = counts, 0, ''
+        received, fault = self._received, self._fault
+        self._counts, self._received, self._fault = counts, 0, ''
         silent = f"no message on '{self._params.prefix}/…'; start the driver, or set the parameter prefix"
         unstamped = f"no '{self._params.prefix}/Timestamp': samples are numbered through, and losses go unseen"
-        verdicts = (
+        conditions = (
             (bool(fault), 'ERROR', fault),
-            (heard == 0, 'ERROR', silent),
+            (received == 0, 'ERROR', silent),
             (new['lost'] > 0, 'WARN', f'{new["lost"]} samples lost since the last report'),
             (new['unstamped'] > new['samples'] / 2, 'WARN', unstamped),
         )
-        level, sentence = next(((level, text) for holds, level, text in verdicts if holds), ('OK', 'converting'))
+        level, sentence = next(((level, text) for holds, level, text in conditions if holds), ('OK', 'converting'))
         return level, sentence, {**counts, 'refused messages': self._refused}
 
 

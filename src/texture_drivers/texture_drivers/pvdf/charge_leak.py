@@ -48,9 +48,9 @@ class ChargeLeak:
 
     def response(self, frequency_hz: Array) -> NDArray[np.complex128]:
         """Return the charge per force at frequencies, (n,), C/N."""
-        through = 2j * np.pi * frequency_hz * self.time_constant_s
-        answer: NDArray[np.complex128] = self.d33_c_n * through / (1 + through)
-        return answer
+        transfer = 2j * np.pi * frequency_hz * self.time_constant_s
+        response: NDArray[np.complex128] = self.d33_c_n * transfer / (1 + transfer)
+        return response
 
 
 class LeakingFilm:
@@ -66,16 +66,16 @@ class LeakingFilm:
 
     def __init__(self, leak: ChargeLeak, rate_hz: float) -> None:
         self._gain = leak.d33_c_n
-        self._kept = math.exp(-1 / (leak.time_constant_s * rate_hz))
-        self._filter = FirstOrder((1.0, -1.0), (1.0, -self._kept))
+        self._pole = math.exp(-1 / (leak.time_constant_s * rate_hz))
+        self._filter = FirstOrder((1.0, -1.0), (1.0, -self._pole))
 
     def update(self, force_n: Samples) -> Samples:
         """Return the charge, (n_samples, n_channels) C, for forces of the same shape; at rest before the first."""
         return self._gain * self._filter.update(force_n)
 
 
-class Restorer:
-    """Charge back to force, batch by batch: the inverse of `LeakingFilm` above a frequency.
+class ForceReconstructor:
+    """Reconstruct the force from the charge, batch by batch: the inverse of `LeakingFilm` above a frequency.
 
     A constant force leaves no charge, so what lies far below the film's corner is lost for good, and a plain inverse
     would add up every offset for ever. This one is exact but for a high-pass of first order at `from_hz`.
@@ -90,9 +90,9 @@ class Restorer:
 
     def __init__(self, leak: ChargeLeak, rate_hz: float, from_hz: float) -> None:
         self._gain = 1 / leak.d33_c_n
-        kept = math.exp(-1 / (leak.time_constant_s * rate_hz))
-        forgotten = math.exp(-2 * math.pi * from_hz / rate_hz)
-        self._filter = FirstOrder((1.0, -kept), (1.0, -forgotten))
+        pole = math.exp(-1 / (leak.time_constant_s * rate_hz))
+        restored_pole = math.exp(-2 * math.pi * from_hz / rate_hz)
+        self._filter = FirstOrder((1.0, -pole), (1.0, -restored_pole))
 
     def update(self, charge_c: Samples) -> Samples:
         """Return the force, (n_samples, n_channels) N, for charges of the same shape; at rest before the first."""

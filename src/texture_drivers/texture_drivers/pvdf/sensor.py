@@ -13,9 +13,9 @@ from texture_core.signal import TactileSignal
 from texture_drivers.framed_sensor import FramedSensor
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf import tables
-from texture_drivers.pvdf.charge_leak import ChargeLeak, Restorer
-from texture_drivers.sample_line import Stream
+from texture_drivers.pvdf.charge_leak import ChargeLeak, ForceReconstructor
 from texture_drivers.settings import load_settings
+from texture_drivers.stream_decoder import FramedStream
 
 COULOMB_PC = 1e12
 
@@ -24,28 +24,74 @@ COULOMB_PC = 1e12
 class PvdfSettings:
     """The film, its amplifier and the force sensor."""
 
-    baud: int = param(tables.BAUD, 'Baud rate of a real UART; USB ignores it.', low=9600, high=12_000_000)
-    film_rate_hz: float = param(tables.FILM_RATE_HZ, 'Samples of the film a second.', unit='Hz', low=1.0, high=1e5)
-    force_rate_hz: float = param(tables.FORCE_RATE_HZ, 'Samples of the force a second.', unit='Hz', low=0.1, high=1e4)
-    film_gain_pc: float = param(tables.FILM_PC_PER_COUNT, 'Charge per count.', unit='pC')
-    film_offset_pc: float = param(0.0, 'Charge at 0 counts.', unit='pC')
-    force_gain_n: float = param(tables.FORCE_N_PER_COUNT, 'Force per count.', unit='N')
-    force_offset_n: float = param(0.0, 'Force at 0 counts.', unit='N')
+    baud: int = param(
+        tables.BAUD,
+        'Sets the baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
+        low=9600,
+        high=12_000_000,
+    )
+    film_rate_hz: float = param(
+        tables.FILM_RATE_HZ,
+        'Sets the nominal sampling rate of the film; it must equal that of the device.',
+        unit='Hz',
+        low=1.0,
+        high=1e5,
+    )
+    force_rate_hz: float = param(
+        tables.FORCE_RATE_HZ,
+        'Sets the nominal sampling rate of the force sensor; it must equal that of the device.',
+        unit='Hz',
+        low=0.1,
+        high=1e4,
+    )
+    film_gain_pc: float = param(
+        tables.FILM_PC_PER_COUNT,
+        'Sets the charge of one count of the film; a larger value gives larger samples.',
+        unit='pC',
+    )
+    film_offset_pc: float = param(
+        0.0, 'Sets the charge of the film at 0 counts, which is added to every sample.', unit='pC'
+    )
+    force_gain_n: float = param(
+        tables.FORCE_N_PER_COUNT,
+        'Sets the force of one count of the force sensor; a larger value gives larger samples.',
+        unit='N',
+    )
+    force_offset_n: float = param(0.0, 'Sets the force at 0 counts, which is added to every sample.', unit='N')
     restore_from_hz: float = param(
         0.0,
-        'Publish the force on the film, in N, with the leak undone above this frequency; 0: the charge as measured.',
+        'Publishes the force on the film with its charge leakage undone above this frequency; 0 publishes '
+        'the charge as measured. A lower frequency restores slower changes and amplifies drift.',
         unit='Hz',
         low=0.0,
         high=1000.0,
     )
-    resistance_ohm: float = param(tables.RESISTANCE_OHM, 'Of the amplifier.', unit='Ω', low=1e3, high=1e15)
-    capacitance_f: float = param(tables.CAPACITANCE_F, 'Of the film.', unit='F', low=1e-13, high=1e-3)
-    d33_pc_n: float = param(tables.D33_PC_N, 'Charge per force on the film.', unit='pC/N', low=1e-3, high=1e6)
+    resistance_ohm: float = param(
+        tables.RESISTANCE_OHM,
+        'Sets the input resistance of the amplifier; a larger value makes the charge leak more slowly.',
+        unit='Ω',
+        low=1e3,
+        high=1e15,
+    )
+    capacitance_f: float = param(
+        tables.CAPACITANCE_F,
+        'Sets the capacitance of the film; a larger value makes the charge leak more slowly.',
+        unit='F',
+        low=1e-13,
+        high=1e-3,
+    )
+    d33_pc_n: float = param(
+        tables.D33_PC_N,
+        'Sets the charge of the film per force; a larger value gives smaller restored forces.',
+        unit='pC/N',
+        low=1e-3,
+        high=1e6,
+    )
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> list[FramedStream]:
         """Return what the device sends, as the line understands it."""
         return [
-            Stream(
+            FramedStream(
                 topic=tables.FILM_TOPIC,
                 kind=tables.FILM_KIND,
                 sensor=tables.FILM_SENSOR,
@@ -55,7 +101,7 @@ class PvdfSettings:
                 gains=np.array([self.film_gain_pc]),
                 offsets=np.array([self.film_offset_pc]),
             ),
-            Stream(
+            FramedStream(
                 topic=tables.FORCE_TOPIC,
                 kind=tables.FORCE_KIND,
                 sensor=tables.FORCE_SENSOR,
@@ -67,12 +113,12 @@ class PvdfSettings:
             ),
         ]
 
-    def restorer(self) -> Restorer | None:
+    def reconstructor(self) -> ForceReconstructor | None:
         """Return what undoes the leak, if that is wanted."""
         if not self.restore_from_hz:
             return None
         leak = ChargeLeak(self.resistance_ohm, self.capacitance_f, self.d33_pc_n / COULOMB_PC)
-        return Restorer(leak, self.film_rate_hz, self.restore_from_hz)
+        return ForceReconstructor(leak, self.film_rate_hz, self.restore_from_hz)
 
 
 class Pvdf:
@@ -81,7 +127,7 @@ class Pvdf:
     def __init__(self, params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> None:
         settings = load_settings(PvdfSettings, params.config)
         self._line = FramedSensor(params, now_ns, settings.streams(), settings.baud)
-        self._restorer = settings.restorer()
+        self._reconstructor = settings.reconstructor()
         self._next_sample = 0
 
     def open(self) -> None:
@@ -91,9 +137,9 @@ class Pvdf:
     def read(self) -> Mapping[str, Sequence[TactileSignal]]:
         """Wait for the length of one batch and return what arrived."""
         batches = self._line.read()
-        if self._restorer is None or tables.FILM_TOPIC not in batches:
+        if self._reconstructor is None or tables.FILM_TOPIC not in batches:
             return batches
-        restored = [self._restored(batch, self._restorer) for batch in batches[tables.FILM_TOPIC]]
+        restored = [self._restored(batch, self._reconstructor) for batch in batches[tables.FILM_TOPIC]]
         return {**batches, tables.FILM_TOPIC: restored}
 
     def close(self) -> None:
@@ -115,10 +161,10 @@ class Pvdf:
         """Nominal rate of each topic."""
         return self._line.expected_rates_hz
 
-    def _restored(self, film: TactileSignal, restorer: Restorer) -> TactileSignal:
+    def _restored(self, film: TactileSignal, reconstructor: ForceReconstructor) -> TactileSignal:
         """Return the force on the film, N, of its charge, pC."""
         if film.first_sample != self._next_sample:
-            restorer.restart()
+            reconstructor.restart()
         self._next_sample = film.next_sample
-        force_n = restorer.update(film.samples.astype(np.float64) / COULOMB_PC)
+        force_n = reconstructor.update(film.samples.astype(np.float64) / COULOMB_PC)
         return replace(film, unit='N', samples=force_n.astype(np.float32))

@@ -16,23 +16,23 @@ from typing import Any, NamedTuple
 from texture_core.errors import InvalidData
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.tsf85 import tables
-from texture_drivers.tsf85.finger import Finger
-from texture_drivers.tsf85.sets import UNKNOWN, Set
+from texture_drivers.tsf85.finger_stream import FingerStream
+from texture_drivers.tsf85.sample_frames import UNKNOWN, SampleFrame
 from texture_drivers.tsf85.settings import Tsf85Settings
 
-PATIENCE = 50  # samples that wait for a stamp; more, and the stamp is taken as lost
+MAX_WAITING_SAMPLES = 50  # samples that wait for a stamp; more, and the stamp is taken as lost
 SILENCE_NS = 1 * NANOSECONDS  # after so long the 16 bits of the stamps may have wrapped unseen
 TAXELS = tables.STATIC_ROWS * tables.STATIC_COLUMNS
 
 
-class Sent(NamedTuple):
+class TimedValue(NamedTuple):
     """A number and when its message was sent."""
 
     source_ns: int
     value: int
 
 
-class MessageStream:
+class Tsf85MessageConverter:
     """Make the messages about one finger into numbered, timed batches.
 
     A message is handed over with the time at which it was sent, by the clock of the driver's host.
@@ -61,9 +61,9 @@ class MessageStream:
         self.unstamped = 0  # samples whose stamp was lost
         self.unpaired = 0  # stamps whose sample was lost
         self._finger = finger
-        self._line = Finger(tables.TSF85, settings, static_rate_hz, frame_id)
-        self._dynamics: deque[Sent] = deque()
-        self._stamps: deque[Sent] = deque()
+        self._line = FingerStream(tables.TSF85, settings, static_rate_hz, frame_id)
+        self._dynamics: deque[TimedValue] = deque()
+        self._stamps: deque[TimedValue] = deque()
         self._image: tuple[int, ...] | None = None
         self._motion: dict[int, tuple[float, ...]] = dict.fromkeys(settings.kinds, UNKNOWN)
         self._last_stamp: int | None = None
@@ -97,36 +97,36 @@ class MessageStream:
 
     def batches(self) -> Mapping[str, list[TactileSignal]]:
         """Return the batches, by topic, of all messages that can be put together by now."""
-        sets: list[Set] = []
+        frames: list[SampleFrame] = []
         sent_ns = 0
-        while self._may_be_judged():
-            taken = self._dynamics.popleft()
-            stamp = self._stamp_of(taken, self._dynamics[0].source_ns)
+        while self._is_complete():
+            sample = self._dynamics.popleft()
+            stamp = self._stamp_of(sample, self._dynamics[0].source_ns)
             if stamp is not None and stamp == self._last_stamp:
                 self.repeated += 1
                 continue
             self._last_stamp = stamp
-            sent_ns = taken.source_ns
-            sets.append(Set(stamp, taken.value, self._image, sum(self._motion.values(), ())))
+            sent_ns = sample.source_ns
+            frames.append(SampleFrame(stamp, sample.value, self._image, sum(self._motion.values(), ())))
             self._image = None
-        if sets and self._last_ns is not None and sent_ns - self._last_ns > SILENCE_NS:
+        if frames and self._last_ns is not None and sent_ns - self._last_ns > SILENCE_NS:
             self._line.interrupt()
         self._last_ns = sent_ns or self._last_ns
-        return self._line.place(sets, sent_ns)
+        return self._line.place(frames, sent_ns)
 
-    def _may_be_judged(self) -> bool:
+    def _is_complete(self) -> bool:
         """Return whether all that was sent with the oldest sample has come, or will not come any more."""
         if len(self._dynamics) < 2:
             return False
         stamped = bool(self._stamps) and self._stamps[-1].source_ns >= self._dynamics[0].source_ns
-        return stamped or len(self._dynamics) > PATIENCE
+        return stamped or len(self._dynamics) > MAX_WAITING_SAMPLES
 
-    def _stamp_of(self, taken: Sent, until_ns: int) -> int | None:
+    def _stamp_of(self, sample: TimedValue, until_ns: int) -> int | None:
         """Return the stamp that was sent between a sample and the next one."""
         stamp = None
         while self._stamps and self._stamps[0].source_ns < until_ns:
             sent = self._stamps.popleft()
-            if stamp is None and sent.source_ns >= taken.source_ns:
+            if stamp is None and sent.source_ns >= sample.source_ns:
                 stamp = sent.value
             else:
                 self.unpaired += 1
@@ -134,11 +134,11 @@ class MessageStream:
         return stamp
 
     def _take_dynamic(self, message: Any, source_ns: int) -> None:
-        self._dynamics.append(Sent(source_ns, int(message.data[self._finger].value)))
+        self._dynamics.append(TimedValue(source_ns, int(message.data[self._finger].value)))
 
     def _take_stamp(self, message: Any, source_ns: int) -> None:
-        self._stamps.append(Sent(source_ns, int(message.values[self._finger])))
-        if len(self._stamps) > PATIENCE and not self._dynamics:
+        self._stamps.append(TimedValue(source_ns, int(message.values[self._finger])))
+        if len(self._stamps) > MAX_WAITING_SAMPLES and not self._dynamics:
             self._stamps.popleft()
             self.unpaired += 1
 
@@ -160,10 +160,10 @@ def _axes(message: Any, finger: int) -> tuple[float, ...]:
 
 
 # Name of the vendor's topic and of its message type: what is done with it.
-TOPICS: Mapping[str, Callable[[MessageStream, Any, int], None]] = {
-    'Dynamic': MessageStream._take_dynamic,
-    'Timestamp': MessageStream._take_stamp,
-    'StaticData': MessageStream._take_static,
-    'Accelerometer': MessageStream._take_acceleration,
-    'Gyroscope': MessageStream._take_rotation,
+TOPICS: Mapping[str, Callable[[Tsf85MessageConverter, Any, int], None]] = {
+    'Dynamic': Tsf85MessageConverter._take_dynamic,
+    'Timestamp': Tsf85MessageConverter._take_stamp,
+    'StaticData': Tsf85MessageConverter._take_static,
+    'Accelerometer': Tsf85MessageConverter._take_acceleration,
+    'Gyroscope': Tsf85MessageConverter._take_rotation,
 }

@@ -38,7 +38,7 @@ class PacketParser:
         Kind of fingertip.
     """
 
-    def __init__(self, layout: tables.Layout = tables.TSF85) -> None:
+    def __init__(self, layout: tables.Tsf85Layout = tables.TSF85) -> None:
         self.packets = 0
         self.refused = 0  # start bytes that led to no packet
         self.refused_bytes = 0
@@ -58,7 +58,7 @@ class PacketParser:
                 break
             self.refused_bytes += start - position
             position = start
-            if not _may_be_judged(buffer, start):
+            if not _is_decidable(buffer, start):
                 break
             packet = _packet_at(buffer, start, self._items)
             if packet is None:
@@ -77,7 +77,7 @@ def _end(buffer: bytes, start: int) -> int:
     return start + tables.HEADER_BYTES + buffer[start + 3]
 
 
-def _may_be_judged(buffer: bytes, start: int) -> bool:
+def _is_decidable(buffer: bytes, start: int) -> bool:
     """Return whether the packet has come completely, or enough of it to be refused."""
     if len(buffer) < start + tables.HEADER_BYTES:
         return False
@@ -94,26 +94,26 @@ def _packet_at(buffer: bytes, start: int, layouts: Mapping[int, Struct]) -> Pack
         return None
     payload = buffer[start + tables.HEADER_BYTES : end]
     for timestamp in tables.TIMESTAMPS:
-        items = _walk(payload, timestamp, layouts)
+        items = _parse_items(payload, timestamp, layouts)
         if items:
             return Packet(command, items)
     return None
 
 
-def _walk(payload: bytes, timestamp: Struct, layouts: Mapping[int, Struct]) -> tuple[Item, ...] | None:
+def _parse_items(payload: bytes, timestamp: Struct, layouts: Mapping[int, Struct]) -> tuple[Item, ...] | None:
     """Return the items of a payload, or None if they do not fit it exactly."""
     items = []
-    heads: set[int] = set()
+    item_bytes: set[int] = set()
     position = 0
     while position < len(payload):
-        head = payload[position]
-        kind, finger = head & tables.TYPE_MASK, (head & tables.FINGER_MASK) >> tables.FINGER_SHIFT
+        item_byte = payload[position]
+        kind, finger = item_byte & tables.TYPE_MASK, (item_byte & tables.FINGER_MASK) >> tables.FINGER_SHIFT
         layout = timestamp if kind == tables.TIMESTAMP else layouts.get(kind)
-        if layout is None or head & tables.INDEX_MASK or finger >= tables.FINGERS or head in heads:
+        if layout is None or item_byte & tables.INDEX_MASK or finger >= tables.FINGERS or item_byte in item_bytes:
             return None
         if position + 1 + layout.size > len(payload):
             return None
-        heads.add(head)
+        item_bytes.add(item_byte)
         items.append(Item(kind, finger, layout.unpack_from(payload, position + 1)))
         position += 1 + layout.size
     return tuple(items)

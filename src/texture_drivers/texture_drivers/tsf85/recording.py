@@ -21,15 +21,15 @@ from texture_core.errors import InvalidData
 from texture_core.files import open_regular
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.tsf85 import tables
-from texture_drivers.tsf85.finger import IMU, SIGNAL, STATIC
+from texture_drivers.tsf85.finger_stream import IMU, SIGNAL, STATIC
 from texture_drivers.tsf85.settings import Tsf85Settings
 
 TAXELS, AXES = tables.STATIC_ROWS * tables.STATIC_COLUMNS, 3
 FIRST_COLUMN = 'Time(ms)'
-Stream = tuple[str, tuple[str, ...], str, float]
-DYNAMIC: Stream = (tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, tables.UNIT, tables.RATE_HZ)
-TAXEL: Stream = (tables.STATIC_SENSOR, tables.STATIC_CHANNELS, tables.UNIT, tables.STATIC_RATE_HZ)
-MOST_LINE = 10_000  # characters; a number has 25 at most
+ChannelGroup = tuple[str, tuple[str, ...], str, float]
+DYNAMIC: ChannelGroup = (tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, tables.UNIT, tables.RATE_HZ)
+TAXEL: ChannelGroup = (tables.STATIC_SENSOR, tables.STATIC_CHANNELS, tables.UNIT, tables.STATIC_RATE_HZ)
+MAX_LINE = 10_000  # characters; a number has 25 at most
 COLUMNS = 1 + tables.FINGERS * (1 + TAXELS + AXES + AXES)
 
 
@@ -94,7 +94,7 @@ class VendorRecording:
         n = len(self.time_ms)
         return self.acceleration.reshape(n, -1), self.rotation.reshape(n, -1)
 
-    def _batch(self, stream: Stream, samples: Array) -> TactileSignal:
+    def _batch(self, stream: ChannelGroup, samples: Array) -> TactileSignal:
         sensor, channels, unit, rate_hz = stream
         return TactileSignal(
             stamp_ns=round(self.time_ms[0] * NANOSECONDS / 1000),
@@ -117,8 +117,8 @@ def load_vendor_csv(path: Path) -> VendorRecording:
     """
     try:
         with open_regular(path) as file, io.TextIOWrapper(file, encoding='utf-8-sig') as text:
-            names = text.readline(MOST_LINE).strip().split(';')
-            lines = (line for line in iter(lambda: text.readline(MOST_LINE), '') if line.strip())
+            names = text.readline(MAX_LINE).strip().split(';')
+            lines = (line for line in iter(lambda: text.readline(MAX_LINE), '') if line.strip())
             with warnings.catch_warnings():
                 warnings.simplefilter('ignore')  # an empty table is refused below, in our words
                 table = np.loadtxt(lines, delimiter=';', ndmin=2)
@@ -132,7 +132,7 @@ def load_vendor_csv(path: Path) -> VendorRecording:
             f"the vendor's program has {COLUMNS} from '{FIRST_COLUMN}' on and at least 3 lines"
         )
     if not table[-1, 0] > table[1, 0]:
-        raise InvalidData(f"recording '{path}' has times that do not rise; record it anew")
+        raise InvalidData(f"recording '{path}' has times that do not rise; record it again")
     return _recording(table)
 
 

@@ -13,9 +13,9 @@ from texture_drivers.params import SensorParams
 from texture_drivers.serial_port import SerialPort
 from texture_drivers.settings import load_settings
 from texture_drivers.tsf85 import tables
-from texture_drivers.tsf85.finger import Finger
+from texture_drivers.tsf85.finger_stream import FingerStream
 from texture_drivers.tsf85.protocol import Packet, PacketParser, start_command, stop_command
-from texture_drivers.tsf85.sets import SetSplitter
+from texture_drivers.tsf85.sample_frames import SampleFrameSplitter
 from texture_drivers.tsf85.settings import Tsf85Settings
 
 SILENCE_S = 0.5  # an open port may stay silent after an unclean end; stop and start wake the device
@@ -53,7 +53,7 @@ class Tsf85:
         params: SensorParams,
         now_ns: Callable[[], int] = time.time_ns,
         *,
-        layout: tables.Layout = tables.TSF85,
+        layout: tables.Tsf85Layout = tables.TSF85,
         fingers: Sequence[int] = (),
     ) -> None:
         if not fingers and params.finger >= tables.FINGERS:
@@ -64,9 +64,9 @@ class Tsf85:
         self._port: SerialPort | None = None
         self._parser = PacketParser(layout)
         self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
-        self._splitters = {finger: SetSplitter(finger, settings.kinds) for finger in self._prefixes}
+        self._splitters = {finger: SampleFrameSplitter(finger, settings.kinds) for finger in self._prefixes}
         self._fingers = {
-            finger: Finger(layout, settings, params.static_rate_hz, params.frame_id) for finger in self._prefixes
+            finger: FingerStream(layout, settings, params.static_rate_hz, params.frame_id) for finger in self._prefixes
         }
         self._serial = ''
         self._last_packet: Packet | None = None
@@ -93,13 +93,13 @@ class Tsf85:
         time.sleep(self._params.batch_s)
         data = self._port.read()
         arrival_ns = self._now_ns()
-        packets = self._without_repeats(self._parser.feed(data))
+        packets = self._without_duplicates(self._parser.feed(data))
         topics: dict[str, Sequence[TactileSignal]] = {}
         alive = False
         for number, finger in self._fingers.items():
-            sets = self._splitters[number].sets(packets)
-            alive = alive or bool(sets)
-            for topic, batches in finger.place(sets, arrival_ns).items():
+            frames = self._splitters[number].frames(packets)
+            alive = alive or bool(frames)
+            for topic, batches in finger.place(frames, arrival_ns).items():
                 topics[f'{self._prefixes[number]}{topic}'] = batches
         self._watch_silence(self._port, alive, len(data))
         return topics
@@ -147,16 +147,16 @@ class Tsf85:
             for topic, rate in self._fingers[number].rates_hz.items()
         }
 
-    def _without_repeats(self, packets: Sequence[Packet]) -> list[Packet]:
+    def _without_duplicates(self, packets: Sequence[Packet]) -> list[Packet]:
         """Leave out what came twice: the same to the last bit, stamp and all."""
-        once = []
+        unique = []
         for packet in packets:
             if packet == self._last_packet and any(item.kind == tables.TIMESTAMP for item in packet.items):
                 self._repeated += 1
             else:
-                once.append(packet)
+                unique.append(packet)
             self._last_packet = packet
-        return once
+        return unique
 
     def _watch_silence(self, port: SerialPort, alive: bool, n_bytes: int) -> None:
         """Wake a device that is open but silent; DeviceError when that does not help."""
@@ -168,7 +168,7 @@ class Tsf85:
         if self._silent_reads * self._params.batch_s < SILENCE_S:
             return
         if self._revivals == REVIVALS:
-            raise DeviceError(self._silence())
+            raise DeviceError(self._silence_sentence())
         self._silent_reads = 0
         self._revivals += 1
         self._revived += 1
@@ -177,7 +177,7 @@ class Tsf85:
         port.write(start_command())
         self._interrupt()
 
-    def _silence(self) -> str:
+    def _silence_sentence(self) -> str:
         fingers = ' or '.join(str(finger) for finger in self._prefixes)
         if self._silent_bytes:
             return (

@@ -1,4 +1,4 @@
-"""What the TSF-85 is told beyond what every sensor is: its inertial sensors."""
+"""Settings of the TSF-85 beside those of every sensor: its inertial sensors."""
 
 from __future__ import annotations
 
@@ -20,13 +20,31 @@ AXES = 'xyz'
 class Tsf85Settings:
     """Whether and how the inertial sensors of the finger are published, as topic 'imu'."""
 
-    imu: bool = param(True, 'Publish acceleration and rotation.')
-    magnetometer: bool = param(False, 'Publish the magnetic field too; few firmwares send it.')
+    imu: bool = param(True, "Publishes acceleration and angular rate on the topic 'imu'.")
+    magnetometer: bool = param(False, 'Publishes the magnetic field too, which only few firmware versions send.')
     # Of the vendor's viewer: 2 g and 250 degrees a second are full scale.
-    acceleration_count_g: float = param(16384.0, 'Counts per g.', unit='1/g', low=1.0, high=1e6)
-    rotation_count_dps: float = param(131.072, 'Counts per degree a second.', unit='s/deg', low=1e-3, high=1e6)
+    acceleration_count_g: float = param(
+        16384.0,
+        'Sets the accelerometer counts of one g; a larger value gives smaller accelerations.',
+        unit='1/g',
+        low=1.0,
+        high=1e6,
+    )
+    rotation_count_dps: float = param(
+        131.072,
+        'Sets the gyroscope counts of one degree per second; a larger value gives smaller angular rates.',
+        unit='s/deg',
+        low=1e-3,
+        high=1e6,
+    )
     # Data sheet of the ICM-20948: 0.15 microtesla a count.
-    field_count_ut: float = param(1 / 0.15, 'Counts per microtesla.', unit='1/µT', low=1e-3, high=1e6)
+    field_count_ut: float = param(
+        1 / 0.15,
+        'Sets the magnetometer counts of one microtesla; a larger value gives smaller fields.',
+        unit='1/µT',
+        low=1e-3,
+        high=1e6,
+    )
 
     @property
     def kinds(self) -> tuple[int, ...]:

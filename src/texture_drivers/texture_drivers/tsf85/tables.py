@@ -42,7 +42,7 @@ UNIT = 'count'
 
 
 @dataclass(frozen=True)
-class Layout:
+class Tsf85Layout:
     """The taxels of one kind of fingertip, row by row."""
 
     rows: int
@@ -60,11 +60,11 @@ class Layout:
         return {STATIC: Struct(f'>{self.rows * self.columns}H'), **ITEMS}
 
 
-LAYOUTS: Mapping[str, Layout] = {
-    'tsf85': Layout(7, 4, 60.0),  # 60 Hz: Robotiq README 2026; 59 Hz in paper 2, about 25 Hz with some firmware
+LAYOUTS: Mapping[str, Tsf85Layout] = {
+    'tsf85': Tsf85Layout(7, 4, 60.0),  # 60 Hz: Robotiq README 2026; 59 Hz in paper 2, about 25 Hz with some firmware
     # The prototype of Roberge et al. ("3x4 taxels per phalanges ... about 25 Hz"). No public driver shows its packets:
     # those of the TSF-85 are taken, with 12 taxels.
-    'tsf85_3x4': Layout(3, 4, 25.0),
+    'tsf85_3x4': Tsf85Layout(3, 4, 25.0),
 }
 TSF85 = LAYOUTS['tsf85']
 STATIC_ROWS, STATIC_COLUMNS, STATIC_RATE_HZ = TSF85.rows, TSF85.columns, TSF85.static_rate_hz

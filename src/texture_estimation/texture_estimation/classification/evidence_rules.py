@@ -13,7 +13,7 @@ from texture_core.parameters import param
 from texture_estimation.log_probabilities import log_softmax, softmax
 
 # A label without a single vote keeps so much, so that its logarithm is finite.
-LEAST_SHARE = 1e-6
+MIN_SHARE = 1e-6
 ROUNDING = 1e-9
 
 
@@ -92,7 +92,7 @@ class MajorityVote:
         most = np.maximum.reduce(mean_voice, axis=-1, keepdims=True) * independent_windows
         won = most >= self.share * np.maximum(independent_windows, self.parts) - ROUNDING
         abstained = 1.0 - np.add.reduce(mean_voice, axis=-1, keepdims=True)
-        shares = np.maximum(mean_voice + abstained / n_labels, LEAST_SHARE)
+        shares = np.maximum(mean_voice + abstained / n_labels, MIN_SHARE)
         return log_softmax(np.where(won, np.log(shares), 0.0))
 
     def posterior(self, mean_voice: Array, independent_windows: float, growth: float) -> Array:

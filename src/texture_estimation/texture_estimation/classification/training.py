@@ -24,7 +24,7 @@ from texture_features.labelled_features import LabelledFeatures
 
 # Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
 DEFAULT_GROWTH = 0.5
-LEAST_SLIDES = 2
+MIN_SLIDES = 2
 
 
 def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Model:
@@ -104,7 +104,7 @@ def _fit(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
 
     Not where a label has a single slide: its windows are held out one by one, and must not be there twice.
     """
-    if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < LEAST_SLIDES:
+    if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < MIN_SLIDES:
         return recipe.learner.fit(examples.values, codes, groups)
     starting = max(1, round(examples.window_s / examples.hop_s))
     times = np.ones(len(codes), dtype=np.intp)

@@ -16,7 +16,7 @@ from texture_core.plain_data import load_json
 from texture_estimation import model_files
 
 FORMAT = 1
-MOST_BYTES = 20 * MB  # of a file; a slide of a minute with 200 features has 5
+MAX_BYTES = 20 * MB  # of a file; a slide of a minute with 200 features has 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ def read_lessons(model: str | Path, feature_set: str, names: Sequence[str]) -> t
 
 def _read(path: Path, feature_set: str, n_features: int) -> Lesson:
     try:
-        content = load_json(path, MOST_BYTES)
+        content = load_json(path, MAX_BYTES)
         values = np.array(content['values'], dtype=np.float64)
         lesson = Lesson(str(content['label']), str(content['exploration_id']), values)
         of = str(content['feature_set'])

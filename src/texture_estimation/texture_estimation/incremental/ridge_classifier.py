@@ -35,7 +35,7 @@ HIDDEN_WEIGHT = 0.3
 RIDGE = 3e-4
 SEED = 0
 # Examples of a texture that count; more cost time and memory, and hardly help.
-MOST_EXAMPLES = 400
+MAX_EXAMPLES = 400
 DEFAULT_SHARPNESS = 10.0
 
 
@@ -181,13 +181,13 @@ class TaughtHead:
             del self._rows[code], self._means[code]
 
 
-def thinned(rows: Array, most: int = MOST_EXAMPLES) -> Array:
+def thinned(rows: Array, most: int = MAX_EXAMPLES) -> Array:
     """Return at most so many of the rows, evenly spread over all."""
     kept: Array = rows[spread(len(rows), most)]
     return kept
 
 
-def spread(count: int, most: int = MOST_EXAMPLES) -> Codes:
+def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:
     """Return at most so many of the numbers 0 to count - 1, evenly spread."""
     return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.intp))
 

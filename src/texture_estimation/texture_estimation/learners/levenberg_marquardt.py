@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 
 # As MATLAB's trainlm: damping at the start, its steps and its end, and failures on what is held out.
-FIRST_DAMPING, MORE, LESS, MOST_DAMPING = 1e-3, 10.0, 0.1, 1e10
+FIRST_DAMPING, MORE, LESS, MAX_DAMPING = 1e-3, 10.0, 0.1, 1e10
 PATIENCE = 6
 SOLVED = 1e-7  # mean square error of targets of 0 and 1
 
@@ -108,7 +108,7 @@ def _step(network: Network, values: Array, targets: Array, damping: float) -> tu
     slope = linear.slope(residual)
     diagonal = np.diag_indices_from(curvature)
     own = curvature[diagonal]
-    while damping <= MOST_DAMPING:
+    while damping <= MAX_DAMPING:
         curvature[diagonal] = own + damping
         solved: Array = np.asarray(np.linalg.solve(curvature, slope), dtype=np.float64)
         stepped = network.moved(linear.step(solved))

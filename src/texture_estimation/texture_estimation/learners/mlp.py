@@ -19,7 +19,7 @@ from texture_estimation.log_probabilities import log_loss, log_softmax
 
 Weights = list[NDArray[np.float32]]  # hidden: (n_features, hidden), (hidden,); output: (hidden, n_labels), (n_labels,)
 BATCH = 128
-LEAST_STEPS = 400
+MIN_STEPS = 400
 RATE = 2e-3
 MEAN_DECAY, SQUARE_DECAY = 0.9, 0.999  # Kingma & Ba's
 TINY = np.float32(1e-8)
@@ -86,7 +86,7 @@ class Mlp:
         weights = _first_weights(inputs.shape[1], self.hidden, n_labels, rng)
         truth = np.eye(n_labels, dtype=np.float32)[codes]
         batches = -(-len(inputs) // BATCH)
-        steps = max(self.epochs * batches, LEAST_STEPS)
+        steps = max(self.epochs * batches, MIN_STEPS)
         adam = _Adam(weights)
         for step in range(steps):
             if step % batches == 0:

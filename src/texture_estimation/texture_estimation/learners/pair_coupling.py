@@ -16,7 +16,7 @@ from texture_estimation.log_probabilities import log_loss, log_softmax
 # exp(500) is far from overflow, and no calibrated margin comes near.
 LARGEST = 500.0
 # Of the fit of a sigmoid. A line that fell would turn the machine's answer round.
-MOST_STEPS, LEAST_SHARE, FLAT, RIDGE, LEAST_SLOPE, TINY = 100, 1e-10, 1e-8, 1e-12, 1e-3, 1e-300
+MAX_STEPS, MIN_SHARE, FLAT, RIDGE, MIN_SLOPE, TINY = 100, 1e-10, 1e-8, 1e-12, 1e-3, 1e-300
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +98,10 @@ def _fit_sigmoid(decisions: Array, codes: Codes, first: int, second: int) -> Arr
 
     line, loss = np.array([0.0, math.log((n_first + 1.0) / (n_second + 1.0))]), math.inf
     step, share = np.zeros(2), 1.0
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         margins = (line + share * step) @ rows
         now = float(np.logaddexp(0.0, margins).sum() - targets @ margins)
-        if now > loss and share > LEAST_SHARE:  # too far: the loss is convex, so a part of the step helps
+        if now > loss and share > MIN_SHARE:  # too far: the loss is convex, so a part of the step helps
             share /= 2.0
             continue
         line, loss, share = line + share * step, now, 1.0
@@ -111,4 +111,4 @@ def _fit_sigmoid(decisions: Array, codes: Codes, first: int, second: int) -> Arr
             break
         bend = (rows * (probability * (1.0 - probability))) @ rows.T + RIDGE * np.eye(2)
         step = -np.linalg.solve(bend, slope)
-    return np.array([max(line[0] / size, LEAST_SLOPE), line[1]])
+    return np.array([max(line[0] / size, MIN_SLOPE), line[1]])

@@ -23,7 +23,7 @@ SMALLEST = 1e-6  # variance of a feature within textures, in that of all slides:
 SAME_NATS = 1e-9  # informations that differ by less are the same
 LEAST = 2  # slides of one kind over one texture that tell how much slides differ; kinds among which to choose
 PARTS = 5  # that are held out in turn, to learn how sure a slide makes
-LEAST_TEMPER = 1e-3
+MIN_TEMPER = 1e-3
 SAMPLES = 200  # of each texture; the error of the estimate is some hundredths of a nat
 
 
@@ -377,4 +377,4 @@ def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
     def loss(logarithm: float) -> float:
         return log_loss(log_softmax(math.exp(logarithm) * log_likelihoods), truth)
 
-    return math.exp(minimize_scalar(loss, bounds=(math.log(LEAST_TEMPER), 0.0), method='bounded').x)
+    return math.exp(minimize_scalar(loss, bounds=(math.log(MIN_TEMPER), 0.0), method='bounded').x)

@@ -39,7 +39,7 @@ class Classifier(EstimatorNode):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('classifier', **kwargs)
-        self.create_service(srv.LearnTexture, 'learn', self._on_learn)
+        self.create_service(srv.AddTexture, 'add_texture', self._on_learn)
         self.create_service(Trigger, 'undo_learning', self._on_undo)
 
     def _load(self, path: str) -> Evidence:
@@ -58,7 +58,7 @@ class Classifier(EstimatorNode):
     def _faults(self) -> dict[str, int]:
         return {'refused_vectors': self._evidence.refused, 'not_finite_vectors': self._evidence.not_finite}
 
-    def _on_learn(self, request: srv.LearnTexture.Request, answer: srv.LearnTexture.Response) -> Any:
+    def _on_learn(self, request: srv.AddTexture.Request, answer: srv.AddTexture.Response) -> Any:
         try:
             answer.examples = self._taught().learn(request.label, request.exploration_id)
         except (TextureError, OSError) as error:

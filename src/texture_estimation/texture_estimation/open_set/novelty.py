@@ -20,7 +20,7 @@ SHRINKAGE = 0.6  # of the covariances towards their diagonals: there are hardly 
 FLOOR = 0.18  # of the mean variance within surfaces, added to each
 SMALLEST = 1e-9  # variance within surfaces, in that of all: slides that are the same to the last bit
 FOLDS = 5
-LEAST_SLIDES = 3  # of a surface: with one held out, two tell how much slides differ
+MIN_SLIDES = 3  # of a surface: with one held out, two tell how much slides differ
 # Lengths of evidence at which the limit is learnt, in windows that do not overlap. The start of a slide is like no
 # other part, so slides are compared by the same stretch: by all that was felt, up to the last of these.
 WORTHS = (1.0, 1.5, 2.0, 3.0, 5.0)
@@ -83,7 +83,7 @@ class Familiarity:
         surfaces = codes[[rows[0] for rows in slides]]
         allowed = math.floor((len(slides) + 1) * false_rejections)
         own = np.unique(surfaces, return_counts=True)[1]
-        if len(own) < 2 or own.min() < LEAST_SLIDES or not allowed:
+        if len(own) < 2 or own.min() < MIN_SLIDES or not allowed:
             return None
         means = np.stack([values[rows[: _count(WORTHS[-1], overlap)]].mean(axis=0) for rows in slides])
         strange: list[list[float]] = [[] for _ in WORTHS]

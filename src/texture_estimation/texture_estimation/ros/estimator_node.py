@@ -13,7 +13,7 @@ from texture_msgs import msg
 from texture_core.errors import InvalidParameter, TextureError
 from texture_core.features import FeatureVector
 from texture_core.ros.conversions import from_msg, to_msg
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare, on_change
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
 
@@ -85,7 +85,7 @@ class EstimatorNode(Node):
         except TextureError as error:
             raise InvalidParameter(str(error)) from error
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         model = self._evidence.model
         faults = {**self._faults(), 'broken_messages': self._broken, 'lost_vectors': self._lost}
         numbers = {

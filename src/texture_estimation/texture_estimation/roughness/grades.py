@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.files import MB, read_text
 from texture_core.resources import find_file
 from texture_estimation.roughness.head import ROUGH, SMOOTH
 
-MOST_BYTES = 1 * MB
+MAX_BYTES = 1 * MB
 TRAIN, TEST = 'train', 'test'
 
 
@@ -39,7 +39,7 @@ class Grades:
     def of(self, texture: str) -> float:
         """Return a texture's grade; UnknownName with the nearest if it has none."""
         if texture not in self.grades:
-            raise unknown(texture, self.grades, 'grade for the texture')
+            raise unknown_name(texture, self.grades, 'grade for the texture')
         return self.grades[texture]
 
     def used_for(self, split: str) -> tuple[str, ...]:
@@ -62,7 +62,7 @@ def read_grades(path: str | Path) -> Grades:
     """
     place = find_file(str(path), 'texture_simulation', 'config/grades', 'table of grades', '.csv')
     try:
-        file = io.StringIO(read_text(place, MOST_BYTES, 'utf-8-sig'), newline='')
+        file = io.StringIO(read_text(place, MAX_BYTES, 'utf-8-sig'), newline='')
         reader = csv.DictReader(line for line in file if not line.startswith('#'))
         rows = list(enumerate(reader, 2))
         columns = tuple(reader.fieldnames or ())

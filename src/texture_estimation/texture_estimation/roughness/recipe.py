@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
 from texture_estimation.recipe import TrainingParams
@@ -74,7 +74,7 @@ class RoughnessRecipe:
         where = f"roughness recipe '{name}'"
         for key in content:
             if key not in KEYS:
-                raise InvalidParameter(f'{where}: {unknown(str(key), KEYS, "key")}')
+                raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
         head_name, head = choose(HEADS, content.get('head', 'gaussian_process'), 'head', where)
         return cls(
             name,

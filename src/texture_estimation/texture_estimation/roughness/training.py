@@ -19,7 +19,7 @@ from texture_estimation.roughness.model import NORMAL_90, Calibration, Roughness
 from texture_estimation.roughness.recipe import RoughnessRecipe
 from texture_features.labelled_features import LabelledFeatures
 
-LEAST_TEXTURES = 4  # to hold one out and learn from the others
+MIN_TEXTURES = 4  # to hold one out and learn from the others
 SCALES = (0.05, 20.0)
 
 
@@ -95,7 +95,7 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
 def hold_out(head: Head, values: Array, true: Array, textures: Codes, folds: int) -> HeldOut | None:
     """Return what is said of each texture by a head that learnt from the others; None if there are too few."""
     codes = np.unique(textures)
-    if len(codes) < LEAST_TEXTURES:
+    if len(codes) < MIN_TEXTURES:
         return None
     grades, stds = np.empty(len(true)), np.empty(len(true))
     # Textures of like grade go to different parts, so that each part leaves some of every grade.
@@ -114,7 +114,7 @@ def calibrate(held_out: HeldOut | None) -> tuple[Calibration, Mapping[str, objec
     Student distribution with as many degrees of freedom as there are textures, whose 90 % interval ours then is.
     """
     if held_out is None:
-        return Calibration(), {'calibration': f'not calibrated: fewer than {LEAST_TEXTURES} textures'}
+        return Calibration(), {'calibration': f'not calibrated: fewer than {MIN_TEXTURES} textures'}
     graded = held_out.graded
     if not len(graded.grades):
         return Calibration(), {'calibration': 'not calibrated: no held-out window got a grade'}

@@ -18,7 +18,7 @@ from texture_estimation.search.trial import EMPTY, Record
 from texture_estimation.search.variables import Individual
 
 FORMAT = 1
-MOST_BYTES = 50 * MB  # of a checkpoint; a search of 10 000 individuals writes 10
+MAX_BYTES = 50 * MB  # of a checkpoint; a search of 10 000 individuals writes 10
 
 
 @dataclass
@@ -78,7 +78,7 @@ class Memory:
             If it cannot be read, or belongs to other data, another search space or another seed.
         """
         try:
-            content = load_json(Path(path).expanduser(), MOST_BYTES)
+            content = load_json(Path(path).expanduser(), MAX_BYTES)
             identity = dict(content['identity']) if content['format'] == FORMAT else None
             records = {
                 tuple(entry['individual']): Record(np.array(entry['learning'], float), np.array(entry['test'], float))

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic
 
-from texture_core.catalogue import find, unknown
+from texture_core.catalogue import find, unknown_name
 from texture_core.errors import InvalidParameter
-from texture_core.plain_data import load_yaml, shown
+from texture_core.plain_data import load_yaml, safe_repr
 from texture_core.resources import find_file
 from texture_estimation.search.task import R
 from texture_estimation.search.variables import Choice, Individual, Integer, LogReal, SearchSpace, Value, Variable
 
-MOST_INCLUDES = 10
+MAX_INCLUDES = 10
 KEYS = ('description', 'include', 'variables')
 PACKAGE, FOLDER = 'texture_estimation', 'config/search'
 
@@ -146,11 +146,11 @@ def _read(name_or_path: str, depth: int = 0) -> dict[str, Axis]:
         raise InvalidParameter(f"search space '{path}' holds no mapping; 'variables' is needed")
     for key in content:
         if key not in KEYS:
-            raise InvalidParameter(f"search space '{path}': {unknown(str(key), KEYS, 'key')}")
+            raise InvalidParameter(f"search space '{path}': {unknown_name(str(key), KEYS, 'key')}")
     included, variables = content.get('include') or [], content.get('variables') or {}
-    if not isinstance(included, list) or not isinstance(variables, Mapping) or depth > MOST_INCLUDES:
+    if not isinstance(included, list) or not isinstance(variables, Mapping) or depth > MAX_INCLUDES:
         raise InvalidParameter(
-            f"search space '{path}': 'include' is a list, at most {MOST_INCLUDES} deep, and 'variables' a mapping"
+            f"search space '{path}': 'include' is a list, at most {MAX_INCLUDES} deep, and 'variables' a mapping"
         )
     axes: dict[str, Axis] = {}
     for other in included:
@@ -162,7 +162,9 @@ def _read(name_or_path: str, depth: int = 0) -> dict[str, Axis]:
 
 def _axis(entry: Any, where: str) -> Axis:
     if not isinstance(entry, Mapping) or 'kind' not in entry:
-        raise InvalidParameter(f"{where}: came {shown(entry)}; a mapping with 'kind' ({', '.join(KINDS)}) is needed")
+        raise InvalidParameter(
+            f"{where}: came {safe_repr(entry)}; a mapping with 'kind' ({', '.join(KINDS)}) is needed"
+        )
     values = {key: value for key, value in entry.items() if key != 'kind'}
     try:
         return find(KINDS, str(entry['kind']), 'kind of variable')(values)

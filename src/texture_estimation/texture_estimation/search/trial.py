@@ -18,7 +18,7 @@ LOOKS = (2, 4, 7, 12)
 # Probability, at each look, of giving up one that is as good as its rival; it is ranked by its estimate even so.
 RISK = 0.05
 # Shares come in steps: two differences may be equal by chance, and seem to have no scatter at all.
-LEAST_SCATTER = 0.005
+MIN_SCATTER = 0.005
 
 
 class Trial(Protocol):
@@ -98,7 +98,7 @@ def verdict(record: Record, rival: Array | None, n_halves: int) -> tuple[float, 
 def has_lost(means: Array, rival: Array) -> bool:
     """Tell whether an individual is worse than its rival beyond chance (paired, one-sided t test)."""
     difference = means - rival
-    spread = max(float(difference.std(ddof=1)), LEAST_SCATTER) / np.sqrt(len(difference))
+    spread = max(float(difference.std(ddof=1)), MIN_SCATTER) / np.sqrt(len(difference))
     return bool(difference.mean() + _quantile(len(difference) - 1) * spread < 0.0)
 
 

@@ -11,7 +11,7 @@ from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.arms.ur import UrArm
 
 ARMS: Mapping[str, ArmClass] = {
-    'simulated': SimulatedArm,  # kinematic, over an elastic plane; drives the emulated bench
+    'simulated': SimulatedArm,  # kinematic, over an elastic plane; drives the emulator
     'ur': UrArm,  # Universal Robots, through ur-rtde
     'hand': InHandArm,  # the sliding fingers of a hand, while the others hold
     'rails': RailsArm,  # Hu et al. 2014: two rails and a pressing motor behind a microcontroller

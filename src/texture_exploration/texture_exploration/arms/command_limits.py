@@ -20,13 +20,25 @@ class CommandLimits:
     """
 
     command_speed_m_s: float = param(
-        1.0, 'A command with a higher speed along the surface is refused.', unit='m/s', low=0.001, high=2.0
+        1.0,
+        'Sets the highest tangential speed that one command may ask for; faster commands are refused.',
+        unit='m/s',
+        low=0.001,
+        high=2.0,
     )
     command_normal_m_s: float = param(
-        0.5, 'A command with a higher speed along the normal is refused.', unit='m/s', low=0.001, high=1.0
+        0.5,
+        'Sets the highest normal speed that one command may ask for; faster commands are refused.',
+        unit='m/s',
+        low=0.001,
+        high=1.0,
     )
     command_force_n: float = param(
-        50.0, 'A command with a higher force is refused, as is a negative one.', unit='N', low=0.1, high=200.0
+        50.0,
+        'Sets the highest normal force that one command may ask for; larger forces are refused.',
+        unit='N',
+        low=0.1,
+        high=200.0,
     )
 
     def check(self, command: ArmCommand, stop: Callable[[], None] | None = None) -> None:

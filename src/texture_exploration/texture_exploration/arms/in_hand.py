@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from texture_core.catalogue import find
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerSender, FingerState
+from texture_core.finger_state import FingerSender, FingerState
 from texture_core.parameters import param
 from texture_exploration.arms.command_limits import CommandLimits
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
@@ -25,14 +25,40 @@ LOOK_S = 0.01
 class InHandParams(CommandLimits):
     """Which hand holds what how."""
 
-    hand: str = param('simulated', 'Name of the hand (simulated, dynamixel).', choices=('simulated', 'dynamixel'))
-    finger_set: str = param('kaboli-train', 'Which fingers hold and which slide; the sets are those of the hand.')
-    grip_force_n: float = param(2.0, 'Each holding finger presses with this.', unit='N', low=0.1, high=20.0)
-    grip_timeout_s: float = param(3.0, 'The fingers must have the object within.', unit='s', low=0.1, high=30.0)
-    profile: str = param('leap', 'Profile of a Dynamixel hand: shipped, or path of a file.')
-    device: str = param('/tmp/texture/dynamixel', 'Serial device of a Dynamixel hand.')
-    torque_off_on_fault: bool = param(False, 'A Dynamixel hand lets go when a motor reports a fault.')
-    finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
+    hand: str = param(
+        'simulated', "Sets the hand that is used: 'simulated' or 'dynamixel'.", choices=('simulated', 'dynamixel')
+    )
+    finger_set: str = param(
+        'kaboli-train', 'Sets which fingers hold and which slide, by the name of a finger set of the hand.'
+    )
+    grip_force_n: float = param(
+        2.0,
+        'Sets the force with which each holding finger presses; a larger force grips more firmly.',
+        unit='N',
+        low=0.1,
+        high=20.0,
+    )
+    grip_timeout_s: float = param(
+        3.0,
+        'Sets how long the fingers may take to grip the object before connecting fails.',
+        unit='s',
+        low=0.1,
+        high=30.0,
+    )
+    profile: str = param(
+        'leap', 'Sets the profile of a Dynamixel hand: the name of a shipped one or the path of a file.'
+    )
+    device: str = param('/tmp/texture/dynamixel', 'Sets the path of the serial device of a Dynamixel hand.')
+    torque_off_on_fault: bool = param(
+        False,
+        'Switches the torque of a Dynamixel hand off, so that it releases the object, when a motor reports a fault.',
+    )
+    finger_port: int = param(
+        0,
+        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        low=0,
+        high=65535,
+    )
 
 
 HANDS: Mapping[str, Callable[[InHandParams], Hand]] = {
@@ -54,7 +80,7 @@ class InHandArm:
         self._params = params
         self.hand = hand or HANDS[params.hand](params)
         self.fingers: FingerSet = find(self.hand.finger_sets, params.finger_set, 'finger set')
-        self._bench = FingerSender(params.finger_port)
+        self._emulator = FingerSender(params.finger_port)
         self._connected = False
 
     def connect(self) -> None:
@@ -72,7 +98,7 @@ class InHandArm:
         """Let go."""
         self._connected = False
         self.hand.close()
-        self._bench.close()
+        self._emulator.close()
 
     def state(self) -> ArmState:
         """Return the mean of the sliding fingers."""
@@ -88,7 +114,7 @@ class InHandArm:
             force_n=sum(tip.force_n for tip in tips) / len(tips),
             fault=hand.fault or (f'the grip is lost: {weak}' if weak else ''),
         )
-        self._bench.send(FingerState(state.time_ns, *state.position, *state.velocity, state.force_n))
+        self._emulator.send(FingerState(state.time_ns, *state.position, *state.velocity, state.force_n))
         return state
 
     def command(self, command: ArmCommand) -> None:

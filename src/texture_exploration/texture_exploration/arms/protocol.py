@@ -12,7 +12,7 @@ Vector = tuple[float, float, float]  # x, y in the surface, z away from it
 
 @dataclass(frozen=True)
 class ArmState:
-    """Where the fingertip is and what it feels, in the frame of the surface.
+    """Position, velocity and normal force of the fingertip in the frame of the surface.
 
     `time_ns` is when the arm measured it, of CLOCK_MONOTONIC; `position` in m, `velocity` in m/s; `force_n` is the
     force normal to the surface, positive when pressing. `fault` says why the arm cannot move; '' if it can.
@@ -41,8 +41,8 @@ class ArmCommand:
 class Arm(Protocol):
     """An arm under hybrid control: velocity along the surface, velocity or force along its normal.
 
-    A command holds until the next one, but at most for a fraction of a second: an arm that hears nothing stops by
-    itself. Any method but `close` raises DeviceError if the arm cannot be reached.
+    A command holds until the next one, but at most for a fraction of a second: an arm without commands stops by itself.
+    Any method but `close` raises DeviceError if the arm cannot be reached.
     """
 
     def connect(self) -> None:
@@ -74,7 +74,7 @@ class ForceReading(enum.Enum):
 
 @runtime_checkable
 class Recoverable(Protocol):
-    """An arm that knows how to come free from a fault without being connected anew."""
+    """An arm that knows how to come free from a fault without being connected again."""
 
     def recover(self) -> None:
         """Clear the fault; DeviceError if that is not possible. Whoever calls it sees that the arm may move."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import serial
 
 from texture_core.errors import DeviceError
-from texture_core.framing import Deframer, Frame, pack
+from texture_core.framing import Frame, FrameDecoder, pack
 from texture_core.parameters import param
 from texture_exploration.arms import rails_tables as tables
 from texture_exploration.arms.command_limits import CommandLimits
@@ -30,11 +30,37 @@ READ_S = 0.05
 class RailsParams(CommandLimits):
     """Where the rails are, and what their encoders count."""
 
-    device: str = param('/tmp/texture/rails', 'Serial device; the default is that of the emulated one.')
-    baud: int = param(230400, 'Baud rate of a real UART; USB ignores it.', low=9600, high=12_000_000)
-    xy_counts_m: float = param(200_000.0, 'Encoder counts per metre of the rails.', unit='1/m', low=1e3, high=1e8)
-    z_counts_m: float = param(1_000_000.0, 'The same, of the pressing motor.', unit='1/m', low=1e3, high=1e8)
-    height_m: float = param(0.01, 'Height of the finger above the surface at 0 counts.', unit='m', low=-0.5, high=0.5)
+    device: str = param(
+        '/tmp/texture/rails',
+        'Sets the path of the serial device of the rails; the default is that of the emulated rails.',
+    )
+    baud: int = param(
+        230400,
+        'Sets the baud rate of a real UART in bit/s; a USB device ignores it. It must equal that of the device.',
+        low=9600,
+        high=12_000_000,
+    )
+    xy_counts_m: float = param(
+        200_000.0,
+        'Sets the encoder counts per metre of the rails; a larger value gives shorter measured distances.',
+        unit='1/m',
+        low=1e3,
+        high=1e8,
+    )
+    z_counts_m: float = param(
+        1_000_000.0,
+        'Sets the encoder counts per metre of the pressing motor; a larger value gives shorter measured distances.',
+        unit='1/m',
+        low=1e3,
+        high=1e8,
+    )
+    height_m: float = param(
+        0.01,
+        'Sets the height of the finger above the surface at 0 counts; a larger value moves the origin up.',
+        unit='m',
+        low=-0.5,
+        high=0.5,
+    )
 
 
 class RailsArm:
@@ -48,8 +74,8 @@ class RailsArm:
         self._thread: threading.Thread | None = None
         self._closing = threading.Event()
         self._fresh = threading.Event()
-        self._trouble = 'the rails are not connected; connect them first'
-        self._deframer = Deframer()
+        self._failure = 'the rails are not connected; connect them first'
+        self._deframer = FrameDecoder()
         self._sending = threading.Lock()
         self._sent = 0
         self._states: deque[tuple[int, Vector]] = deque(maxlen=SPEED_OVER)  # device time in µs, and place
@@ -68,14 +94,14 @@ class RailsArm:
             self._port = serial.Serial(
                 self._params.device, self._params.baud, exclusive=True, timeout=READ_S, write_timeout=0.2
             )
-        self._trouble = ''
+        self._failure = ''
         self._thread = threading.Thread(target=self._read, name='rails', daemon=True)
         self._thread.start()
         try:
             self._send(tables.CLEAR)
             if not self._fresh.wait(FIRST_STATE_S):
                 raise DeviceError(
-                    self._trouble
+                    self._failure
                     or f"device '{self._params.device}' is open and sends no state of rails; check that it is the "
                     f'right device, and its baud rate ({self._params.baud} is set)'
                 )
@@ -96,12 +122,12 @@ class RailsArm:
             with contextlib.suppress(*LINE_FAULTS):
                 self._port.close()
             self._port = None
-        self._trouble = self._trouble or 'the rails are not connected; connect them first'
+        self._failure = self._failure or 'the rails are not connected; connect them first'
 
     def state(self) -> ArmState:
         """Return the newest state."""
-        if self._trouble or self._state is None:
-            raise DeviceError(self._trouble)
+        if self._failure or self._state is None:
+            raise DeviceError(self._failure)
         return self._state
 
     def command(self, command: ArmCommand) -> None:
@@ -131,8 +157,8 @@ class RailsArm:
         }
 
     def _send(self, kind: int, body: bytes = b'') -> None:
-        if self._trouble or self._port is None:
-            raise DeviceError(self._trouble)
+        if self._failure or self._port is None:
+            raise DeviceError(self._failure)
         with self._sending, self._line():
             frame = Frame(kind, tables.VERSION, self._sent, time.monotonic_ns() // 1000, 1, 1, body)
             self._sent += 1
@@ -153,7 +179,7 @@ class RailsArm:
             return
         if frame.version != tables.VERSION or len(frame.body) != tables.STATE_BODY.size:
             self._refused += 1
-            self._trouble = (
+            self._failure = (
                 f'the rails send states of version {frame.version}, and {tables.VERSION} is known; update the firmware '
                 'or this package'
             )
@@ -185,8 +211,8 @@ class RailsArm:
         try:
             yield
         except LINE_FAULTS as error:
-            self._trouble = (
+            self._failure = (
                 f"the rails on '{self._params.device}' cannot be reached ({error}); check that they are plugged in, "
                 'that you may open the device, and that no other program has it open'
             )
-            raise DeviceError(self._trouble) from error
+            raise DeviceError(self._failure) from error

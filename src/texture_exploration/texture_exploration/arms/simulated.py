@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerSender, FingerState
+from texture_core.finger_state import FingerSender, FingerState
 from texture_core.parameters import param
 from texture_exploration.arms.command_limits import CommandLimits
 from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading, Vector
 from texture_exploration.arms.simulated_surface import SimulatedSurface, SimulatedSurfaceParams
-from texture_exploration.arms.velocity_only import VelocityOnly
+from texture_exploration.arms.velocity_only import VelocityForceControl
 from texture_exploration.force_control import ForceLoopParams
 
 RATE_HZ = 250.0
@@ -30,27 +30,52 @@ class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams, CommandLimits)
     """The simulated arm and the surface under it."""
 
     force_mode: bool = param(
-        True, 'The arm controls forces itself, ideally; false: it knows velocities alone, and follows late.'
+        True,
+        'Lets the arm control forces itself, ideally; false gives a delayed velocity interface with a force'
+        ' loop around it.',
     )
 
     undeclared_lag_s: float = param(
         0.0,
-        "Lag of an arm without force mode beyond 'loop_delay_s', which nobody told it.",
+        "Sets the lag of an arm without force mode beyond 'loop_delay_s', unknown to its force control.",
         unit='s',
         low=0.0,
         high=0.2,
     )
     force_noise_n: float = param(
-        0.001, 'Standard deviation of the measured force of an arm without force mode.', unit='N', low=0.0, high=1.0
+        0.001,
+        'Sets the standard deviation of the force noise of an arm without force mode.',
+        unit='N',
+        low=0.0,
+        high=1.0,
     )
-    seed: int = param(1, 'Seed of the noise.', low=0)
-    stiffness_n_m: float = param(2000.0, 'Stiffness of finger and surface; 0: there is none.', unit='N/m', low=0.0)
+    seed: int = param(1, 'Sets the seed of the noise; equal seeds give equal noise.', low=0)
+    stiffness_n_m: float = param(
+        2000.0, 'Sets the stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
+    )
     admittance_m_s_n: float = param(
-        0.01, "Normal speed per force error of the arm's own force mode.", unit='m/s/N', low=1e-4, high=1.0
+        0.01,
+        "Sets the normal speed per force error of the arm's own force mode; a larger value settles faster.",
+        unit='m/s/N',
+        low=1e-4,
+        high=1.0,
     )
-    start_height_m: float = param(0.01, 'Height of the finger at the start.', unit='m', low=0.0, high=0.2)
-    command_timeout_s: float = param(0.1, 'A command holds so long.', unit='s', low=0.02, high=2.0)
-    finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
+    start_height_m: float = param(
+        0.01, 'Sets the height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
+    )
+    command_timeout_s: float = param(
+        0.1,
+        'Sets how long a command holds without a new one; afterwards the arm stands still.',
+        unit='s',
+        low=0.02,
+        high=2.0,
+    )
+    finger_port: int = param(
+        0,
+        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        low=0,
+        high=65535,
+    )
 
 
 class SimulatedArm:
@@ -84,7 +109,7 @@ class SimulatedArm:
         self._params = params
         self._clock = clock
         self._own_thread = own_thread
-        self._order = (STANDSTILL, clock())  # the command, and when it came
+        self._last_command = (STANDSTILL, clock())  # the command, and when it came
         self._state = ArmState(clock(), (0.0, 0.0, params.start_height_m), (0.0, 0.0, 0.0), 0.0)
         self._frozen = False
         self._fault = ''
@@ -98,12 +123,12 @@ class SimulatedArm:
         self._wake = threading.Event()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
-        self._bench = FingerSender(params.finger_port)
+        self._emulator = FingerSender(params.finger_port)
         self._surface = SimulatedSurface(params, params.stiffness_n_m)
-        self._slow = (
+        self._velocity_control = (
             None
             if params.force_mode
-            else VelocityOnly(params, 1 / RATE_HZ, clock(), params.loop_delay_s + params.undeclared_lag_s)
+            else VelocityForceControl(params, 1 / RATE_HZ, clock(), params.loop_delay_s + params.undeclared_lag_s)
         )
 
     def connect(self) -> None:
@@ -125,7 +150,7 @@ class SimulatedArm:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-        self._bench.close()
+        self._emulator.close()
 
     def state(self) -> ArmState:
         """Return the newest state."""
@@ -136,14 +161,14 @@ class SimulatedArm:
         if self._closing.is_set():
             raise DeviceError('the simulated arm is not connected; connect it first')
         self._params.check(command, self.stop)
-        was_resting = self._resting
-        self._order = (command, self._clock())
-        if was_resting:
+        was_idle = self._is_idle
+        self._last_command = (command, self._clock())
+        if was_idle:
             self._wake.set()
 
     def stop(self) -> None:
         """Stand still."""
-        self._order = (STANDSTILL, self._clock())
+        self._last_command = (STANDSTILL, self._clock())
 
     def freeze(self) -> None:
         """Behave like a controller that hangs: the state grows old, commands do nothing, until connected again."""
@@ -171,9 +196,9 @@ class SimulatedArm:
         """How hard the finger really presses, whatever the force sensor shows."""
         return self._true_n
 
-    def shove(self, way_m: Vector) -> None:
+    def displace(self, distance_m: Vector) -> None:
         """Move as if somebody shoved the finger."""
-        x, y, z = (at + way for at, way in zip(self._state.position, way_m, strict=True))
+        x, y, z = (at + step_m for at, step_m in zip(self._state.position, distance_m, strict=True))
         self._state = replace(self._state, position=(x, y, z))
 
     def step(self, dt_s: float) -> None:
@@ -181,26 +206,26 @@ class SimulatedArm:
         if self._frozen:
             return
         now_ns = self._clock()
-        command, given_ns = self._order if not self._fault else (STANDSTILL, now_ns)
+        command, given_ns = self._last_command if not self._fault else (STANDSTILL, now_ns)
         left_s = self._params.command_timeout_s + (given_ns - now_ns) * 1e-9
         # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
         moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
-        moved = self._slow.moved_m(now_ns) if self._slow else self._moved_m(command, moving_s)
-        x, y, z = (at + way for at, way in zip(self._state.position, moved, strict=True))
+        moved = self._velocity_control.moved_m(now_ns) if self._velocity_control else self._moved_m(command, moving_s)
+        x, y, z = (at + step_m for at, step_m in zip(self._state.position, moved, strict=True))
         velocity = _speed(moved, moving_s)
         if left_s < 0:
             velocity = (0.0, 0.0, 0.0)
             command = STANDSTILL
-            self._order = (STANDSTILL, now_ns)
+            self._last_command = (STANDSTILL, now_ns)
         self._true_n = self._surface.force_n(x, z) + self._push_n
         self._state = ArmState(now_ns, (x, y, z), velocity, self._measured_n(dt_s), self._fault)
-        if self._slow:
-            self._slow.ask(command, self._state, dt_s)
-        self._bench.send(FingerState(now_ns, x, y, z, *velocity, self._true_n))
+        if self._velocity_control:
+            self._velocity_control.ask(command, self._state, dt_s)
+        self._emulator.send(FingerState(now_ns, x, y, z, *velocity, self._true_n))
 
     @property
-    def _resting(self) -> bool:
-        return self._order[0] == STANDSTILL
+    def _is_idle(self) -> bool:
+        return self._last_command[0] == STANDSTILL
 
     def _measured_n(self, dt_s: float) -> float:
         """Return what the force sensor shows of the true force."""
@@ -226,16 +251,16 @@ class SimulatedArm:
         decay_s = admittance * self._params.stiffness_n_m
         effective_s = -math.expm1(-decay_s * dt_s) / decay_s if decay_s > 0 else dt_s
         x = self._state.position[0]
-        way = command.tangential_m_s[0] * dt_s
-        rise = self._surface.height_m(x + way) - self._surface.height_m(x)
+        step_m = command.tangential_m_s[0] * dt_s
+        rise = self._surface.height_m(x + step_m) - self._surface.height_m(x)
         # A step is met or lost, not followed.
-        follow = rise if self._state.force_n > 0 and abs(rise) <= STEEPEST * abs(way) else 0.0
+        follow = rise if self._state.force_n > 0 and abs(rise) <= STEEPEST * abs(step_m) else 0.0
         return admittance * (self._state.force_n - command.force_n) * effective_s + follow
 
     def _run(self) -> None:
         last_ns = self._clock()
         while not self._closing.is_set():
-            if self._resting:
+            if self._is_idle:
                 # A command ends the rest at once, and counts from now on.
                 self._wake.wait(RESTING_PERIOD_S)
                 self._wake.clear()
@@ -250,7 +275,7 @@ class SimulatedArm:
 def _speed(moved_m: Vector, dt_s: float) -> Vector:
     if dt_s <= 0:
         return 0.0, 0.0, 0.0
-    x, y, z = (way / dt_s for way in moved_m)
+    x, y, z = (step_m / dt_s for step_m in moved_m)
     return x, y, z
 
 

@@ -14,22 +14,58 @@ STICK_M = 0.002  # way from slip to slip
 class SimulatedSurfaceParams:
     """Shape, layers and stickiness of the surface under a simulated finger."""
 
-    tilt_rad: float = param(0.0, 'The surface rises along x by this angle.', unit='rad', low=-0.5, high=0.5)
-    bump_m: float = param(0.0, 'Height of a round bump on the way along x.', unit='m', low=-0.01, high=0.01)
-    bump_from_m: float = param(0.02, 'x at which the bump begins.', unit='m', low=-2.0, high=2.0)
-    bump_length_m: float = param(0.04, 'Length of the bump along x.', unit='m', low=0.005, high=1.0)
-    step_m: float = param(0.0, 'The surface is higher by this from a step on.', unit='m', low=-0.1, high=0.01)
-    step_from_m: float = param(0.03, 'x of the step.', unit='m', low=-2.0, high=2.0)
-    edge_m: float = param(2.0, 'x at which the surface ends.', unit='m', low=-2.0, high=2.0)
-    ridge_m: float = param(0.0, 'Height of regular ridges along x.', unit='m', low=0.0, high=0.005)
-    ridge_length_m: float = param(0.002, 'Distance of the ridges.', unit='m', low=0.0002, high=0.1)
-    layer_m: float = param(0.0, 'Thickness of a soft layer; 0: none.', unit='m', low=0.0, high=0.02)
-    base_stiffness_n_m: float = param(
-        20000.0, 'Stiffness once the soft layer is pressed through.', unit='N/m', low=10.0, high=200000.0
+    tilt_rad: float = param(
+        0.0,
+        'Sets the angle by which the surface rises along x; a larger angle is steeper.',
+        unit='rad',
+        low=-0.5,
+        high=0.5,
     )
-    adhesion_n: float = param(0.0, 'The surface holds on to the finger with up to this.', unit='N', low=0.0, high=10.0)
+    bump_m: float = param(
+        0.0, 'Sets the height of a round bump on the path along x; 0 removes the bump.', unit='m', low=-0.01, high=0.01
+    )
+    bump_from_m: float = param(0.02, 'Sets the x coordinate at which the bump begins.', unit='m', low=-2.0, high=2.0)
+    bump_length_m: float = param(
+        0.04, 'Sets the length of the bump along x; a longer bump is flatter.', unit='m', low=0.005, high=1.0
+    )
+    step_m: float = param(
+        0.0, 'Sets the height of a step of the surface along x; 0 removes the step.', unit='m', low=-0.1, high=0.01
+    )
+    step_from_m: float = param(0.03, 'Sets the x coordinate of the step.', unit='m', low=-2.0, high=2.0)
+    edge_m: float = param(2.0, 'Sets the x coordinate at which the surface ends.', unit='m', low=-2.0, high=2.0)
+    ridge_m: float = param(
+        0.0, 'Sets the height of regular ridges along x; 0 removes the ridges.', unit='m', low=0.0, high=0.005
+    )
+    ridge_length_m: float = param(
+        0.002,
+        'Sets the distance between the ridges; a larger distance lowers their frequency.',
+        unit='m',
+        low=0.0002,
+        high=0.1,
+    )
+    layer_m: float = param(
+        0.0, 'Sets the thickness of a soft layer on the surface; 0 removes the layer.', unit='m', low=0.0, high=0.02
+    )
+    base_stiffness_n_m: float = param(
+        20000.0,
+        'Sets the stiffness below the soft layer; a larger value gives harder impacts there.',
+        unit='N/m',
+        low=10.0,
+        high=200000.0,
+    )
+    adhesion_n: float = param(
+        0.0,
+        'Sets the largest pulling force with which the surface adheres to the finger; 0 removes adhesion.',
+        unit='N',
+        low=0.0,
+        high=10.0,
+    )
     stick_slip_n: float = param(
-        0.0, 'The force swings by this while the finger sticks and slips, once every 2 mm.', unit='N', low=0.0, high=5.0
+        0.0,
+        'Sets the amplitude of the force while the finger sticks and slips every 2 mm; 0 removes stick-slip.',
+        unit='N',
+        low=0.0,
+        high=5.0,
     )
 
 

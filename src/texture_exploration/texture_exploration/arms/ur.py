@@ -11,7 +11,7 @@ from texture_core.errors import DeviceError
 from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading
 from texture_exploration.arms.surface_frame import SurfaceFrame
 from texture_exploration.arms.ur_link import WorkerLink
-from texture_exploration.arms.ur_messages import RECOVER, STOP, Report, Wish
+from texture_exploration.arms.ur_messages import RECOVER, STOP, UrCommand, UrReport
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.arms.ur_probe import check_ready, unlock_protective_stop
 from texture_exploration.arms.ur_program import check_program
@@ -115,14 +115,14 @@ class UrArm:
             return
         normal_m_s = command.normal_m_s if command.force_n is None else 0.0
         velocity = self._frame.to_base((*command.tangential_m_s, normal_m_s))
-        self._connected().send(Wish(time.monotonic_ns(), velocity, command.force_n).to_bytes())
+        self._connected().send(UrCommand(time.monotonic_ns(), velocity, command.force_n).to_bytes())
 
     def stop(self) -> None:
         """Let the worker stop the arm."""
         self._connected().send(STOP)
 
     def recover(self) -> None:
-        """Release a protective stop and start the control program again, without connecting anew.
+        """Release a protective stop and start the control program again, without connecting again.
 
         Whoever calls this has made sure that the arm may move.
 
@@ -161,13 +161,13 @@ class UrArm:
             raise DeviceError('the arm is not connected; connect it first')
         return self._link
 
-    def _report(self) -> Report:
+    def _report(self) -> UrReport:
         link = self._connected()
         link.check()
         assert link.report is not None
         return link.report
 
-    def _fault(self, report: Report) -> str:
+    def _fault(self, report: UrReport) -> str:
         if report.silent:
             return f'the controller is silent for more than {self._params.silence_s * 1e3:.0f} ms'
         if report.safety_mode in SAFETY_FAULTS:

@@ -1,4 +1,4 @@
-"""The worker process as its parent sees it: start it, hear from it, tell it, end it."""
+"""The worker process as its parent sees it: start it, exchange messages with it, end it."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import sys
 import threading
 
 from texture_core.errors import DeviceError
-from texture_exploration.arms.ur_messages import LARGEST, REPORT, TROUBLE, Report
+from texture_exploration.arms.ur_messages import FAILURE, LARGEST, REPORT, UrReport
 from texture_exploration.arms.ur_params import UrArmParams
 
 MODULE = 'texture_exploration.arms.ur_worker'
 STOPPING_S = 1.5  # time to brake, beside what the controller takes to acknowledge it
 ACKNOWLEDGEMENTS = 2  # of a stop and of the end of force control
-LAST_WORD_S = 0.05
+FINAL_MESSAGE_S = 0.05
 
 
 class WorkerLink:
     """One worker process, from its start to its end."""
 
     def __init__(self, params: UrArmParams) -> None:
-        self.report: Report | None = None
-        self._trouble = ''
+        self.report: UrReport | None = None
+        self._failure = ''
         self._timeout_s = params.connect_timeout_s
         self._stopping_s = STOPPING_S + ACKNOWLEDGEMENTS * params.acknowledge_s
-        self._news = threading.Event()
+        self._state_received = threading.Event()
         self._channel, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         command = [sys.executable, '-m', MODULE, str(end.fileno()), json.dumps(dataclasses.asdict(params))]
         with end:
@@ -51,7 +51,7 @@ class WorkerLink:
         DeviceError
             If the worker ends before, or none comes in time.
         """
-        if not self._news.wait(self._timeout_s):
+        if not self._state_received.wait(self._timeout_s):
             raise DeviceError(
                 f'the controller did not let the arm be ready within {self._timeout_s:g} s; '
                 'look at its pendant, and restart it if it hangs'
@@ -70,12 +70,12 @@ class WorkerLink:
             raise DeviceError(self._why_ended())
 
     def send(self, data: bytes) -> None:
-        """Tell the worker something, without waiting.
+        """Send a message to the worker, without waiting.
 
         Raises
         ------
         DeviceError
-            If it is gone or does not listen.
+            If it is gone or does not read.
         """
         try:
             self._channel.send(data, socket.MSG_DONTWAIT)
@@ -99,11 +99,11 @@ class WorkerLink:
         while data := self._receive():
             kind = data[:1]
             if kind == REPORT:
-                self.report = Report.from_bytes(data)
-                self._news.set()
-            elif kind == TROUBLE:
-                self._trouble = data[1:].decode()
-        self._news.set()
+                self.report = UrReport.from_bytes(data)
+                self._state_received.set()
+            elif kind == FAILURE:
+                self._failure = data[1:].decode()
+        self._state_received.set()
 
     def _receive(self) -> bytes:
         try:
@@ -112,9 +112,9 @@ class WorkerLink:
             return b''
 
     def _why_ended(self) -> str:
-        self._reader.join(LAST_WORD_S)  # what the worker said before it ended may still be on its way
-        if self._trouble:
-            return self._trouble
+        self._reader.join(FINAL_MESSAGE_S)  # what the worker said before it ended may still be on its way
+        if self._failure:
+            return self._failure
         if self._process.poll() == -signal.SIGALRM:
             return 'the controller stopped answering in the middle of a command; look at its pendant, and connect again'
         return 'the process that talks to the controller ended; connect again'

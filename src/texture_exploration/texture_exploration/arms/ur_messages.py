@@ -1,4 +1,4 @@
-"""What the arm and its worker process say to each other: datagrams on a socket pair, one message each."""
+"""Messages between the arm and its worker process: datagrams on a socket pair, one message each."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import astuple, dataclass
 
 from texture_exploration.arms.protocol import Vector
 
-WISH, STOP, RECOVER, REPORT, TROUBLE = (bytes([number]) for number in range(1, 6))
-WISH_FORMAT = struct.Struct('<q4d')
+COMMAND, STOP, RECOVER, REPORT, FAILURE = (bytes([number]) for number in range(1, 6))
+COMMAND_FORMAT = struct.Struct('<q4d')
 REPORT_FORMAT = struct.Struct('<q9di4?5I')
 LARGEST = 4096
 
 
 @dataclass(frozen=True)
-class Wish:
-    """What the arm shall do, in the base frame: a velocity, (3,), and perhaps a force that presses on the surface.
+class UrCommand:
+    """Command to the arm in the base frame: a velocity, (3,), and perhaps a force that presses on the surface.
 
     `time_ns` is when it was commanded, of CLOCK_MONOTONIC: a wish that waited for the worker is old.
     """
@@ -28,12 +28,12 @@ class Wish:
     def to_bytes(self) -> bytes:
         """Return the message."""
         force = math.nan if self.force_n is None else self.force_n
-        return WISH + WISH_FORMAT.pack(self.time_ns, *self.velocity_m_s, force)
+        return COMMAND + COMMAND_FORMAT.pack(self.time_ns, *self.velocity_m_s, force)
 
     @classmethod
-    def from_bytes(cls, data: bytes) -> Wish:
+    def from_bytes(cls, data: bytes) -> UrCommand:
         """Return what a message says."""
-        time_ns, vx, vy, vz, force = WISH_FORMAT.unpack(data[1:])
+        time_ns, vx, vy, vz, force = COMMAND_FORMAT.unpack(data[1:])
         return cls(time_ns, (vx, vy, vz), None if math.isnan(force) else force)
 
 
@@ -54,7 +54,7 @@ class Counts:
 
 
 @dataclass(frozen=True)
-class Report:
+class UrReport:
     """What the controller measured last, in the base frame, and how it is.
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
@@ -80,7 +80,7 @@ class Report:
         return REPORT + REPORT_FORMAT.pack(self.time_ns, *vectors, *status)
 
     @classmethod
-    def from_bytes(cls, data: bytes) -> Report:
+    def from_bytes(cls, data: bytes) -> UrReport:
         """Return what a message says."""
         numbers = REPORT_FORMAT.unpack(data[1:])
         position, velocity, force = numbers[1:4], numbers[4:7], numbers[7:10]
@@ -89,6 +89,6 @@ class Report:
         return cls(numbers[0], position, velocity, force, safety_mode, playing, silent, unsteady, zeroed, counts)
 
 
-def trouble(text: str) -> bytes:
+def failure_message(text: str) -> bytes:
     """Return the message that the worker gives up, and why."""
-    return TROUBLE + text.encode()[: LARGEST - 1]
+    return FAILURE + text.encode()[: LARGEST - 1]

@@ -35,7 +35,7 @@ UNLOCK_WAIT_S = 8.0  # the controller refuses for 5 s
 UNLOCK_RETRY_S = 0.25
 
 
-class Line:
+class TcpConnection:
     """A TCP connection on which every wait ends in time, and every failure is a sentence."""
 
     def __init__(self, ip: str, port: int, timeout_s: float) -> None:
@@ -103,7 +103,7 @@ def rtde_version(ip: str, timeout_s: float) -> tuple[int, int]:
     DeviceError
         If there is none, or it does not answer in time.
     """
-    with closing(Line(ip, RTDE_PORT, timeout_s)) as line:
+    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         answer = _ask(line, CONTROLLER_VERSION, b'')
     if len(answer) < 8:
@@ -120,7 +120,7 @@ def runtime_state(ip: str, timeout_s: float) -> int:
     DeviceError
         If it does not answer in time.
     """
-    with closing(Line(ip, RTDE_PORT, timeout_s)) as line:
+    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         _ask(line, SETUP_OUTPUTS, struct.pack('>d', RUNTIME_HZ) + b'runtime_state')
         _ask(line, START, b'')
@@ -140,18 +140,18 @@ def claims_register(ip: str, name: str, timeout_s: float) -> bool:
     DeviceError
         If the controller does not answer in time.
     """
-    with closing(Line(ip, RTDE_PORT, timeout_s)) as line:
+    with closing(TcpConnection(ip, RTDE_PORT, timeout_s)) as line:
         _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
         return b'IN_USE' not in _ask(line, SETUP_INPUTS, name.encode())
 
 
-def _ask(line: Line, kind: int, payload: bytes) -> bytes:
+def _ask(line: TcpConnection, kind: int, payload: bytes) -> bytes:
     """Send a message and return the payload of the answer of the same type."""
     line.send(HEADER.pack(HEADER.size + len(payload), kind) + payload)
     return _await(line, kind)
 
 
-def _await(line: Line, kind: int) -> bytes:
+def _await(line: TcpConnection, kind: int) -> bytes:
     """Return the payload of the next message of a type; others, such as texts, are passed over."""
     while True:
         size, answered = HEADER.unpack(line.read(HEADER.size))
@@ -160,7 +160,7 @@ def _await(line: Line, kind: int) -> bytes:
             return answer
 
 
-class Dashboard(Line):
+class DashboardClient(TcpConnection):
     """The dashboard server of a controller: a line is asked, a line is answered."""
 
     def __init__(self, ip: str, timeout_s: float) -> None:
@@ -192,7 +192,7 @@ def check_ready(ip: str, timeout_s: float, unlock: bool) -> tuple[int, int]:
     _check_version(ip, version)
     if version[0] >= FIRST_WITHOUT_DASHBOARD:
         return version
-    with closing(Dashboard(ip, max(0.1, end_s - time.monotonic()))) as dashboard:
+    with closing(DashboardClient(ip, max(0.1, end_s - time.monotonic()))) as dashboard:
         mode = dashboard.ask('robotmode')
         if 'RUNNING' not in mode:
             raise DeviceError(f"the arm at {ip} answers '{mode}'; switch it on and release its brakes")
@@ -229,7 +229,7 @@ def unlock_protective_stop(ip: str, timeout_s: float) -> None:
     """
     end_s = time.monotonic() + UNLOCK_WAIT_S
     while True:
-        with closing(Dashboard(ip, timeout_s)) as dashboard:
+        with closing(DashboardClient(ip, timeout_s)) as dashboard:
             if _safety(dashboard) in FREE_MODES:
                 return
             answer = dashboard.ask('unlock protective stop')
@@ -238,6 +238,6 @@ def unlock_protective_stop(ip: str, timeout_s: float) -> None:
         time.sleep(UNLOCK_RETRY_S)
 
 
-def _safety(dashboard: Dashboard) -> str:
+def _safety(dashboard: DashboardClient) -> str:
     """Return the safety mode, such as NORMAL."""
     return dashboard.ask('safetymode').rpartition(' ')[2]

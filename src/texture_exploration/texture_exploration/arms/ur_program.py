@@ -6,7 +6,7 @@ import time
 from contextlib import closing
 
 from texture_core.errors import DeviceError
-from texture_exploration.arms.ur_probe import Dashboard, claims_register, runtime_state
+from texture_exploration.arms.ur_probe import DashboardClient, claims_register, runtime_state
 from texture_exploration.arms.ur_tables import (
     COMMAND_REGISTER,
     CONTROL_SCRIPT,
@@ -54,7 +54,7 @@ def _program(ip: str, version: tuple[int, int], timeout_s: float) -> str:
     if version[0] >= FIRST_WITHOUT_DASHBOARD:
         runtime = runtime_state(ip, timeout_s)
         return '' if runtime == PROGRAM_STOPPED else f'runtime state {runtime}'
-    with closing(Dashboard(ip, timeout_s)) as dashboard:
+    with closing(DashboardClient(ip, timeout_s)) as dashboard:
         running, state = dashboard.ask('running'), dashboard.ask('programState')
     return state if 'true' in running.lower() or not state.upper().startswith('STOPPED') else ''
 
@@ -67,7 +67,7 @@ def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
     """Stop it by the dashboard; without one ur-rtde has to."""
     if version[0] >= FIRST_WITHOUT_DASHBOARD:
         return
-    with closing(Dashboard(ip, timeout_s)) as dashboard:
+    with closing(DashboardClient(ip, timeout_s)) as dashboard:
         dashboard.ask('stop')
     end_s = time.monotonic() + STOPPING_S
     while program := _program(ip, version, timeout_s):

@@ -23,9 +23,18 @@ from typing import Any
 
 from texture_core.parameters import from_mapping
 from texture_exploration.arms.protocol import Vector
-from texture_exploration.arms.ur_messages import LARGEST, RECOVER, STOP, WISH, Counts, Report, Wish, trouble
+from texture_exploration.arms.ur_command_stream import UrCommandStream
+from texture_exploration.arms.ur_messages import (
+    COMMAND,
+    LARGEST,
+    RECOVER,
+    STOP,
+    Counts,
+    UrCommand,
+    UrReport,
+    failure_message,
+)
 from texture_exploration.arms.ur_params import UrArmParams
-from texture_exploration.arms.ur_pilot import Pilot
 from texture_exploration.arms.ur_tables import PROGRAM_PLAYING
 from texture_exploration.arms.ur_watchdog import Watchdog
 
@@ -52,14 +61,14 @@ class Observer:
         self.connected = True
         self.unsteady = self.zeroed = False
         self.counts = Counts()
-        self.newest: Report | None = None
+        self.newest: UrReport | None = None
         self._receive = receive
         self._channel = channel
         self._silence_s = params.silence_s
         self._period_s = 1.0 / params.rate_hz
         self._stamp = -1.0
         self._time_ns = time.monotonic_ns()
-        self._quiet_s = 0.0
+        self._silent_for_s = 0.0
         self._late = 0
 
     def run(self) -> None:
@@ -68,28 +77,28 @@ class Observer:
         try:
             while self.connected and self._receive.isConnected():
                 now_s = time.monotonic()
-                self._look(min(now_s - last_s, LATE_S))
+                self._poll(min(now_s - last_s, LATE_S))
                 last_s = now_s
                 time.sleep(self._period_s)  # the exact waitPeriod of ur-rtde burns processor time
         finally:
             self.connected = False
 
-    def _look(self, passed_s: float) -> None:
+    def _poll(self, passed_s: float) -> None:
         stamp = self._receive.getTimestamp()
         if stamp != self._stamp:
             self._stamp, self._time_ns = stamp, time.monotonic_ns()
-            self._quiet_s, self.silent = 0.0, False
+            self._silent_for_s, self.silent = 0.0, False
             self._report()
             return
-        before_s, self._quiet_s = self._quiet_s, self._quiet_s + passed_s
-        self._late += before_s <= LATE_S < self._quiet_s
-        if self._quiet_s > self._silence_s and not self.silent:
+        previous_s, self._silent_for_s = self._silent_for_s, self._silent_for_s + passed_s
+        self._late += previous_s <= LATE_S < self._silent_for_s
+        if self._silent_for_s > self._silence_s and not self.silent:
             self.silent = True
             self._report()
 
     def _report(self) -> None:
         receive = self._receive
-        report = Report(
+        report = UrReport(
             time_ns=self._time_ns,
             position_m=_vector(receive.getActualTCPPose()),
             velocity_m_s=_vector(receive.getActualTCPSpeed()),
@@ -124,19 +133,19 @@ class Worker:
         self._control = control_class(params.ip, params.rate_hz, flags)
         self._observer = Observer(receive, channel, params)
         self._watchdog = Watchdog(self._control, params, lambda seconds: set_alarm(seconds + HANGING_S))
-        self._pilot = Pilot(self._control, params, self._watchdog)
-        self._wish: Wish | None = None
+        self._commands = UrCommandStream(self._control, params, self._watchdog)
+        self._ur_command: UrCommand | None = None
         self._felt_ns = 0
         self._was_playing = False
         self._stopped = False  # the program was stopped, and not by us
         self._strange = False  # and another one was started since
 
-    def lead(self) -> str:
+    def run(self) -> str:
         """Lead the arm until the parent or the controller is gone; return what to say about it."""
         try:
             self._set_watchdog()
             threading.Thread(target=self._observer.run, name='observer', daemon=True).start()
-            while self._listen():
+            while self._receive_commands():
                 if not (self._observer.connected and self._control.isConnected()):
                     return LOST
                 self._watch_program()
@@ -157,7 +166,7 @@ class Worker:
         if self._stopped:
             self._clear()
         elif not self._observer.silent:
-            self._pilot.cycle(self._wish)
+            self._commands.cycle(self._ur_command)
         self._tell()
         self._control.waitPeriod(begin)
 
@@ -166,11 +175,11 @@ class Worker:
         newest = self._observer.newest
         if newest is not None and newest.time_ns != self._felt_ns:
             self._felt_ns = newest.time_ns
-            self._pilot.feel(newest.time_ns, newest.position_m, newest.force_n)
+            self._commands.observe(newest.time_ns, newest.position_m, newest.force_n)
 
     def _tell(self) -> None:
         """Let the observer know what to report beside."""
-        pilot, watchdog = self._pilot, self._watchdog
+        pilot, watchdog = self._commands, self._watchdog
         self._observer.unsteady, self._observer.zeroed = pilot.unsteady, pilot.trusted
         self._observer.counts = Counts(
             refused=pilot.refused,
@@ -195,33 +204,33 @@ class Worker:
         ours = not self._stopped and not self._strange
         if ours and self._observer.connected and not self._observer.silent and self._control.isConnected():
             with contextlib.suppress(RuntimeError):
-                self._pilot.rest()
+                self._commands.rest()
                 set_alarm(HANGING_S)
                 self._control.stopScript()
 
-    def _listen(self) -> bool:
+    def _receive_commands(self) -> bool:
         """Take over what the parent said last; return whether it is still there."""
         try:
             while data := self._channel.recv(LARGEST, socket.MSG_DONTWAIT):
-                self._obey(data)
+                self._handle(data)
         except BlockingIOError:
-            if self._wish is not None and self._age_s(self._wish) > self._params.command_timeout_s:
-                self._wish = None
+            if self._ur_command is not None and self._age_s(self._ur_command) > self._params.command_timeout_s:
+                self._ur_command = None
             return True
         except OSError:
             pass
         return False
 
     @staticmethod
-    def _age_s(wish: Wish) -> float:
-        return (time.monotonic_ns() - wish.time_ns) * 1e-9
+    def _age_s(ur_command: UrCommand) -> float:
+        return (time.monotonic_ns() - ur_command.time_ns) * 1e-9
 
-    def _obey(self, data: bytes) -> None:
+    def _handle(self, data: bytes) -> None:
         kind = data[:1]
-        if kind == WISH:
-            self._wish = Wish.from_bytes(data)
+        if kind == COMMAND:
+            self._ur_command = UrCommand.from_bytes(data)
         elif kind == STOP:
-            self._wish = None
+            self._ur_command = None
         elif kind == RECOVER:
             self._recover()
 
@@ -230,16 +239,16 @@ class Worker:
         self._control.kickWatchdog()
 
     def _recover(self) -> None:
-        """Start the program on the controller anew."""
+        """Start the program on the controller again."""
         set_alarm(RESTART_S + HANGING_S)
-        self._wish = None
+        self._ur_command = None
         self._clear()
         self._control.reuploadScript()
         end_s = time.monotonic() + RESTART_S
         while not (self._control.isProgramRunning() and self._plays()) and time.monotonic() < end_s:
             time.sleep(0.005)
         self._set_watchdog()
-        self._pilot.forget()
+        self._commands.reset()
         self._stopped = False
 
     def _plays(self) -> bool:
@@ -257,7 +266,7 @@ def _vector(values: Sequence[float]) -> Vector:
 
 
 def set_alarm(seconds: float) -> None:
-    """Let the kernel end this process unless it sets the alarm anew in time; no lock of Python can stop it."""
+    """Let the kernel end this process unless it sets the alarm again in time; no lock of Python can stop it."""
     signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
@@ -272,14 +281,14 @@ def main() -> None:
     set_alarm(params.connect_timeout_s)
     try:
         worker = Worker(params, channel)
-        reason = worker.lead()
+        reason = worker.run()
     except RuntimeError as error:  # so ur-rtde tells what it met
         reason = str(error)
     except Exception as error:  # an error of ours: the arm was stopped on the way out, and the parent is told
         traceback.print_exc()
         reason = f'the process that talks to the controller failed ({error!r}) and stopped the arm; connect again'
     if reason:
-        channel.send(trouble(reason))
+        channel.send(failure_message(reason))
     # To end the interfaces of ur-rtde takes seconds of sleep; the end of the process closes their connections too.
     os._exit(0)
 

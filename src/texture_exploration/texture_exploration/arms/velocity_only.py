@@ -6,12 +6,12 @@ import math
 from collections import deque
 
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
-from texture_exploration.force_control import Feeling, ForceLoop, ForceLoopParams
+from texture_exploration.force_control import ContactState, ForceLoop, ForceLoopParams
 
 HOLDS_S = 0.02  # so long an arm keeps a velocity when nobody asks for another
 
 
-class VelocityOnly:
+class VelocityForceControl:
     """Ask for velocities that press as wanted, and move by what was asked a delay ago.
 
     Parameters
@@ -28,13 +28,13 @@ class VelocityOnly:
 
     def __init__(self, params: ForceLoopParams, period_s: float, now_ns: int, delay_s: float) -> None:
         self._loop = ForceLoop(params, period_s)
-        self._late = DelayedVelocity(delay_s, now_ns)
-        self._way_m = 0.0
+        self._delayed = DelayedVelocity(delay_s, now_ns)
+        self._travelled_m = 0.0
 
     def moved_m(self, now_ns: int) -> Vector:
         """Return how far the finger has gone since this was asked last."""
-        moved = self._late.moved_m(now_ns)
-        self._way_m += math.hypot(*moved[:2])
+        moved = self._delayed.moved_m(now_ns)
+        self._travelled_m += math.hypot(*moved[:2])
         return moved
 
     def ask(self, command: ArmCommand, state: ArmState, dt_s: float) -> None:
@@ -42,16 +42,16 @@ class VelocityOnly:
         held_s = min(dt_s, HOLDS_S)
         normal = self._normal_m_s(command, state, held_s)
         self._loop.asked(state.position[2], normal, held_s)
-        self._late.ask(state.time_ns, (*command.tangential_m_s, normal))
+        self._delayed.ask(state.time_ns, (*command.tangential_m_s, normal))
 
     def _normal_m_s(self, command: ArmCommand, state: ArmState, dt_s: float) -> float:
-        feeling = Feeling(state.position[2], self._way_m, state.force_n)
+        contact = ContactState(state.position[2], self._travelled_m, state.force_n)
         speed_m_s = math.hypot(*command.tangential_m_s)
-        self._loop.feel(feeling, speed_m_s)
+        self._loop.observe(contact, speed_m_s)
         if command.force_n is None:
             self._loop.restart()
-            return max(command.normal_m_s, -self._loop.closing_m_s(feeling.height_m))
-        return self._loop.velocity_m_s(command.force_n, feeling, speed_m_s, dt_s)
+            return max(command.normal_m_s, -self._loop.approach_m_s(contact.height_m))
+        return self._loop.velocity_m_s(command.force_n, contact, speed_m_s, dt_s)
 
 
 class DelayedVelocity:
@@ -69,15 +69,15 @@ class DelayedVelocity:
 
     def moved_m(self, until_ns: int) -> Vector:
         """Return how far it goes from the last time asked until now."""
-        way: Vector = (0.0, 0.0, 0.0)
+        travelled: Vector = (0.0, 0.0, 0.0)
         while self._coming and self._coming[0][0] <= until_ns:
             begin_ns, velocity = self._coming.popleft()
-            way = self._go(way, begin_ns)
+            travelled = self._go(travelled, begin_ns)
             self._now, self._since_ns = velocity, begin_ns
-        return self._go(way, until_ns)
+        return self._go(travelled, until_ns)
 
-    def _go(self, way: Vector, until_ns: int) -> Vector:
+    def _go(self, travelled: Vector, until_ns: int) -> Vector:
         held_s = max(0, min(until_ns, self._since_ns + round(HOLDS_S * 1e9)) - self._done_ns) * 1e-9
         self._done_ns = max(self._done_ns, until_ns)
-        x, y, z = (at + speed * held_s for at, speed in zip(way, self._now, strict=True))
+        x, y, z = (at + speed * held_s for at, speed in zip(travelled, self._now, strict=True))
         return x, y, z

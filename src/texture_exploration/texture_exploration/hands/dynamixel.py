@@ -12,7 +12,7 @@ from pathlib import Path
 from texture_core.errors import CommandRefused, DeviceError
 from texture_exploration.arms.command_limits import CommandLimits
 from texture_exploration.arms.protocol import ArmCommand
-from texture_exploration.hands.dynamixel_bus import DynamixelBus, Motor
+from texture_exploration.hands.dynamixel_bus import DynamixelBus, MotorState
 from texture_exploration.hands.profile import Joint, Profile, load_profile
 from texture_exploration.hands.protocol import FingerSet, Fingertip, HandState
 from texture_exploration.hands.torque_guard import TorqueGuard, torque_off_packet
@@ -63,13 +63,13 @@ class DynamixelHand:
         self._device = device
         self._torque_off = torque_off_on_fault
         self._limits = limits
-        self._fingers = {name: Finger(joints, self.profile) for name, joints in self.profile.fingers.items()}
+        self._fingers = {name: DynamixelFinger(joints, self.profile) for name, joints in self.profile.fingers.items()}
         self._state: HandState | None = None
-        self._trouble = NOT_CONNECTED
+        self._failure = NOT_CONNECTED
         self._warning = self._doubt = ''
         self._highest_a: Mapping[int, float] = {}
         self._grip: Mapping[str, float] = {}
-        self._orders: dict[str, tuple[ArmCommand, float]] = {}
+        self._commands: dict[str, tuple[ArmCommand, float]] = {}
         self._fresh = threading.Event()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
@@ -79,13 +79,13 @@ class DynamixelHand:
         self.close()
         self._closing.clear()
         self._fresh.clear()
-        self._trouble = self._warning = self._doubt = ''
+        self._failure = self._warning = self._doubt = ''
         self._thread = threading.Thread(target=self._run, name='dynamixel', daemon=True)
         self._thread.start()
-        if not self._fresh.wait(FIRST_STATE_S) or self._trouble:
-            trouble = self._trouble or f"the motors on '{self._device}' answer only in part; check the cables"
+        if not self._fresh.wait(FIRST_STATE_S) or self._failure:
+            failure = self._failure or f"the motors on '{self._device}' answer only in part; check the cables"
             self.close()
-            raise DeviceError(trouble)
+            raise DeviceError(failure)
 
     def close(self) -> None:
         """Let go: torque off, and close the bus."""
@@ -93,13 +93,13 @@ class DynamixelHand:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
-        self._grip, self._orders = {}, {}
-        self._trouble = self._trouble or NOT_CONNECTED
+        self._grip, self._commands = {}, {}
+        self._failure = self._failure or NOT_CONNECTED
 
     def state(self) -> HandState:
         """Return the newest state."""
-        if self._trouble or self._state is None:
-            raise DeviceError(self._trouble)
+        if self._failure or self._state is None:
+            raise DeviceError(self._failure)
         return self._state
 
     def warning(self) -> str:
@@ -114,8 +114,8 @@ class DynamixelHand:
 
     def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
         """Follow from the next cycle on; what is refused makes these fingers stand still."""
-        if self._trouble:
-            raise DeviceError(self._trouble)
+        if self._failure:
+            raise DeviceError(self._failure)
         for name in fingers:
             self._check(name, command)
         self._order(fingers, command)
@@ -134,14 +134,14 @@ class DynamixelHand:
             rebooted = bus.reboot()
         finally:
             bus.close()
-        self._trouble = NOT_CONNECTED
+        self._failure = NOT_CONNECTED
         if not rebooted:
             return 'no motor that answers reports an error; none was rebooted, and the hand let go'
         return f'rebooted: {", ".join(map(self.profile.owner, rebooted))}; the hand let go, the next request connects'
 
     def _order(self, fingers: Sequence[str], command: ArmCommand) -> None:
         for name in fingers:
-            self._orders[name] = (command, time.monotonic())
+            self._commands[name] = (command, time.monotonic())
 
     def _check(self, name: str, command: ArmCommand) -> None:
         """Refuse what exceeds the limits of commands or the current that the motor takes."""
@@ -168,12 +168,12 @@ class DynamixelHand:
             self._highest_a = bus.limits_a
             bus.start()
             self._doubt = self._doubtful(bus.deaf)
-            self._lead(bus)
+            self._control_loop(bus)
         except DeviceError as error:
-            self._trouble = str(error)
+            self._failure = str(error)
         except BaseException as error:
             # Also an error of this program must neither leave the motors pressing nor pass in silence.
-            self._trouble = f'the hand was let go after an error in its program ({type(error).__name__}: {error})'
+            self._failure = f'the hand was let go after an error in its program ({type(error).__name__}: {error})'
             raise
         finally:
             if bus is not None:
@@ -183,7 +183,7 @@ class DynamixelHand:
                 guard.dismiss()
             self._fresh.set()
 
-    def _lead(self, bus: DynamixelBus) -> None:
+    def _control_loop(self, bus: DynamixelBus) -> None:
         """Read, decide and write, in one cycle after the other."""
         period_s = 1.0 / self.profile.rate_hz
         for finger in self._fingers.values():
@@ -241,11 +241,11 @@ class DynamixelHand:
             f"profile '{self.profile.name}'"
         )
 
-    def _step(self, motors: Mapping[int, Motor], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
+    def _step(self, motors: Mapping[int, MotorState], dt_s: float, now_s: float) -> dict[int, tuple[float, float]]:
         goals: dict[int, tuple[float, float]] = {}
         for name, finger in self._fingers.items():
             finger.measure(motors)
-            command, given_s = self._orders.get(name, (STANDSTILL, now_s))
+            command, given_s = self._commands.get(name, (STANDSTILL, now_s))
             if name in self._grip:
                 command = ArmCommand(force_n=self._grip[name])
             elif now_s - given_s > COMMAND_S:
@@ -262,7 +262,7 @@ class DynamixelHand:
         self._fresh.set()
 
 
-class Finger:
+class DynamixelFinger:
     """Angles and currents of a finger's motors, as a fingertip and back.
 
     The levers turn angles into ways around the pose at the start; across and along are arcs that are taken as straight.
@@ -275,12 +275,12 @@ class Finger:
 
     def restart(self) -> None:
         """The next measurement is the pose at the start."""
-        self._motors: dict[str, Motor] = {}
+        self._motors: dict[str, MotorState] = {}
         self._start: dict[str, float] = {}
         self._goal: dict[str, float] = {}
         self._pressing = False
 
-    def measure(self, motors: Mapping[int, Motor]) -> None:
+    def measure(self, motors: Mapping[int, MotorState]) -> None:
         """Take what the motors measure; one that is missing keeps its last, and begins where it is when it is back."""
         for role, joint in self._joints.items():
             motor = motors.get(joint.id)
@@ -294,7 +294,7 @@ class Finger:
     @property
     def tip(self) -> Fingertip:
         """Place, speed and force."""
-        x, y, depth = (self._way(role) for role in ('across', 'along', 'press'))
+        x, y, depth = (self._travel_m(role) for role in ('across', 'along', 'press'))
         vx, vy, down = (self._speed(role) for role in ('across', 'along', 'press'))
         return Fingertip((x, y, self._profile.start_height_m - depth), (vx, vy, -down), self._force_n())
 
@@ -327,11 +327,11 @@ class Finger:
             'press'
         ]
 
-    def _advance(self, role: str, angle_rad: float, ahead_rad: float) -> None:
+    def _advance(self, role: str, angle_rad: float, max_lead_rad: float) -> None:
         at = self._motors[role].position_rad
-        self._goal[role] = min(at + ahead_rad, max(at - ahead_rad, self._goal[role] + angle_rad))
+        self._goal[role] = min(at + max_lead_rad, max(at - max_lead_rad, self._goal[role] + angle_rad))
 
-    def _way(self, role: str) -> float:
+    def _travel_m(self, role: str) -> float:
         if role not in self._motors:
             return 0.0
         return (self._motors[role].position_rad - self._start[role]) * self._joints[role].lever_m

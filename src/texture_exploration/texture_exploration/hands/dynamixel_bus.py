@@ -1,7 +1,8 @@
 """Motors on a Dynamixel bus, in physical units, through the unmodified dynamixel-sdk.
 
-Its calls leave `is_using` set when they fail: one thread alone may use a bus, and after an error the port is made anew.
-Its reception is a busy loop; a port that waits a little for bytes makes it sleep, and leaves Python's lock to others.
+Its calls leave `is_using` set when they fail: one thread alone may use a bus, and after an error the port is made
+again. Its reception is a busy loop; a port that waits a little for bytes makes it sleep, and leaves Python's lock to
+others.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ HARDWARE_ERRORS = {0: 'input voltage', 2: 'overheating', 3: 'encoder', 4: 'elect
 
 
 @dataclass(frozen=True)
-class Motor:
+class MotorState:
     """What a motor measures."""
 
     current_a: float
@@ -210,7 +211,7 @@ class DynamixelBus:
                     'switch its power off and on'
                 )
 
-    def read(self) -> dict[int, Motor]:
+    def read(self) -> dict[int, MotorState]:
         """Return what all motors measure, {} if a cycle is lost; who does not answer is moved to `missing`."""
         asked = [motor for motor in self._profile.ids if motor not in self.missing]
         group = self._sdk.GroupSyncRead(self._port, self._packets, *self._block)
@@ -341,14 +342,14 @@ class DynamixelBus:
             # That all were asked at once was the first try.
             return any(self._packets.ping(self._port, motor)[1] == SUCCESS for _ in range(TRIES - 1))
 
-    def _measured(self, group: Any, motor: int) -> Motor:
+    def _measured(self, group: Any, motor: int) -> MotorState:
         profile = self._profile
 
         def value(register: str) -> int:
             address, size = profile.table[register]
             return signed(group.getData(motor, address, size), size)
 
-        return Motor(
+        return MotorState(
             current_a=value('present_current') * profile.current_a,
             velocity_rad_s=value('present_velocity') * profile.velocity_rad_s,
             position_rad=(value('present_position') - profile.zero) * profile.position_rad,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidParameter, TextureError
 from texture_core.plain_data import load_yaml
 from texture_core.resources import find_file
@@ -29,7 +29,7 @@ REGISTERS = (
     'present_velocity',
     'present_position',
 )
-WATCHDOG_UNIT_S, MOST_WATCHDOG = 0.02, 127  # the register counts by these
+WATCHDOG_UNIT_S, MAX_WATCHDOG = 0.02, 127  # the register counts by these
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
     for one in sets.values():
         for finger in (*one.hold, *one.slide):
             if finger not in fingers:
-                raise InvalidParameter(f'{where}: {unknown(finger, fingers, "finger")}')
+                raise InvalidParameter(f'{where}: {unknown_name(finger, fingers, "finger")}')
     scales = content['scales']
     profile = Profile(
         name=name,
@@ -142,10 +142,10 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
         watchdog_s=float(content.get('watchdog_s', Profile.watchdog_s)),
     )
     _check_models(profile, where)
-    if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MOST_WATCHDOG:
+    if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MAX_WATCHDOG:
         raise InvalidParameter(
             f'{where}: watchdog_s is {profile.watchdog_s:g} s; allowed are {WATCHDOG_UNIT_S:g} to '
-            f'{MOST_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors press on when nobody commands them'
+            f'{MAX_WATCHDOG * WATCHDOG_UNIT_S:g} s, and 0, with which the motors press on when nobody commands them'
         )
     if len(set(profile.ids)) != len(profile.ids):
         raise InvalidParameter(f'{where}: a motor is named twice; each has one place')
@@ -164,7 +164,7 @@ def _check_models(profile: Profile, where: str) -> None:
 def _joints(roles: Mapping[str, Any], where: str) -> dict[str, Joint]:
     for role in roles:
         if role not in ROLES:
-            raise InvalidParameter(f'{where}: {unknown(str(role), ROLES, "joint")}')
+            raise InvalidParameter(f'{where}: {unknown_name(str(role), ROLES, "joint")}')
     if 'press' not in roles:
         raise InvalidParameter(f"{where}: no motor for 'press'; every finger needs one")
     return {role: Joint(int(one['id']), float(one['lever_m'])) for role, one in roles.items()}

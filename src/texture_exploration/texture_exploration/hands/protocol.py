@@ -11,7 +11,7 @@ from texture_exploration.arms.protocol import ArmCommand, Vector
 
 @dataclass(frozen=True)
 class Fingertip:
-    """Where one fingertip is and what it feels, each in the frame of its own patch of the object; see `ArmState`."""
+    """Position, velocity and force of one fingertip, in the frame of its own patch of the object; see `ArmState`."""
 
     position: Vector
     velocity: Vector

@@ -10,7 +10,7 @@ from texture_core.exploration import ExplorationRequest
 from texture_exploration.arms.protocol import Vector
 from texture_exploration.motions.path import PathFollower, lead_m
 from texture_exploration.motions.protocol import Motion
-from texture_exploration.motions.slide_over import slide_over
+from texture_exploration.motions.surface_slide import plan_surface_slide
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -18,7 +18,7 @@ DEFAULTS = {'speed_m_s': 0.1, 'force_n': 1.0, 'radius_m': 0.02, 'turns': 2.0}  #
 
 
 @dataclass(frozen=True)
-class Circle:
+class CircularPath:
     """A circle, counter-clockwise as seen from above; `start_rad` is where on it the path begins."""
 
     radius_m: float
@@ -57,12 +57,12 @@ def circular(request: ExplorationRequest, home: Vector, touch: TouchParams, limi
     """
     request = limits.complete(request, DEFAULTS)
     _check_speed(request, limits)
-    _check_room(request, home, limits)
+    _check_free_distance(request, home, limits)
     radius, speed = request.radius_m, request.speed_m_s
     start = request.direction_rad - lead_m(speed, touch.ramp_s(speed)) / radius
     begin = (home[0] + radius * math.cos(start), home[1] + radius * math.sin(start), home[2])
-    follower = PathFollower(Circle(radius, request.turns, start), touch.arm_lag_s)
-    return slide_over(follower, request, begin, touch, limits)
+    follower = PathFollower(CircularPath(radius, request.turns, start), touch.arm_lag_s)
+    return plan_surface_slide(follower, request, begin, touch, limits)
 
 
 def _check_speed(request: ExplorationRequest, limits: SafetyLimits) -> None:
@@ -74,8 +74,8 @@ def _check_speed(request: ExplorationRequest, limits: SafetyLimits) -> None:
         )
 
 
-def _check_room(request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> None:
-    room = min(limits.room_m(home, quarter * 0.5 * math.pi) for quarter in range(4))
+def _check_free_distance(request: ExplorationRequest, home: Vector, limits: SafetyLimits) -> None:
+    room = min(limits.free_distance_m(home, quarter * 0.5 * math.pi) for quarter in range(4))
     if request.radius_m > room:
         raise MotionRefused(
             f'{request.motion}: radius_m is {request.radius_m:g}, which leaves the workspace; allowed from here is at '

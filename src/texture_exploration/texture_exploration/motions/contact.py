@@ -39,7 +39,7 @@ class ContactWatch:
         return self._lost_ns is None
 
     def restart(self) -> None:
-        """The finger was brought to the surface anew."""
+        """The finger was brought to the surface again."""
         self._lost_ns = None
 
     def update(self, arm: ArmState) -> None:

@@ -9,13 +9,13 @@ from texture_core.exploration import ExplorationRequest
 from texture_exploration.arms.protocol import ArmState, Vector
 from texture_exploration.motions.path import ramps_m
 from texture_exploration.motions.protocol import Motion
-from texture_exploration.motions.slide_over import slide_over
+from texture_exploration.motions.surface_slide import plan_surface_slide
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 # A stroke is about what a fingertip reaches; duration: Kaboli et al. 2015.
 DEFAULTS = {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0}
-TURN_MARGIN_S = 0.01  # a promise of steady speed ends one step before the turn
+TURN_MARGIN_S = 0.01  # steady speed is guaranteed until one step before the turn
 
 
 class Strokes:
@@ -110,11 +110,11 @@ def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParam
     turn_s = touch.ramp_s(2 * speed)
     _check_stroke(request, home, limits, least_m=ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s)
     strokes = Strokes(request.direction_rad, request.distance_m, speed, turn_s, speed * request.duration_s)
-    return slide_over(strokes, request, home, touch, limits)
+    return plan_surface_slide(strokes, request, home, touch, limits)
 
 
 def _check_stroke(request: ExplorationRequest, home: Vector, limits: SafetyLimits, least_m: float) -> None:
-    room = limits.room_m(home, request.direction_rad)
+    room = limits.free_distance_m(home, request.direction_rad)
     if not least_m <= request.distance_m <= room:
         raise MotionRefused(
             f'{request.motion}: distance_m, the length of a stroke, is {request.distance_m:g}; allowed is '

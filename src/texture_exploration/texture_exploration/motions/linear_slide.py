@@ -10,7 +10,7 @@ from texture_core.exploration import ExplorationRequest
 from texture_exploration.arms.protocol import Vector
 from texture_exploration.motions.path import PathFollower, ramps_m
 from texture_exploration.motions.protocol import Motion
-from texture_exploration.motions.slide_over import slide_over
+from texture_exploration.motions.surface_slide import plan_surface_slide
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -18,7 +18,7 @@ DEFAULTS = {'speed_m_s': 0.05, 'force_n': 1.0, 'distance_m': 0.1}
 
 
 @dataclass(frozen=True)
-class Line:
+class StraightPath:
     """A straight path."""
 
     length_m: float
@@ -42,14 +42,14 @@ def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, 
         If a number is out of its range, does not belong to this motion, or the path leaves the workspace.
     """
     request = limits.complete(request, DEFAULTS)
-    _check_room(request, home, touch, limits)
-    follower = PathFollower(Line(request.distance_m, request.direction_rad), touch.arm_lag_s)
-    return slide_over(follower, request, home, touch, limits)
+    _check_free_distance(request, home, touch, limits)
+    follower = PathFollower(StraightPath(request.distance_m, request.direction_rad), touch.arm_lag_s)
+    return plan_surface_slide(follower, request, home, touch, limits)
 
 
-def _check_room(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
+def _check_free_distance(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
     ramps = ramps_m(request.speed_m_s, touch.ramp_s(request.speed_m_s))
-    allowed = max(0.0, limits.room_m(home, request.direction_rad) - ramps)
+    allowed = max(0.0, limits.free_distance_m(home, request.direction_rad) - ramps)
     if request.distance_m > allowed:
         raise MotionRefused(
             f'{request.motion}: distance_m is {request.distance_m:g}, which with {ramps:.3f} m to gain and lose speed '

@@ -14,7 +14,7 @@ STEERING_1_S = 15.0  # sideways speed per distance from the path; a tenth of wha
 MAX_SIDEWAYS = 0.5  # share of the speed
 
 
-class Path(Protocol):
+class SurfacePath(Protocol):
     """A curve along the surface; `travelled_m` counts from where the finger begins to gain speed."""
 
     @property
@@ -63,7 +63,7 @@ class PathFollower:
         How long the arm takes to follow a command.
     """
 
-    def __init__(self, path: Path, arm_lag_s: float = 0.0) -> None:
+    def __init__(self, path: SurfacePath, arm_lag_s: float = 0.0) -> None:
         self.path = path
         self.length_m = path.length_m
         self.travelled_m = 0.0

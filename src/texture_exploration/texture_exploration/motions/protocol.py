@@ -16,7 +16,7 @@ from texture_exploration.safety import SafetyLimits
 class MotionStep:
     """What the arm shall do now, and how far the motion is.
 
-    `steady_s` promises that phase, speed and force hold so long from now; `direction_rad` is the direction of travel;
+    `steady_s` guarantees that phase, speed and force hold so long from now; `direction_rad` is the direction of travel;
     `progress` the share of the slide that is over.
     """
 
@@ -37,7 +37,7 @@ class Motion(Protocol):
         """Lift the finger along the normal and end as ABORTED, from any phase; the first reason counts."""
 
     def finish(self, reason: str) -> None:
-        """End the slide early, but no earlier than promised, and go on to DONE."""
+        """End the slide early, but not before the guaranteed time is over, and go on to DONE."""
 
     @property
     def force_n(self) -> float:

@@ -9,13 +9,13 @@ from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState
 from texture_exploration.motions.contact import ContactLost
 from texture_exploration.motions.protocol import MotionStep
-from texture_exploration.motions.stages import Slide, Stage
+from texture_exploration.motions.stages import SlideStage, Stage
 
 SEEKS = 3  # a surface that is lost more often is not one to slide on
 
 
 class StagedMotion:
-    """Go through the stages; on any trouble go to the last one, which lifts the finger.
+    """Go through the stages; on any error go to the last one, which lifts the finger.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ class StagedMotion:
     """
 
     def __init__(
-        self, stages: Sequence[Stage], slide: Slide, seek: Callable[[], Sequence[Stage]] | None = None
+        self, stages: Sequence[Stage], slide: SlideStage, seek: Callable[[], Sequence[Stage]] | None = None
     ) -> None:
-        self._ahead = list(stages)
+        self._remaining_stages = list(stages)
         self._lift = stages[-1]
         self._slide = slide
         self._seek = seek
@@ -44,8 +44,8 @@ class StagedMotion:
     def step(self, time_ns: int, arm: ArmState) -> MotionStep:
         """Return what to do now; a stage that is over hands on to the next within the same step."""
         command = self._try_stage(time_ns, arm)
-        while command is None and self._ahead:
-            self._stage = self._ahead.pop(0)
+        while command is None and self._remaining_stages:
+            self._stage = self._remaining_stages.pop(0)
             self._stage.begin(time_ns, arm)
             command = self._try_stage(time_ns, arm)
         if self._stage is None or command is None:
@@ -67,10 +67,10 @@ class StagedMotion:
             return
         self._abort_reason = self._abort_reason or reason
         if self._stage is not self._lift:
-            self._stage, self._ahead = None, [self._lift]
+            self._stage, self._remaining_stages = None, [self._lift]
 
     def finish(self, reason: str) -> None:
-        """End the slide as soon as what was promised is kept; without effect before and after it."""
+        """End the slide as soon as the guaranteed time is over; without effect before and after it."""
         if self._stage is self._slide and not self._finish_reason:
             self._finish_reason = reason
             self._slide.finish()
@@ -96,19 +96,19 @@ class StagedMotion:
                 raise MotionAborted(
                     f'waited {stage.timeout_s:.1f} s for {stage.goal}; the force is {arm.force_n:.2f} N'
                 )
-        except MotionAborted as trouble:
-            if not self._sought(trouble, stage):
-                self.abort(str(trouble))
+        except MotionAborted as error:
+            if not self._sought(error, stage):
+                self.abort(str(error))
             return None
         return command
 
-    def _sought(self, trouble: MotionAborted, stage: Stage) -> bool:
+    def _sought(self, error: MotionAborted, stage: Stage) -> bool:
         """Put the stages ahead that bring a lost contact back; return whether there are any."""
-        if self._seek is None or self._seeks >= SEEKS or not isinstance(trouble, ContactLost):
+        if self._seek is None or self._seeks >= SEEKS or not isinstance(error, ContactLost):
             return False
         if stage.phase is Phase.LIFT:  # the slide is over
             return False
         self._seeks += 1
         again = [stage] if stage is self._slide else []
-        self._stage, self._ahead = None, [*self._seek(), *again, *self._ahead]
+        self._stage, self._remaining_stages = None, [*self._seek(), *again, *self._remaining_stages]
         return True

@@ -15,7 +15,7 @@ from texture_exploration.safety import SafetyLimits
 
 NEAR_M = 0.0005
 PRESSING_S = 0.1  # from contact to the wanted force: a step would swing on a stiff surface
-PROMISE_S = 0.1  # the longest promise a slide gives; ending it early takes as long
+STEADY_HORIZON_S = 0.1  # the longest time for which a slide guarantees speed and force; ending it early takes as long
 
 
 class Stage:
@@ -51,7 +51,7 @@ class Stage:
         raise NotImplementedError
 
 
-class GoHome(Stage):
+class GoHomeStage(Stage):
     """Rise to the height of the start, then go above the surface to where the motion begins."""
 
     def __init__(self, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
@@ -72,13 +72,15 @@ class GoHome(Stage):
         self._free_n = min(self._free_n, arm.force_n)
         if arm.force_n - self._free_n > self._touch.contact_force_n:
             raise MotionAborted(f'the finger met something on the way to the start, {arm.force_n:.2f} N')
-        gentle = 0.5 * self._touch.acceleration_m_s2
-        speed = min(self._touch.travel_speed_m_s, math.sqrt(2 * gentle * distance), gentle * self.elapsed_s(time_ns))
+        gentle_m_s2 = 0.5 * self._touch.acceleration_m_s2
+        speed = min(
+            self._touch.travel_speed_m_s, math.sqrt(2 * gentle_m_s2 * distance), gentle_m_s2 * self.elapsed_s(time_ns)
+        )
         return ArmCommand(tangential_m_s=(speed * x / distance, speed * y / distance))
 
 
-class Approach(Stage):
-    """Come down until the finger feels the surface."""
+class ApproachStage(Stage):
+    """Come down until the force shows contact."""
 
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to meet the surface')
@@ -103,7 +105,7 @@ class Approach(Stage):
         return ArmCommand(normal_m_s=-self._speed_m_s)
 
 
-class Settle(Stage):
+class SettleForceStage(Stage):
     """Press gently harder, until the force has stayed within its tolerance for a while."""
 
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
@@ -129,7 +131,7 @@ class Settle(Stage):
         return ArmCommand(force_n=self._first_n + (self._force_n - self._first_n) * rise)
 
 
-class Accelerate(Stage):
+class AccelerateStage(Stage):
     """Gain speed smoothly along the path; over when the arm really has the speed and the force."""
 
     def __init__(
@@ -176,7 +178,7 @@ class Accelerate(Stage):
         return fast and abs(arm.force_n - self._force_n) <= 2 * self._touch.force_tolerance * self._force_n
 
 
-class Slide(Stage):
+class SlideStage(Stage):
     """Keep speed and force for the length of the path."""
 
     def __init__(
@@ -198,7 +200,7 @@ class Slide(Stage):
         # A slide begins within twice the tolerance, so a smaller share would refuse what was let in.
         self._mean_share = max(touch.mean_force_share, 2 * touch.force_tolerance)
         self._start_m: float | None = None
-        self._promised_ns = 0
+        self._steady_until_ns = 0
         self._finish = False
         self._force_sum_n = 0.0
         self._steps = 0
@@ -216,11 +218,11 @@ class Slide(Stage):
             self._start_m = self._follower.travelled_m
 
     def finish(self) -> None:
-        """End as soon as what was promised is kept."""
+        """End as soon as the guaranteed time is over."""
         self._finish = True
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Keep on sliding, and promise how long: nothing while the finger does not touch."""
+        """Keep on sliding, and update the guaranteed time: 0 while the finger does not touch."""
         self._follower.update(time_ns, arm)
         self.steady_s = 0.0
         self._contact.update(arm)
@@ -232,8 +234,8 @@ class Slide(Stage):
             self._check_mean_force()
             return None
         if self._contact.touching:
-            self.steady_s = min(PROMISE_S, left_s, self._follower.steady_m / self._speed_m_s)
-            self._promised_ns = max(self._promised_ns, time_ns + int(self.steady_s * 1e9))
+            self.steady_s = min(STEADY_HORIZON_S, left_s, self._follower.steady_m / self._speed_m_s)
+            self._steady_until_ns = max(self._steady_until_ns, time_ns + int(self.steady_s * 1e9))
         return ArmCommand(self._follower.velocity(self._speed_m_s), force_n=self.force_n)
 
     def _left_s(self, time_ns: int, arm: ArmState) -> float:
@@ -243,7 +245,7 @@ class Slide(Stage):
         length_m = self._follower.length_m
         self.progress = min(1.0, slid_m / length_m)
         by_length = (length_m - slid_m) / self._speed_m_s
-        return min(by_length, (self._promised_ns - time_ns) * 1e-9) if self._finish else by_length
+        return min(by_length, (self._steady_until_ns - time_ns) * 1e-9) if self._finish else by_length
 
     def _check_mean_force(self) -> None:
         mean_n = self._force_sum_n / self._steps
@@ -254,7 +256,7 @@ class Slide(Stage):
             )
 
 
-class Brake(Stage):
+class BrakeStage(Stage):
     """Lose speed smoothly along the path, still pressing: a finger that lifts at speed is plucked off.
 
     The slide itself is over: a surface that ends here costs nothing, and the finger only keeps its height. A contact
@@ -322,7 +324,7 @@ class Halt(Stage):
         return None if share >= 1.0 else ArmCommand(self._follower.velocity(self._speed_m_s * smooth(1.0 - share)))
 
 
-class Lift(Stage):
+class LiftStage(Stage):
     """Leave the surface along its normal, to the height of the start or at least by the clearance.
 
     The clearance counts from where the finger came free: a soft surface follows it for a while. A force that does not

@@ -25,9 +25,13 @@ LOOK_S = 0.1
 class ExplorePresetParams:
     """Which motions are made on what."""
 
-    preset: str = param('ets-linear', 'Preset that the package ships, or path of a preset file.')
-    surface: str = param('', 'True name of the surface, if known; it labels a recording.')
-    repeats: int = param(0, 'Rounds through all combinations; 0: as many as the preset says.', low=0, high=10000)
+    preset: str = param(
+        'ets-linear', 'Sets the preset that is explored: the name of a shipped one or the path of a file.'
+    )
+    surface: str = param('', 'Sets the true label of the surface if it is known; it labels the recording.')
+    repeats: int = param(
+        0, 'Sets the number of rounds through all combinations; 0 takes the number of the preset.', low=0, high=10000
+    )
 
 
 class ExplorePreset(Node):
@@ -39,37 +43,37 @@ class ExplorePreset(Node):
         preset = load_preset(params.preset)
         requests = preset.all(params.repeats)
         self.counts: Counter[str] = Counter(done=0, aborted=0, refused=0)
-        self._ahead = [replace(request, surface=params.surface) for request in requests]
-        self._total = len(self._ahead)
+        self._remaining = [replace(request, surface=params.surface) for request in requests]
+        self._total = len(self._remaining)
         self._busy = False
         self._on_end = on_end
         self._client = self.create_client(srv.Explore, 'explore')
-        self._timer = self.create_timer(LOOK_S, self._go_on)
+        self._timer = self.create_timer(LOOK_S, self._request_next)
         self.get_logger().info(f"preset '{preset.name}': {self._total} explorations; {preset.paper}")
 
-    def _go_on(self) -> None:
+    def _request_next(self) -> None:
         """Ask for the next one; until the explorer is there, look again later."""
         if self._busy or not self._client.service_is_ready():
             return
-        if not self._ahead:
+        if not self._remaining:
             self.get_logger().info(f'ended: {dict(self.counts)}')
             self._timer.cancel()
             self._on_end()
             return
         self._busy = True
-        request = request_to_msg(self._ahead.pop(0), srv.Explore.Request)
+        request = request_to_msg(self._remaining.pop(0), srv.Explore.Request)
         self._client.call_async(request).add_done_callback(self._on_answer)
 
     def _on_answer(self, future: Any) -> None:
         answer = future.result()
         kind = 'done' if answer.success else 'aborted' if answer.exploration_id else 'refused'
         self.counts[kind] += 1
-        number = self._total - len(self._ahead)
+        number = self._total - len(self._remaining)
         self.get_logger().info(f'{number} of {self._total}, {kind}: {answer.exploration_id} {answer.message}')
         self._busy = False
 
     @property
-    def all_well(self) -> bool:
+    def all_succeeded(self) -> bool:
         """Whether every exploration was made to its end."""
         return self.counts['done'] == self._total
 
@@ -83,4 +87,4 @@ def main() -> None:
         return nodes[0]
 
     run(make)
-    sys.exit(0 if nodes[0].all_well else 1)
+    sys.exit(0 if nodes[0].all_succeeded else 1)

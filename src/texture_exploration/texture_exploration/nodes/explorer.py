@@ -1,4 +1,4 @@
-"""Move the finger over the surface as asked, and say what was felt."""
+"""Move the finger over the surface on request, and return the estimates."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.parameters import param
 from texture_core.ros.conversions import from_msg, request_from_msg, to_msg
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare, on_change
 from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_core.ros.waiting_executor import WaitingExecutor
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.protocol import Rebootable
-from texture_exploration.estimates import CertaintyParams, Estimates
-from texture_exploration.exploration import Exploration, hear_nothing
+from texture_exploration.estimates import EarlyStoppingParams, ExplorationEstimates
+from texture_exploration.exploration import Exploration, no_signal_watch
+from texture_exploration.exploration_ids import ExplorationIds
 from texture_exploration.explorer import Explorer
-from texture_exploration.identity import Identities
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.signal_watch import SignalWatch, SignalWatchParams
@@ -47,7 +47,9 @@ RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds o
 class ArmParams:
     """Which arm carries the finger."""
 
-    arm: str = param('simulated', f"Name of the arm ({', '.join(ARMS)}), or 'module:Class' of your own.")
+    arm: str = param(
+        'simulated', "Sets the arm that carries the finger: a name of the catalogue, or 'module:Class' of your own."
+    )
 
 
 class ExplorerNode(Node):
@@ -55,11 +57,11 @@ class ExplorerNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
-        self._certainty = declare(self, CertaintyParams, changeable=True)
+        self._early_stopping = declare(self, EarlyStoppingParams, changeable=True)
         self._explorer = self._make_explorer()
         self._follow_parameters()
-        self._identities = Identities(np.random.default_rng())
-        self._open: dict[str, Estimates] = {}  # explorations whose caller still waits, by id
+        self._ids = ExplorationIds(np.random.default_rng())
+        self._open: dict[str, ExplorationEstimates] = {}  # explorations whose caller still waits, by id
         self._publishing = threading.Lock()
         self._closing = False
         self._states = self.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
@@ -88,7 +90,7 @@ class ExplorerNode(Node):
         """Lift the finger, let the arm go, leave nobody waiting."""
         self._closing = True
         for estimates in list(self._open.values()):
-            estimates.give_up()
+            estimates.cancel()
         self._explorer.close()
 
     def _make_explorer(self) -> Explorer:
@@ -96,7 +98,7 @@ class ExplorerNode(Node):
         arm = arm_class(declare(self, arm_class.Params))
         touch = declare(self, TouchParams, changeable=True)
         limits = declare(self, SafetyLimits, changeable=True)
-        explorer = Explorer(arm, touch, limits, self._on_state, silence=self._watch_signal())
+        explorer = Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
         try:
             explorer.connect()
         except DeviceError as error:
@@ -106,15 +108,15 @@ class ExplorerNode(Node):
     def _watch_signal(self) -> Callable[[int], str]:
         params = declare(self, SignalWatchParams)
         if not params.watch_signal:
-            return hear_nothing
+            return no_signal_watch
         watch = SignalWatch(params.signal_timeout_s, time.monotonic_ns)
         # The bytes as they come: what they say is the business of others.
-        self.create_subscription(msg.TactileSignal, 'signal', lambda _data: watch.heard(), SENSOR_QOS, raw=True)
-        return watch.silence
+        self.create_subscription(msg.TactileSignal, 'signal', lambda _data: watch.on_samples(), SENSOR_QOS, raw=True)
+        return watch.signal_fault
 
     def _follow_parameters(self) -> None:
         """Let changed parameters hold from the next exploration on; those of arm and sensor are fixed."""
-        on_change(self, CertaintyParams, partial(setattr, self, '_certainty'))
+        on_change(self, EarlyStoppingParams, partial(setattr, self, '_certainty'))
         on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
         on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))
 
@@ -122,7 +124,7 @@ class ExplorerNode(Node):
         return self._explore(request, response, lambda exploration: exploration.ended.wait())
 
     def _on_goal(self, goal: Any) -> action.Explore.Result:
-        result = self._explore(goal.request, action.Explore.Result(), partial(self._attend, goal))
+        result = self._explore(goal.request, action.Explore.Result(), partial(self._give_feedback, goal))
         if goal.is_cancel_requested:
             goal.canceled()
         elif result.success:
@@ -131,22 +133,22 @@ class ExplorerNode(Node):
             goal.abort()
         return result
 
-    def _explore(self, request: Any, result: Any, attend: Callable[[Exploration], None]) -> Any:
+    def _explore(self, request: Any, result: Any, wait: Callable[[Exploration], None]) -> Any:
         """Begin, attend to it until the finger is lifted, and fill the result of the service or the action."""
         try:
-            identity = self._identities.next(self.get_clock().now().nanoseconds)
-            exploration = self._explorer.begin(identity, request_from_msg(request))
+            exploration_id = self._ids.next(self.get_clock().now().nanoseconds)
+            exploration = self._explorer.begin(exploration_id, request_from_msg(request))
         except (MotionRefused, UnknownName, InvalidData) as error:
             result.message = str(error)
             # Their numbers are NaN, not the zeros that a new message holds.
-            nothing = Estimates('')
+            nothing = ExplorationEstimates('')
             result.texture, result.roughness = to_msg(nothing.texture), to_msg(nothing.roughness)
             self.get_logger().warning(f'refused: {error}')
             return result
-        estimates = self._open[exploration.exploration_id] = Estimates(exploration.exploration_id)
+        estimates = self._open[exploration.exploration_id] = ExplorationEstimates(exploration.exploration_id)
         try:
-            attend(exploration)
-            self._wait_for_last_word(exploration, estimates)
+            wait(exploration)
+            self._wait_for_final_estimates(exploration, estimates)
         finally:
             del self._open[exploration.exploration_id]
         result.success, result.message = exploration.outcome.success, exploration.outcome.message
@@ -156,8 +158,8 @@ class ExplorerNode(Node):
             self.get_logger().info(f'{exploration.exploration_id}: {result.message}')
         return result
 
-    def _attend(self, goal: Any, exploration: Exploration) -> None:
-        """Tell the client how it goes; stop when it no longer wants it."""
+    def _give_feedback(self, goal: Any, exploration: Exploration) -> None:
+        """Publish feedback to the client; stop when it cancels."""
         while not exploration.ended.wait(FEEDBACK_PERIOD_S):
             if goal.is_cancel_requested:
                 exploration.stop('cancelled by the client')
@@ -165,10 +167,10 @@ class ExplorerNode(Node):
             state = self._stamped(exploration.state)
             goal.publish_feedback(action.Explore.Feedback(state=to_msg(state), texture=to_msg(estimates.texture)))
 
-    def _wait_for_last_word(self, exploration: Exploration, estimates: Estimates) -> None:
+    def _wait_for_final_estimates(self, exploration: Exploration, estimates: ExplorationEstimates) -> None:
         if exploration.outcome.slid and not self._closing:
             kinds = [kind for kind in ('texture', 'roughness') if self.count_publishers(kind)]
-            estimates.wait_until_final(kinds, self._certainty.estimate_timeout_s)
+            estimates.wait_until_final(kinds, self._early_stopping.estimate_timeout_s)
 
     def _on_stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         stopped = self._explorer.stop('stopped on request')
@@ -201,9 +203,9 @@ class ExplorerNode(Node):
             return
         estimates.update(estimate)
         current = self._explorer.current
-        wanted = current is not None and current.request.stop_when_certain
+        wanted = current is not None and current.request.early_stopping
         ours = current is not None and current.exploration_id == estimate.exploration_id
-        if wanted and ours and isinstance(estimate, TextureEstimate) and self._certainty.certain(estimate):
+        if wanted and ours and isinstance(estimate, TextureEstimate) and self._early_stopping.may_stop(estimate):
             current.finish(
                 f"ended early: '{estimate.label}' is certain with {estimate.confidence:.2f} "
                 f'after {estimate.windows} windows'
@@ -231,18 +233,18 @@ class ExplorerNode(Node):
         age_ns = self._explorer.now_ns() - state.stamp_ns
         return replace(state, stamp_ns=self.get_clock().now().nanoseconds - age_ns)
 
-    def _report(self) -> Report:
-        current, trouble = self._explorer.current, self._explorer.trouble()
+    def _report(self) -> DiagnosticReport:
+        current, fault = self._explorer.current, self._explorer.fault()
         numbers = {
             'phase': current.state.phase.value if current else Phase.IDLE.value,
             'exploration': current.exploration_id if current else '',
-            'arm_trouble': trouble or 'none',
+            'arm_fault': fault or 'none',
             'arm_state_age_s': self._explorer.arm_age_s(),
             **self._explorer.counts,
             **{f'arm_{name}': count for name, count in self._explorer.arm_counts().items()},
         }
-        if trouble:
-            return 'ERROR', trouble, numbers
+        if fault:
+            return 'ERROR', fault, numbers
         warning = self._explorer.warning()
         return ('WARN', warning, numbers) if warning else ('OK', 'the arm answers', numbers)
 

@@ -15,7 +15,7 @@ from texture_features.feature import Windows
 from texture_features.spectra.line_spectrum import line_spectrum, without_force
 
 # A band is at least so wide: one beyond the lines takes part of the last.
-LEAST_LINES = 1e-3
+MIN_LINES = 1e-3
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class SpatialLevel:
         # Line n, from 0, stands for the stretch from n to n + 1; edges are in lines, too.
         edges = _edges_1_m(self) * (speed / hertz[0]) - 0.5
         low = np.minimum(np.maximum(edges[..., :-1, :], 0.0), len(hertz) - 1.0)
-        high = np.minimum(np.maximum(edges[..., 1:, :], low + LEAST_LINES), len(hertz))
+        high = np.minimum(np.maximum(edges[..., 1:, :], low + MIN_LINES), len(hertz))
         line = _numbers(len(hertz) + 1)
         inside = np.minimum(np.maximum(line, low), high)
         share = inside[..., 1:] - inside[..., :-1]

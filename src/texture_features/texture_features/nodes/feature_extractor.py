@@ -14,7 +14,7 @@ from texture_msgs import msg
 from texture_core.errors import TextureError
 from texture_core.parameters import param
 from texture_core.ros.conversions import from_msg, to_msg
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
@@ -73,7 +73,7 @@ class FeatureExtractor(Node):
             self._publisher.publish(vector)
             self._sent += 1
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         numbers = {**self._cutter.counts, 'broken_messages': self._broken}
         waiting = self._cutter.waiting_for
         if waiting:

@@ -17,7 +17,7 @@ REST_QUANTILE = 0.1
 # Means of 50 samples scatter by 20 %: the lowest tenth of them, rest being about half of all, ends at 0.8 of the mean.
 REST_OVER_QUANTILE = 1.25
 # Samples that do not change at all are no measure of the noise.
-LEAST_REST, TINY = 1e-9, 1e-300
+MIN_REST, TINY = 1e-9, 1e-300
 
 
 def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = SMOOTH_S) -> tuple[float, Array]:
@@ -59,7 +59,7 @@ def rest_power(powers: Array) -> Array:
     smooth[share < 0.5] = np.inf
     quiet = REST_OVER_QUANTILE * np.quantile(smooth, REST_QUANTILE, axis=0, method='lower')
     quiet[np.isinf(quiet)] = smooth.min(axis=0)[np.isinf(quiet)]
-    rest: Array = np.maximum(np.maximum(quiet, LEAST_REST * np.where(known, powers, 0.0).max(axis=0)), TINY)
+    rest: Array = np.maximum(np.maximum(quiet, MIN_REST * np.where(known, powers, 0.0).max(axis=0)), TINY)
     return rest
 
 

@@ -25,7 +25,7 @@ from texture_features.segmentation.cell_power import TINY, centred, passed_share
 # A change grows as the speed, and where waves rise towards the corner of a high-pass, faster.
 SENSES: Mapping[str, tuple[float, ...]] = {'force': (0.0,), 'change': (1.0, 1.5), 'either': (0.0, 0.5, 1.0, 1.5)}
 WINDOW_S, STEADY_WINDOW_S = 0.05, 0.25
-LEAST_STEADY = 8  # samples, for a spectrum
+MIN_STEADY = 8  # samples, for a spectrum
 HOPS_A_WINDOW, ONSETS_A_HOP = 5, 4
 # Windows that overlap tell much of the same: a Hann window weighs as much as two thirds of its length.
 NEW_IN_WINDOW = 1.5 / HOPS_A_WINDOW
@@ -42,7 +42,7 @@ POINTS = (np.arange(20) + 0.5) / 20
 POINT_WEIGHTS = np.sin(np.pi * POINTS) ** 4 / (np.sin(np.pi * POINTS) ** 4).sum()
 # One value in a hundred is of something else, of any power over nine decades (20 nats).
 ANYTHING = float(np.log(0.01 / 20))
-LEAST_POWER = 0.01  # of the noise
+MIN_POWER = 0.01  # of the noise
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class OnsetModel:
         step_s = hop / ONSETS_A_HOP / self.rate_hz
         onsets = np.arange(round(between_s[0] / step_s), round(between_s[1] / step_s) + 1)  # in steps
         starts = np.flatnonzero(_whole(known, length)[::hop])  # in hops
-        if not len(starts) or len(steady) < LEAST_STEADY:
+        if not len(starts) or len(steady) < MIN_STEADY:
             return float(onsets.mean()) * step_s
         vibration = vibration_of(around, self.rate_hz, self.smooth_s) / np.sqrt(self.rest)
         powers = _spectra(vibration[(starts * hop)[:, None] + np.arange(length)])
@@ -122,7 +122,7 @@ class OnsetModel:
         ways = (sensed[:, None, :, None] * squeezed).reshape(-1, len(SHARES), len(bins_hz))
         felt = np.einsum('wapf,p->waf', ways[:, at], POINT_WEIGHTS)
         rest = noise * passed_share(bins_hz, self.rate_hz, self.smooth_s)
-        expected: Array = np.maximum(self.rate_hz / 2 * (rest + felt), LEAST_POWER)
+        expected: Array = np.maximum(self.rate_hz / 2 * (rest + felt), MIN_POWER)
         return expected
 
     def _squeezed(self, frequency_hz: Array, texture: Array, bins_hz: AnyArray) -> Array:
@@ -170,6 +170,6 @@ def _hann(length: int) -> Array:
 
 def _fit(powers: Array, expected: Array) -> Array:
     """Return the log-likelihood of each window at each age, (n_ways, n_windows, n_ages)."""
-    ratio = np.maximum(powers, LEAST_POWER)[:, None, :] / expected[:, None]
+    ratio = np.maximum(powers, MIN_POWER)[:, None, :] / expected[:, None]
     fit: Array = np.maximum(np.log(ratio) - ratio, ANYTHING).sum(axis=-1)
     return fit

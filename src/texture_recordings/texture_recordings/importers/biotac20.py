@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from texture_core.arrays import AnyArray, Array
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.files import Arrays, open_regular
@@ -95,7 +95,7 @@ def import_biotac20(
         raise InvalidData(f"no files materialNN.npz in '{source}'; give the folder that holds them")
     for name in materials:
         if name not in files:
-            raise unknown(name, files, 'material')
+            raise unknown_name(name, files, 'material')
     wanted = parse_selection(slides)
     return [_import_material(files[name], Path(out) / name, wanted, channels) for name in (materials or list(files))]
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.arrays import AnyArray
-from texture_core.catalogue import unknown
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.files import Arrays, open_regular
 from texture_recordings.importers.steady_slides import SteadySlide, Stream, write_steady_slides
@@ -44,7 +44,7 @@ class SlideFile:
             found[place[0]].append((place[1], key))
         for name in surfaces:
             if name not in found:
-                raise unknown(name, found, 'surface')
+                raise unknown_name(name, found, 'surface')
         return [
             write_steady_slides(
                 Path(out) / name,

@@ -13,7 +13,7 @@ from rclpy.qos import QoSProfile
 
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.parameters import param
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
 from texture_recordings.bag_writer import BagWriter
@@ -106,7 +106,7 @@ class Record(Node):
         if self._error is not None:
             raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record anew")
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         faults = {
             'lost_samples': sum(self._continuity.lost.values()),
             'dropped_messages': self._counts['dropped'],

@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.parameters import param
 from texture_simulation.devices.biotac_encoder import VERSION, Bytes, Values, encode_replies, reply_frame, serials_frame
-from texture_simulation.devices.device import Device
+from texture_simulation.devices.device import EmulatedDevice
 
 SLOT_US = 1e6 / 4400
 FRAMES_PER_SERIALS = 100
@@ -21,16 +21,18 @@ WRONG_VERSION = 99
 class BoardFaults:
     """What goes wrong before the bridge's check sum is made."""
 
-    flip: float = param(0.0, 'Probability that one bit of a byte on the SPI bus is changed.', low=0.0, high=1.0)
+    flip: float = param(
+        0.0, 'Sets the probability that one bit of a byte on the SPI bus is changed.', low=0.0, high=1.0
+    )
 
 
-class EmulatedBioTac(Device):
+class EmulatedBioTac(EmulatedDevice):
     """An emulated bridge: `advance` it by the frames that have been sampled.
 
     Parameters
     ----------
     link, rng
-        See `Device`.
+        See `EmulatedDevice`.
     serials
         Serial number of the BioTac at each place, '' where there is none.
     """
@@ -45,11 +47,11 @@ class EmulatedBioTac(Device):
         self._frames = 0
 
     def reset(self) -> None:
-        """Begin the sequence numbers and the clock anew, as after a brown-out."""
+        """Begin the sequence numbers and the clock again, as after a brown-out."""
         super().reset()
         self._frames = 0
 
-    def pass_by(self, frames: int) -> None:
+    def skip(self, frames: int) -> None:
         """Let time pass without sending: frames are lost."""
         self._frames += frames
 

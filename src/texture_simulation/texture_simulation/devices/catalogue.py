@@ -10,11 +10,11 @@ import numpy as np
 
 from texture_simulation.devices.biotac import EmulatedBioTac
 from texture_simulation.devices.daq import EmulatedDaq
-from texture_simulation.devices.device import Device
+from texture_simulation.devices.device import EmulatedDevice
 from texture_simulation.devices.pvdf import EmulatedPvdf
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 
-DEVICES: Mapping[str, Callable[[Path, np.random.Generator], Device]] = {
+DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
     'tsf85': EmulatedTsf85,
     'tsf85_pair': EmulatedTsf85,
     'tsf85_3x4': EmulatedTsf85,

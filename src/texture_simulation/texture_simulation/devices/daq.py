@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_simulation.devices.sampler import Counts, EmulatedSampler, Sampled
+from texture_simulation.devices.sampler import Counts, EmulatedSampler, SampledStream
 
-STREAM = Sampled(kind=0x01, rate_hz=2500.0, columns=8, rows=10)  # 250 frames of 174 bytes a second
+STREAM = SampledStream(kind=0x01, rate_hz=2500.0, columns=8, rows=10)  # 250 frames of 174 bytes a second
 
 
 class EmulatedDaq(EmulatedSampler):
@@ -20,6 +20,6 @@ class EmulatedDaq(EmulatedSampler):
     ) -> None:
         super().__init__(link, rng, {'daq': replace(STREAM, rate_hz=rate_hz)}, start_us)
 
-    def feel(self, counts: Counts) -> None:
+    def sample(self, counts: Counts) -> None:
         """Take samples, (n_samples, 8)."""
         self.advance({'daq': counts})

@@ -10,7 +10,7 @@ from texture_simulation.devices.faults import ByteFaults, FrameFaults
 from texture_simulation.devices.pty_port import PtyPort
 
 
-class Device:
+class EmulatedDevice:
     """An emulated device on a pseudo-terminal.
 
     It has no clock of its own: each kind is told what has been sampled, and a caller of another pace than nominal makes
@@ -27,12 +27,12 @@ class Device:
     def __init__(self, link: Path, rng: np.random.Generator) -> None:
         self.faults = ByteFaults()  # bytes lost, added, changed
         self.frame_faults = FrameFaults()  # frames left out or sent twice
-        self.mute = False  # open but silent
+        self.silent = False  # open but silent
         self.stalled = False  # keeps what it samples, and sends it all at once when it goes on
         self.wrong_firmware = False  # sends what no driver knows
         self._port = PtyPort(link)
         self._rng = rng
-        self._kept = b''
+        self._held_back = b''
 
     @property
     def plugged(self) -> bool:
@@ -42,7 +42,7 @@ class Device:
     @property
     def streaming(self) -> bool:
         """Whether it sends."""
-        return self.plugged and not self.mute
+        return self.plugged and not self.silent
 
     @property
     def dropped_bytes(self) -> int:
@@ -59,12 +59,12 @@ class Device:
         self._port.unplug()
 
     def reset(self) -> None:
-        """Begin clock and numbers anew, as after a brown-out."""
-        self._kept = b''
+        """Begin clock and numbers again, as after a brown-out."""
+        self._held_back = b''
 
     def _send(self, data: bytes) -> None:
         if self.streaming:
-            self._kept += data
+            self._held_back += data
         if not self.stalled:
-            self._port.write(self.faults.apply(self._kept, self._rng))
-            self._kept = b''
+            self._port.write(self.faults.apply(self._held_back, self._rng))
+            self._held_back = b''

@@ -10,15 +10,22 @@ import struct
 import time
 from pathlib import Path
 
-from texture_simulation.devices.dynamixel_motors import ALERT, ERROR, PHYSICS_S, DynamixelMotors, Finger, leap_hand
-from texture_simulation.devices.robot_line import RobotLine
+from texture_simulation.devices.dynamixel_motors import (
+    ALERT,
+    ERROR,
+    PHYSICS_S,
+    DynamixelMotors,
+    FingerMotors,
+    leap_hand,
+)
+from texture_simulation.devices.serial_robot import EmulatedSerialRobot
 
 HEADER = b'\xff\xff\xfd\x00'
 PING, READ, WRITE, REBOOT, STATUS, SYNC_READ, SYNC_WRITE = 1, 2, 3, 8, 0x55, 0x82, 0x83
 UNDEFINED, CUT_SHORT = 2, 5  # errors of a status packet: instruction, length
 TURN_S = 0.002
 IDLE_S = 0.0005
-MOST_STEPS = 100
+MAX_STEPS = 100
 
 
 def crc16(data: bytes) -> int:
@@ -31,17 +38,17 @@ def crc16(data: bytes) -> int:
     return value
 
 
-class EmulatedDynamixelBus(RobotLine):
+class EmulatedDynamixelBus(EmulatedSerialRobot):
     """The motors on their bus.
 
     Parameters
     ----------
     link, finger_port
-        See `RobotLine`.
+        See `EmulatedSerialRobot`.
     motors
         On the bus.
     finger
-        Which one is reported to the bench.
+        Which one is reported to the emulator.
     latency_s
         What comes from the motors is kept back for so long, as by a USB adapter: 16 ms are the default of FTDI.
     """
@@ -50,7 +57,7 @@ class EmulatedDynamixelBus(RobotLine):
         self,
         link: Path,
         motors: DynamixelMotors,
-        finger: Finger | None = None,
+        finger: FingerMotors | None = None,
         finger_port: int = 0,
         latency_s: float = 0.0,
     ) -> None:
@@ -58,15 +65,15 @@ class EmulatedDynamixelBus(RobotLine):
         self.motors = motors
         self.latency_s = latency_s
         self._finger = finger
-        self._heard = b''
+        self._received = b''
 
     def run(self) -> None:
         """Answer what comes, and let the motors move."""
         due_s = time.monotonic()
         while not self.closing.is_set():
-            with self.using:
+            with self.port_lock:
                 data = self.port.read()
-                answers = self.hear(data)
+                answers = self.receive(data)
                 if answers:
                     self.closing.wait(self.latency_s)
                 self.port.write(answers)
@@ -75,26 +82,28 @@ class EmulatedDynamixelBus(RobotLine):
             steps = int((time.monotonic() - due_s) / PHYSICS_S)
             if steps * PHYSICS_S >= TURN_S:
                 due_s += steps * PHYSICS_S
-                self.motors.advance(min(steps, MOST_STEPS))
+                self.motors.advance(min(steps, MAX_STEPS))
                 if self._finger is not None:
-                    self.bench.send(self.motors.finger_state(self._finger, time.monotonic_ns()))
+                    self.emulator.send(self.motors.finger_state(self._finger, time.monotonic_ns()))
 
-    def hear(self, data: bytes) -> bytes:
+    def receive(self, data: bytes) -> bytes:
         """Return the answers to what came over the line."""
-        self._heard += data
+        self._received += data
         answers = b''
-        while (at := self._heard.find(HEADER)) >= 0 and len(self._heard) >= at + 7:
-            length = int.from_bytes(self._heard[at + 5 : at + 7], 'little')
-            packet = self._heard[at : at + 7 + length]
+        while (at := self._received.find(HEADER)) >= 0 and len(self._received) >= at + 7:
+            length = int.from_bytes(self._received[at + 5 : at + 7], 'little')
+            packet = self._received[at : at + 7 + length]
             if len(packet) < 7 + length:
                 break
-            self._heard = self._heard[at + 7 + length :]
+            self._received = self._received[at + 7 + length :]
             if crc16(packet[:-2]) == int.from_bytes(packet[-2:], 'little'):
-                self.motors.hear()
-                answers += self._obey(packet[4], packet[7], packet[8:-2].replace(b'\xff\xff\xfd\xfd', b'\xff\xff\xfd'))
+                self.motors.receive()
+                answers += self._execute(
+                    packet[4], packet[7], packet[8:-2].replace(b'\xff\xff\xfd\xfd', b'\xff\xff\xfd')
+                )
         return answers
 
-    def _obey(self, motor: int, instruction: int, params: bytes) -> bytes:
+    def _execute(self, motor: int, instruction: int, params: bytes) -> bytes:
         if instruction == SYNC_READ:
             address, size = struct.unpack_from('<HH', params)
             return self._sync_read(address, size, params[4:])
@@ -150,7 +159,7 @@ def main() -> None:
         'link', type=Path, nargs='?', default=Path('/tmp/texture/dynamixel'), help='device path to make'
     )
     options = parser.parse_args()
-    EmulatedDynamixelBus(options.link, leap_hand()).live()
+    EmulatedDynamixelBus(options.link, leap_hand()).serve_forever()
 
 
 if __name__ == '__main__':

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 
 ALERT, RANGE, LENGTH, LIMIT, ACCESS = 0x80, 4, 5, 6, 7  # errors of a status packet
 EEPROM_END = 64
@@ -22,7 +22,7 @@ MODE, CURRENT_LIMIT, SHUTDOWN = 11, 38, 63
 TORQUE, ERROR, P_GAIN, WATCHDOG, GOAL_CURRENT, GOAL_POSITION, PRESENT = 64, 70, 84, 98, 102, 116, 126
 PRESENT_END = 147  # of what is measured; none of it can be written
 GOALS = range(100, 104), range(104, 108), range(116, 120)  # PWM and current, velocity, position
-WATCHDOG_UNIT_S, MOST_WATCHDOG, TRIPPED = 0.02, 127, 0xFF
+WATCHDOG_UNIT_S, MAX_WATCHDOG, TRIPPED = 0.02, 127, 0xFF
 SHUTDOWN_BITS = 0x34  # as delivered: overload, electrical shock and overheating switch the torque off
 OVERLOAD = 1 << 5  # in Hardware Error Status and Shutdown
 POSITION_MODE, DEFAULT_P_GAIN = 3, 400
@@ -36,7 +36,7 @@ PHYSICS_S = 0.0005
 
 
 @dataclass(frozen=True)
-class Pressing:
+class PressingMotor:
     """A motor whose lever presses a fingertip on the object."""
 
     lever_m: float
@@ -44,7 +44,7 @@ class Pressing:
 
 
 @dataclass(frozen=True)
-class Finger:
+class FingerMotors:
     """The motors of a finger: what presses, and what moves the fingertip across and along the object, with levers."""
 
     press: int
@@ -56,13 +56,13 @@ class Finger:
 
 # Of a LEAP hand: each finger bends forward by the motor that presses.
 LEAP_IDS = range(16)
-LEAP_FINGERS: Mapping[str, Finger] = {
-    'index': Finger(1, 0, 2),
-    'middle': Finger(5, 4, 6),
-    'ring': Finger(9, 8, 10),
-    'thumb': Finger(13, 12, 14),
+LEAP_FINGERS: Mapping[str, FingerMotors] = {
+    'index': FingerMotors(1, 0, 2),
+    'middle': FingerMotors(5, 4, 6),
+    'ring': FingerMotors(9, 8, 10),
+    'thumb': FingerMotors(13, 12, 14),
 }
-LEAP_PRESSING = {finger.press: Pressing(0.09, 0.01) for finger in LEAP_FINGERS.values()}
+LEAP_PRESSING = {finger.press: PressingMotor(0.09, 0.01) for finger in LEAP_FINGERS.values()}
 
 
 class DynamixelMotors:
@@ -86,7 +86,7 @@ class DynamixelMotors:
     def __init__(
         self,
         ids: list[int],
-        pressing: Mapping[int, Pressing],
+        pressing: Mapping[int, PressingMotor],
         stiffness_n_m: float = 2000.0,
         model: int = XC330_M288,
         watchdog_stops: bool = True,
@@ -123,17 +123,17 @@ class DynamixelMotors:
         """Return how far a motor has turned since the start."""
         return float(self._angle[self.ids.index(motor)])
 
-    def finger_state(self, finger: Finger, time_ns: int) -> FingerState:
+    def finger_state(self, finger: FingerMotors, time_ns: int) -> FingerState:
         """Return where a fingertip is over the object, how fast, and how hard it presses."""
         press, across, along = (self.ids.index(motor) for motor in (finger.press, finger.across, finger.along))
-        ways, speeds = (
+        travels, speeds = (
             (values[across] * finger.across_m, values[along] * finger.along_m, values[press] * self._lever[press])
             for values in (self._angle.tolist(), self._speed.tolist())
         )
-        height_m = float(self._height[press]) - ways[2]
-        return FingerState(time_ns, *ways[:2], height_m, *speeds[:2], -speeds[2], self.forces_n[finger.press])
+        height_m = float(self._height[press]) - travels[2]
+        return FingerState(time_ns, *travels[:2], height_m, *speeds[:2], -speeds[2], self.forces_n[finger.press])
 
-    def hear(self) -> None:
+    def receive(self) -> None:
         """Take note of an instruction packet on the bus, whomever it is for: the Bus Watchdogs count from now."""
         self._silence_s = 0.0
 
@@ -149,7 +149,7 @@ class DynamixelMotors:
             table[TORQUE] = 0
 
     def reboot(self, motor: int) -> None:
-        """Start a motor anew, as by the instruction or after a dip of its supply: what is not in its EEPROM is lost."""
+        """Restart a motor, as by the instruction or after a dip of its supply: what is not in its EEPROM is lost."""
         self._starting_s[motor] = REBOOT_S
         self._clear_memory(motor)
 
@@ -207,7 +207,7 @@ class DynamixelMotors:
         self._silence_s += passed_s
         self._starting_s = {motor: left - passed_s for motor, left in self._starting_s.items() if left > passed_s}
         for table in self.tables.values():
-            armed = table[TORQUE] and 0 < table[WATCHDOG] <= MOST_WATCHDOG
+            armed = table[TORQUE] and 0 < table[WATCHDOG] <= MAX_WATCHDOG
             if armed and self._silence_s > table[WATCHDOG] * WATCHDOG_UNIT_S:
                 table[WATCHDOG] = TRIPPED
                 if self._watchdog_stops:

@@ -13,9 +13,9 @@ from texture_core.parameters import param
 class ByteFaults:
     """How likely each byte is to suffer."""
 
-    drop: float = param(0.0, 'Probability that a byte is lost.', low=0.0, high=1.0)
-    insert: float = param(0.0, 'Probability that a random byte is added before a byte.', low=0.0, high=1.0)
-    flip: float = param(0.0, 'Probability that one bit of a byte is changed.', low=0.0, high=1.0)
+    drop: float = param(0.0, 'Sets the probability that a byte is lost on the line.', low=0.0, high=1.0)
+    insert: float = param(0.0, 'Sets the probability that a random byte is inserted before a byte.', low=0.0, high=1.0)
+    flip: float = param(0.0, 'Sets the probability that one bit of a byte is changed.', low=0.0, high=1.0)
 
     def apply(self, data: bytes, rng: np.random.Generator) -> bytes:
         """Return what arrives of `data`."""
@@ -33,8 +33,8 @@ class ByteFaults:
 class FrameFaults:
     """What goes wrong with whole frames or packets."""
 
-    skip: float = param(0.0, 'Probability that a frame is made and not sent.', low=0.0, high=1.0)
-    duplicate: float = param(0.0, 'Probability that a frame is sent twice.', low=0.0, high=1.0)
+    skip: float = param(0.0, 'Sets the probability that a frame is numbered and not sent.', low=0.0, high=1.0)
+    duplicate: float = param(0.0, 'Sets the probability that a frame is sent twice.', low=0.0, high=1.0)
 
     def apply(self, frame: bytes, rng: np.random.Generator) -> bytes:
         """Return what is sent of a frame."""

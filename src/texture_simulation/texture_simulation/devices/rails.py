@@ -8,23 +8,23 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_core.finger import FingerState
+from texture_core.finger_state import FingerState
 from texture_simulation.devices.faults import ByteFaults
 from texture_simulation.devices.rails_firmware import RailsFirmware, RailsMachine
-from texture_simulation.devices.robot_line import RobotLine
+from texture_simulation.devices.serial_robot import EmulatedSerialRobot
 
 STEP_S = 0.0025
 STATE_STEPS = 4  # a state every 10 ms
-MOST_STEPS = 40  # in one go, after the machine was busy
+MAX_STEPS = 40  # in one go, after the machine was busy
 
 
-class EmulatedRails(RobotLine):
+class EmulatedRails(EmulatedSerialRobot):
     """The rails on their line.
 
     Parameters
     ----------
     link, finger_port
-        See `RobotLine`.
+        See `EmulatedSerialRobot`.
     machine
         The mechanics.
     rng
@@ -41,7 +41,7 @@ class EmulatedRails(RobotLine):
         super().__init__(link, finger_port)
         self.faults = ByteFaults()
         self.firmware = RailsFirmware(machine or RailsMachine())
-        self.mute = False
+        self.silent = False
         self._rng = rng or np.random.default_rng(0)
         self._steps = 0
 
@@ -51,9 +51,9 @@ class EmulatedRails(RobotLine):
         while not self.closing.wait(STEP_S):
             passed = int((time.monotonic() - due_s) / STEP_S)
             due_s += passed * STEP_S
-            with self.using:
-                self.firmware.hear(self.port.read())
-                for _ in range(min(passed, MOST_STEPS)):
+            with self.port_lock:
+                self.firmware.receive(self.port.read())
+                for _ in range(min(passed, MAX_STEPS)):
                     self._step()
 
     def _step(self) -> None:
@@ -62,21 +62,21 @@ class EmulatedRails(RobotLine):
         if self._steps % STATE_STEPS:
             return
         state = self.firmware.state()
-        if not self.mute:
+        if not self.silent:
             self.port.write(self.faults.apply(state, self._rng))
         x, y, z = self.firmware.position.tolist()
         vx, vy, vz = self.firmware.velocity.tolist()
         height, force = z - self.firmware.surface_m, self.firmware.force_n
-        self.bench.send(FingerState(time.monotonic_ns(), x, y, height, vx, vy, vz, force))
+        self.emulator.send(FingerState(time.monotonic_ns(), x, y, height, vx, vy, vz, force))
 
 
 def main() -> None:
     """Run the emulated rails until Ctrl-C, as in `python -m texture_simulation.devices.rails /tmp/texture/rails`."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument('link', type=Path, nargs='?', default=Path('/tmp/texture/rails'), help='device path to make')
-    parser.add_argument('--finger-port', type=int, default=0, help='UDP port of the emulated bench; 0: none')
+    parser.add_argument('--finger-port', type=int, default=0, help='UDP port of the emulator; 0: none')
     options = parser.parse_args()
-    EmulatedRails(options.link, finger_port=options.finger_port).live()
+    EmulatedRails(options.link, finger_port=options.finger_port).serve_forever()
 
 
 if __name__ == '__main__':

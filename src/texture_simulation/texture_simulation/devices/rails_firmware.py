@@ -31,14 +31,27 @@ LIFT_SPEED_M_S = 0.05
 class RailsMachine:
     """The mechanics, and what lies under the finger."""
 
-    start_height_m: float = param(0.01, 'Height of the finger at the start.', unit='m', low=0.0)
-    stiffness_n_m: float = param(2000.0, 'Stiffness of finger and surface.', unit='N/m', low=0.0)
-    travel_m: float = param(0.3, 'The end switches are so far from the start.', unit='m', low=0.01)
-    acceleration_m_s2: float = param(5.0, 'Of the steppers.', unit='m/s²', low=0.1)
-    xy_counts_m: float = param(200_000.0, 'Encoder counts per metre of the rails.', unit='1/m', low=1e3)
-    z_counts_m: float = param(1_000_000.0, 'The same, of the pressing motor.', unit='1/m', low=1e3)
-    overload_n: float = param(14.0, 'From this force on the firmware lifts the finger by itself.', unit='N', low=0.1)
-    stalled: bool = param(False, 'Something is in the way of the rails.')
+    start_height_m: float = param(
+        0.01, 'Sets the height of the finger above the surface at the start.', unit='m', low=0.0
+    )
+    stiffness_n_m: float = param(
+        2000.0, 'Sets the stiffness of finger and surface in contact; 0 removes the surface.', unit='N/m', low=0.0
+    )
+    travel_m: float = param(0.3, 'Sets the distance of the end switches from the start.', unit='m', low=0.01)
+    acceleration_m_s2: float = param(
+        5.0,
+        'Sets the acceleration of the stepper motors; a larger value reaches a commanded speed sooner.',
+        unit='m/s²',
+        low=0.1,
+    )
+    xy_counts_m: float = param(200_000.0, 'Sets the encoder counts per metre of the rails.', unit='1/m', low=1e3)
+    z_counts_m: float = param(
+        1_000_000.0, 'Sets the encoder counts per metre of the pressing motor.', unit='1/m', low=1e3
+    )
+    overload_n: float = param(
+        14.0, 'Sets the force above which the firmware lifts the finger by itself.', unit='N', low=0.1
+    )
+    stalled: bool = param(False, 'Blocks the rails mechanically, so that the encoders do not follow the motors.')
 
 
 class RailsFirmware:
@@ -54,26 +67,26 @@ class RailsFirmware:
         self._flags = 0
         self._wanted = np.zeros(2)
         self._mode, self._value = HOLD, 0.0
-        self._quiet_s = 0.0
+        self._silent_for_s = 0.0
         self._watching = False
-        self._heard = b''
+        self._received = b''
         self._sent = 0
         self._time_s = 0.0
 
     @property
     def force_n(self) -> float:
-        """What the force sensor feels."""
+        """Force on the force sensor, N."""
         return float(self.machine.stiffness_n_m * max(0.0, self.surface_m - self.position[2]))
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         """Obey the orders in what came over the line."""
-        *pieces, self._heard = (self._heard + data).split(b'\x00')
-        for piece in pieces:
-            content = _checked(piece)
+        *segments, self._received = (self._received + data).split(b'\x00')
+        for segment in segments:
+            content = _checked(segment)
             if content is None:
-                self.bad_frames += bool(piece)
+                self.bad_frames += bool(segment)
             else:
-                self._obey(content[0], content[10:])
+                self._execute(content[0], content[10:])
 
     def advance(self, dt_s: float) -> None:
         """Let time pass."""
@@ -96,8 +109,8 @@ class RailsFirmware:
         content = head + body
         return bytes(cobs.encode(content + struct.pack('<H', binascii.crc_hqx(content, 0xFFFF)))) + b'\x00'
 
-    def _obey(self, kind: int, body: bytes) -> None:
-        self._quiet_s = 0.0
+    def _execute(self, kind: int, body: bytes) -> None:
+        self._silent_for_s = 0.0
         if kind == 0xA2:
             self._flags &= ~(OVERLOAD | STALL)
         if kind in (0xA1, 0xA2) or self._flags & (OVERLOAD | STALL):
@@ -116,8 +129,8 @@ class RailsFirmware:
         self._mode, self._watching = HOLD, False
 
     def _watch(self, dt_s: float) -> None:
-        self._quiet_s += dt_s
-        if self._watching and self._quiet_s > WATCHDOG_S:
+        self._silent_for_s += dt_s
+        if self._watching and self._silent_for_s > WATCHDOG_S:
             self.watchdog_stops += 1
             self._halt()
 
@@ -153,11 +166,11 @@ class RailsFirmware:
         self.velocity[2] = (self.position[2] - before) / dt_s
 
 
-def _checked(piece: bytes) -> bytes | None:
+def _checked(segment: bytes) -> bytes | None:
     """Return a frame without its checksum, or None if it is damaged."""
     try:
-        content = bytes(cobs.decode(piece))
+        content = bytes(cobs.decode(segment))
     except cobs.DecodeError:
         return None
-    checked, told = content[:-2], content[-2:]
-    return checked if len(checked) >= 10 and struct.pack('<H', binascii.crc_hqx(checked, 0xFFFF)) == told else None
+    checked, checksum = content[:-2], content[-2:]
+    return checked if len(checked) >= 10 and struct.pack('<H', binascii.crc_hqx(checked, 0xFFFF)) == checksum else None

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_simulation.devices.biotac_encoder import stuff
-from texture_simulation.devices.device import Device
+from texture_simulation.devices.device import EmulatedDevice
 
 Counts = NDArray[np.int16]
 VERSION = 1
@@ -25,7 +25,7 @@ MICROSECONDS = 1_000_000
 
 
 @dataclass(frozen=True)
-class Sampled:
+class SampledStream:
     """One kind of frames that the device sends."""
 
     kind: int
@@ -34,34 +34,36 @@ class Sampled:
     rows: int  # in a frame
 
 
-class EmulatedSampler(Device):
+class EmulatedSampler(EmulatedDevice):
     """An emulated device: `advance` it by what has been sampled.
 
     Parameters
     ----------
     link, rng
-        See `Device`.
+        See `EmulatedDevice`.
     streams
         What it samples, by a name of our own.
     start_us
         Its clock when plugged in.
     """
 
-    def __init__(self, link: Path, rng: np.random.Generator, streams: Mapping[str, Sampled], start_us: int = 0) -> None:
+    def __init__(
+        self, link: Path, rng: np.random.Generator, streams: Mapping[str, SampledStream], start_us: int = 0
+    ) -> None:
         super().__init__(link, rng)
         self._start_us = start_us
         self._streams = streams
         self.reset()
 
     def reset(self) -> None:
-        """Begin numbers and clock anew, as after a brown-out."""
+        """Begin numbers and clock again, as after a brown-out."""
         super().reset()
         self._frames = dict.fromkeys(self._streams, 0)
         self._waiting: dict[str, Counts] = {
             name: np.empty((0, stream.columns), dtype=np.int16) for name, stream in self._streams.items()
         }
 
-    def pass_by(self, duration_s: float) -> None:
+    def skip(self, duration_s: float) -> None:
         """Let time pass without sending: whole frames are lost."""
         for name, stream in self._streams.items():
             self._frames[name] += round(duration_s * stream.rate_hz / stream.rows)
@@ -92,7 +94,7 @@ class EmulatedSampler(Device):
         return self.frame_faults.apply(data, self._rng)
 
 
-def encode(stream: Sampled, number: int, time_us: int, counts: Counts, version: int = VERSION) -> bytes:
+def encode(stream: SampledStream, number: int, time_us: int, counts: Counts, version: int = VERSION) -> bytes:
     """Return a frame on the wire; number and time wrap."""
     rows, columns = counts.shape
     content = struct.pack('<BBHIBB', stream.kind, version, number % 2**16, time_us % 2**32, rows, columns)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_simulation.devices.device import Device
+from texture_simulation.devices.device import EmulatedDevice
 from texture_simulation.devices.faults import FrameFaults
 from texture_simulation.devices.tsf85_encoder import TAXELS, Counts, Image, Tsf85Encoder
 
@@ -16,13 +16,13 @@ KEPT_BYTES = 4  # of an incomplete command
 UNKNOWN_ITEM = b'\x80'  # no type that any firmware known sends
 
 
-class EmulatedTsf85(Device):
+class EmulatedTsf85(EmulatedDevice):
     """An emulated sensor: `advance` it by the milliseconds that have passed.
 
     Parameters
     ----------
     link, rng
-        See `Device`.
+        See `EmulatedDevice`.
     finger, long_stamps
         See `Tsf85Encoder`.
     """
@@ -30,9 +30,9 @@ class EmulatedTsf85(Device):
     def __init__(self, link: Path, rng: np.random.Generator, finger: int = 0, long_stamps: bool = True) -> None:
         super().__init__(link, rng)
         self.started = False
-        self.deaf_starts = 0  # so many start commands to come do not help, as after an unclean end
+        self.ignored_starts = 0  # so many start commands to come do not help, as after an unclean end
         self._encoder = Tsf85Encoder(finger, long_stamps)
-        self._heard = b''
+        self._received = b''
         self._clock_ms = 0
         self._image: Image = np.zeros(TAXELS, dtype=np.uint16)
         self._image_is_new = False
@@ -43,7 +43,7 @@ class EmulatedTsf85(Device):
         return super().streaming and self.started
 
     def reset(self) -> None:
-        """Begin the clock anew, silent until started, as after a brown-out."""
+        """Begin the clock again, silent until started, as after a brown-out."""
         super().reset()
         self._clock_ms = 0
         self.started = False
@@ -57,16 +57,16 @@ class EmulatedTsf85(Device):
         images : (n_images, n_taxels) or (n_images, 2, n_taxels)
             New ones; the last is in force from the first of these milliseconds on.
         """
-        self._obey(self._port.read())
+        self._execute(self._port.read())
         if len(images):
             self._image, self._image_is_new = images[-1], True
         data = b''
         if self.streaming:
             data, self._image_is_new = self._sent(dynamic), False
         self._send(data)
-        self.pass_by(len(dynamic))
+        self.skip(len(dynamic))
 
-    def pass_by(self, milliseconds: int) -> None:
+    def skip(self, milliseconds: int) -> None:
         """Let time pass of which nothing is sent."""
         self._clock_ms += milliseconds
 
@@ -78,10 +78,10 @@ class EmulatedTsf85(Device):
             return b''.join(packets)
         return b''.join(self.frame_faults.apply(packet, self._rng) for packet in packets)
 
-    def _obey(self, data: bytes) -> None:
-        heard = self._heard + data
-        for command in AUTOSEND.finditer(heard):
+    def _execute(self, data: bytes) -> None:
+        received = self._received + data
+        for command in AUTOSEND.finditer(received):
             is_start = command.group(1) != b'\x00'
-            self.started = is_start and not self.deaf_starts
-            self.deaf_starts -= is_start and self.deaf_starts > 0
-        self._heard = heard[-KEPT_BYTES:] if data else self._heard
+            self.started = is_start and not self.ignored_starts
+            self.ignored_starts -= is_start and self.ignored_starts > 0
+        self._received = received[-KEPT_BYTES:] if data else self._received

@@ -24,12 +24,12 @@ RESTING_ROTATION = bytes(6)
 
 
 class Tsf85Encoder:
-    """Make the packets of consecutive milliseconds; a finger that does not feel and the inertial sensors rest.
+    """Make the packets of consecutive milliseconds; a finger that does not sense and the inertial sensors rest.
 
     Parameters
     ----------
     finger
-        The finger that feels, 0 or 1.
+        The finger that senses, 0 or 1.
     long_stamps
         64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
     stamped
@@ -64,7 +64,7 @@ class Tsf85Encoder:
         first_ms
             The device's clock at the first of them.
         dynamic : (n,) or (n, 2)
-            Of the finger that feels, or of both.
+            Of the finger that senses, or of both.
         image : (n_taxels,) or (2, n_taxels)
             The same.
         image_is_new
@@ -84,7 +84,7 @@ class Tsf85Encoder:
             yield row.tobytes()
 
     def _by_finger(self, values: NDArray[Any]) -> Iterator[tuple[int, NDArray[Any]]]:
-        """Yield finger and values of each that feels, (n,) or (2, n)."""
+        """Yield finger and values of each that senses, (n,) or (2, n)."""
         yield from [(self._finger, values)] if values.ndim == 1 else enumerate(values)
 
 

@@ -8,20 +8,25 @@ import numpy as np
 
 from texture_core.arrays import Samples
 from texture_core.parameters import param
-from texture_simulation.effects.stages import Scans, ThroughSignal
+from texture_simulation.effects.protocols import BatchShape, SignalFilter
 
 
 @dataclass(frozen=True)
 class Drift:
     """Each channel wanders at random (a Wiener process)."""
 
-    count_per_sqrt_s: float = param(20.0, 'Standard deviation after a second.', unit='count', low=0.0)
+    count_per_sqrt_s: float = param(
+        20.0,
+        'Sets the standard deviation of the random walk after one second; a larger value drifts faster.',
+        unit='count',
+        low=0.0,
+    )
 
     def start_signal(
-        self, rng: np.random.Generator, rate_hz: float, scans: Scans, channels: int, *, slow: bool
-    ) -> ThroughSignal:
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
         """Return what adds the drift."""
-        at = np.zeros((*scans, 1, channels))
+        at = np.zeros((*batch_shape, 1, channels))
         step = self.count_per_sqrt_s / np.sqrt(rate_hz)
 
         def add(samples: Samples) -> Samples:

@@ -8,7 +8,7 @@ import numpy as np
 
 from texture_core.arrays import Samples
 from texture_core.parameters import param
-from texture_simulation.effects.stages import Scans, ThroughSignal
+from texture_simulation.effects.protocols import BatchShape, SignalFilter
 
 
 @dataclass(frozen=True)
@@ -18,16 +18,20 @@ class Dropouts:
     Samples that are missing altogether are a fault of the line: see `devices/faults.py`.
     """
 
-    per_s: float = param(0.5, 'How often it happens.', unit='1/s', low=0.0, high=100.0)
-    length_s: float = param(0.02, 'For how long.', unit='s', low=1e-3, high=1.0)
+    per_s: float = param(
+        0.5, 'Sets how often a dropout occurs; a higher rate gives more dropouts.', unit='1/s', low=0.0, high=100.0
+    )
+    length_s: float = param(
+        0.02, 'Sets how long a dropout lasts; the last good sample is repeated during it.', unit='s', low=1e-3, high=1.0
+    )
 
     def start_signal(
-        self, rng: np.random.Generator, rate_hz: float, scans: Scans, channels: int, *, slow: bool
-    ) -> ThroughSignal:
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
         """Return what holds the samples."""
         length = max(1, round(self.length_s * rate_hz))
-        held = np.zeros((*scans, 1, channels))  # the last good sample
-        left = np.zeros(scans, dtype=np.intp)  # samples that are still to be held
+        held = np.zeros((*batch_shape, 1, channels))  # the last good sample
+        left = np.zeros(batch_shape, dtype=np.intp)  # samples that are still to be held
 
         def hold(samples: Samples) -> Samples:
             nonlocal held, left
@@ -35,7 +39,7 @@ class Dropouts:
             if not count:
                 return samples
             number = np.arange(count)
-            begins = rng.random((*scans, count)) < self.per_s / rate_hz
+            begins = rng.random((*batch_shape, count)) < self.per_s / rate_hz
             last = np.maximum.accumulate(np.where(begins, number, left[..., None] - length - 1), axis=-1)
             bad = number - last < length
             source = np.maximum.accumulate(np.where(bad, -1, number), axis=-1)

@@ -8,17 +8,19 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_simulation.path import Path
+from texture_simulation.trajectory import Trajectory
 
 SALT = 41  # so that the gain of a finger is drawn apart from its other traits
 
 
 @dataclass(frozen=True)
 class FingerSpread:
-    """Each individual of the sensor feels textures by a factor of its own more or less strongly."""
+    """Each individual of the sensor senses textures by a factor of its own more or less strongly."""
 
-    relative: float = param(0.1, 'Relative spread from finger to finger.', low=0.0, high=0.5)
+    relative: float = param(
+        0.1, 'Sets the relative spread of the sensitivity from finger to finger.', low=0.0, high=0.5
+    )
 
-    def gain(self, path: Path, finger: int) -> Array | float:
+    def gain(self, path: Trajectory, finger: int) -> Array | float:
         """Return the factor of a finger."""
         return float(np.exp(self.relative * np.random.default_rng([SALT, finger]).standard_normal()))

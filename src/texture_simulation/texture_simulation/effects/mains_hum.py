@@ -8,7 +8,7 @@ import numpy as np
 
 from texture_core.arrays import Samples
 from texture_core.parameters import param
-from texture_simulation.effects.stages import Scans, ThroughSignal
+from texture_simulation.effects.protocols import BatchShape, SignalFilter
 
 THIRD = 0.3  # of the fundamental; rectifiers draw odd harmonics
 
@@ -17,14 +17,16 @@ THIRD = 0.3  # of the fundamental; rectifiers draw odd harmonics
 class MainsHum:
     """A sine of the mains' frequency, and its third harmonic, on all channels alike."""
 
-    rms_count: float = param(20.0, 'Root mean square of the fundamental.', unit='count', low=0.0)
-    mains_hz: float = param(50.0, 'Frequency of the mains.', unit='Hz', low=40.0, high=70.0)
+    rms_count: float = param(
+        20.0, 'Sets the root mean square of the fundamental; a larger value gives more hum.', unit='count', low=0.0
+    )
+    mains_hz: float = param(50.0, 'Sets the frequency of the mains, 50 or 60 Hz.', unit='Hz', low=40.0, high=70.0)
 
     def start_signal(
-        self, rng: np.random.Generator, rate_hz: float, scans: Scans, channels: int, *, slow: bool
-    ) -> ThroughSignal:
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
         """Return what adds the hum; its phase is another in each slide."""
-        phase = rng.uniform(0, 2 * np.pi, (*scans, 1))
+        phase = rng.uniform(0, 2 * np.pi, (*batch_shape, 1))
         turn, done = 2 * np.pi * self.mains_hz / rate_hz, 0
 
         def add(samples: Samples) -> Samples:

@@ -8,18 +8,18 @@ import numpy as np
 
 from texture_core.arrays import Samples
 from texture_core.parameters import param
-from texture_simulation.effects.stages import Scans, ThroughSignal
+from texture_simulation.effects.protocols import BatchShape, SignalFilter
 
 
 @dataclass(frozen=True)
 class Quantisation:
     """Samples come in steps of several counts; steps of one count are always there."""
 
-    step_count: float = param(16.0, 'Height of a step.', unit='count', low=1.0)
+    step_count: float = param(16.0, 'Sets the quantisation step; a larger step is coarser.', unit='count', low=1.0)
 
     def start_signal(
-        self, rng: np.random.Generator, rate_hz: float, scans: Scans, channels: int, *, slow: bool
-    ) -> ThroughSignal:
+        self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
+    ) -> SignalFilter:
         """Return what rounds the samples."""
         return self._round
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_simulation.effects.stages import Scans, ThroughPath
-from texture_simulation.path import Path
+from texture_simulation.effects.protocols import BatchShape, TrajectoryFilter
+from texture_simulation.trajectory import Trajectory
 
 CATCH_UP_S = 4e-3  # time constant of the jump
 FORGOTTEN = 8.0  # time constants after which nothing of a skid is left
@@ -23,20 +23,26 @@ class Skids:
     A cheap stand-in for stick-slip, for slides of which some went wrong.
     """
 
-    per_s: float = param(0.5, 'How often it happens.', unit='1/s', low=0.0, high=20.0)
-    length_s: float = param(0.05, 'For how long the skin sticks.', unit='s', low=1e-3, high=1.0)
+    per_s: float = param(
+        0.5,
+        'Sets how often the skin sticks and jumps; a higher rate disturbs more slides.',
+        unit='1/s',
+        low=0.0,
+        high=20.0,
+    )
+    length_s: float = param(0.05, 'Sets how long the skin sticks before it jumps.', unit='s', low=1e-3, high=1.0)
 
-    def start_path(self, rng: np.random.Generator, rate_hz: float, scans: Scans) -> ThroughPath:
+    def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
         """Return what lets the skin lag behind the finger."""
         length, kept = max(1, round(self.length_s * rate_hz)), math.exp(-1 / (CATCH_UP_S * rate_hz))
-        since = np.full(scans, 10**9)  # points since the last skid began
-        held = [np.zeros(scans), np.zeros(scans)]  # where
+        since = np.full(batch_shape, 10**9)  # points since the last skid began
+        held = [np.zeros(batch_shape), np.zeros(batch_shape)]  # where
         farthest = length + FORGOTTEN * CATCH_UP_S * rate_hz
 
-        def lag(path: Path) -> Path:
+        def lag(path: Trajectory) -> Trajectory:
             nonlocal since
             count = len(path)
-            begins = rng.random((*scans, count)) < self.per_s / rate_hz * (path.force_n > 0)
+            begins = rng.random((*batch_shape, count)) < self.per_s / rate_hz * (path.force_n > 0)
             if not begins.any() and not (since < farthest).any():
                 since = since + count
                 return path
@@ -51,7 +57,7 @@ class Skids:
                 began = np.take_along_axis(place, np.maximum(end, 0)[..., None], axis=-1)[..., 0]
                 held[i] = np.where(end >= 0, began, held[i])
             since = age[..., -1] + 1
-            return Path(skin[0], skin[1], path.force_n)
+            return Trajectory(skin[0], skin[1], path.force_n)
 
         return lag
 

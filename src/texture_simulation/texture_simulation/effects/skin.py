@@ -9,9 +9,9 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_simulation.effects.stages import Scans, ThroughForce
+from texture_simulation.effects.protocols import BatchShape, ForceFilter
 from texture_simulation.filters import Filter
-from texture_simulation.path import Path
+from texture_simulation.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -22,14 +22,21 @@ class Skin:
     stable, and exact at the resonance.
     """
 
-    resonance_hz: float = param(200.0, '√(k/m) / 2π.', unit='Hz', low=1.0, high=400.0)
-    damping: float = param(0.3, 'd / (2·√(k·m)); 1 is critical.', low=0.01, high=10.0)
+    resonance_hz: float = param(
+        200.0, 'Sets the resonance frequency of the skin, √(k/m) / 2π.', unit='Hz', low=1.0, high=400.0
+    )
+    damping: float = param(
+        0.3,
+        'Sets the damping ratio d / (2·√(k·m)); 1 is critical damping, a larger value is slower.',
+        low=0.01,
+        high=10.0,
+    )
 
-    def start_force(self, rng: np.random.Generator, rate_hz: float, scans: Scans) -> ThroughForce:
+    def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
         """Return what filters the variation."""
         skin = Filter(self.sections(rate_hz))
 
-        def through(path: Path, variation_n: Array) -> Array:
+        def through(path: Trajectory, variation_n: Array) -> Array:
             return skin(variation_n)
 
         return through

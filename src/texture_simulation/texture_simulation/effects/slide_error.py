@@ -9,19 +9,23 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 
-LEAST_SHARE = 0.05  # of what was wanted
+MIN_SHARE = 0.05  # of what was wanted
 
 
 @dataclass(frozen=True)
 class SlideError:
     """Speed and force deviate from slide to slide (offline recordings; a simulated arm has errors of its own)."""
 
-    speed: float = param(0.01, 'Relative deviation of the speed.', low=0.0, high=0.5)
-    force: float = param(0.04, 'Relative deviation of the force.', low=0.0, high=0.5)
+    speed: float = param(
+        0.01, 'Sets the relative standard deviation of the speed from slide to slide.', low=0.0, high=0.5
+    )
+    force: float = param(
+        0.04, 'Sets the relative standard deviation of the force from slide to slide.', low=0.0, high=0.5
+    )
 
     def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Return speed and force as they become, of the same shape."""
         return (
-            speed_m_s * np.maximum(LEAST_SHARE, 1 + self.speed * rng.standard_normal(speed_m_s.shape)),
-            force_n * np.maximum(LEAST_SHARE, 1 + self.force * rng.standard_normal(force_n.shape)),
+            speed_m_s * np.maximum(MIN_SHARE, 1 + self.speed * rng.standard_normal(speed_m_s.shape)),
+            force_n * np.maximum(MIN_SHARE, 1 + self.force * rng.standard_normal(force_n.shape)),
         )

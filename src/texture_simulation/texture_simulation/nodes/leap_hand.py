@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.node import Node
 
 from texture_core.parameters import param
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
 from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
@@ -19,12 +19,22 @@ from texture_simulation.devices.dynamixel_motors import LEAP_FINGERS, leap_hand
 
 @dataclass(frozen=True)
 class LeapHandParams:
-    """Where the motors are reached, what they hold, and which finger feels it."""
+    """Where the motors are reached, what they hold, and which finger senses it."""
 
-    link: str = param('/tmp/texture/dynamixel', 'Symbolic link to create; the device path for the arm.')
-    finger: str = param('index', 'Finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
-    finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
-    stiffness_n_m: float = param(2000.0, 'Stiffness of fingertip and object; 0: there is none.', unit='N/m', low=0.0)
+    link: str = param(
+        '/tmp/texture/dynamixel',
+        'Sets the path of the symbolic link to the emulated hand, which is the device path of the arm.',
+    )
+    finger: str = param('index', 'Sets the finger that carries the tactile sensor.', choices=tuple(LEAP_FINGERS))
+    finger_port: int = param(
+        0,
+        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        low=0,
+        high=65535,
+    )
+    stiffness_n_m: float = param(
+        2000.0, 'Sets the stiffness of fingertip and object in contact; 0 removes the object.', unit='N/m', low=0.0
+    )
 
 
 class LeapHandNode(Node):
@@ -40,13 +50,13 @@ class LeapHandNode(Node):
             EmulatedDynamixelBus(Path(params.link).expanduser(), motors, finger, params.finger_port)
         )
         Diagnostics(self, self._report, hardware_id=params.link)
-        self.get_logger().info(f'an emulated LEAP hand is at {params.link}; its {params.finger} finger feels')
+        self.get_logger().info(f'an emulated LEAP hand is at {params.link}; its {params.finger} finger senses')
 
     def shutdown(self) -> None:
         """Unplug it."""
         self._open.close()
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         if not self._bus.running:
             return 'ERROR', 'the emulated hand ended; see the log and start the node again', {}
         return 'OK', 'the emulated hand runs', {}

@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.node import Node
 
 from texture_core.parameters import param
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
 from texture_simulation.devices.rails import EmulatedRails
@@ -18,11 +18,19 @@ from texture_simulation.devices.rails_firmware import RailsMachine
 
 
 @dataclass(frozen=True)
-class LinkParams:
+class RailsLinkParams:
     """Where the rails are reached, and whom they tell where the finger is."""
 
-    link: str = param('/tmp/texture/rails', 'Symbolic link to create; the device path for the arm.')
-    finger_port: int = param(0, 'UDP port of the emulated bench on loopback; 0: none.', low=0, high=65535)
+    link: str = param(
+        '/tmp/texture/rails',
+        'Sets the path of the symbolic link to the emulated rails, which is the device path of the arm.',
+    )
+    finger_port: int = param(
+        0,
+        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        low=0,
+        high=65535,
+    )
 
 
 class RailsNode(Node):
@@ -30,7 +38,7 @@ class RailsNode(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('rails', **kwargs)
-        params = declare(self, LinkParams)
+        params = declare(self, RailsLinkParams)
         machine = declare(self, RailsMachine)
         self._open = ExitStack()
         self._rails = self._open.enter_context(
@@ -43,7 +51,7 @@ class RailsNode(Node):
         """Unplug them."""
         self._open.close()
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         firmware = self._rails.firmware
         numbers = {'watchdog stops': firmware.watchdog_stops, 'bad frames': firmware.bad_frames}
         if not self._rails.running:

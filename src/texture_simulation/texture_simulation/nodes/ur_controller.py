@@ -6,7 +6,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from texture_core.ros.diagnostics import Diagnostics, Report
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
 from texture_simulation.devices.ur.params import UrControllerParams
@@ -28,7 +28,7 @@ class UrControllerNode(Node):
         """End the process."""
         self._controller.stop()
 
-    def _report(self) -> Report:
+    def _report(self) -> DiagnosticReport:
         if not self._controller.running:
             return 'ERROR', 'the emulated controller ended; see its log and start the node again', {}
         return 'OK', 'the emulated controller runs', {}

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Samples
-from texture_simulation.effects.stages import Scans, SignalEffect
+from texture_simulation.effects.protocols import BatchShape, SignalEffect
 from texture_simulation.scene import Scene
 
 Integer = TypeVar('Integer', bound=np.integer[Any])
@@ -43,22 +43,23 @@ class Converter:
         channels: int,
         limits: tuple[int, int],
         *,
-        scans: Scans,
+        batch_shape: BatchShape,
         slow: bool = False,
         scale: float = 1.0,
     ) -> None:
         self._limits = limits
         self._scale = scale
-        self._through = [
-            effect.start_signal(rng, rate_hz, scans, channels, slow=slow) for effect in scene.effects_of(SignalEffect)
+        self._filters = [
+            effect.start_signal(rng, rate_hz, batch_shape, channels, slow=slow)
+            for effect in scene.effects_of(SignalEffect)
         ]
 
     def exact(self, counts: Samples) -> Samples:
         """Return the next samples, (..., n_samples, n_channels), with the effects, clipped and whole."""
-        if self._through:
+        if self._filters:
             counts = counts / self._scale
-            for through in self._through:
-                counts = through(counts)
+            for apply in self._filters:
+                counts = apply(counts)
             counts = counts * self._scale
         whole = np.rint(counts)
         return np.clip(whole, *self._limits, out=whole)

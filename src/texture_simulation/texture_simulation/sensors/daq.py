@@ -1,6 +1,6 @@
 """What the finger of Jamali & Sammut 2010 measures while it goes along a path.
 
-Four PVDF films and four strain gauges lie at random places in two layers of silicone. Each feels the pressure over its
+Four PVDF films and four strain gauges lie at random places in two layers of silicone. Each senses the pressure over its
 place, the blunter the deeper it lies: a film its changes (the charge leaks), a gauge the pressure itself. All pass a
 low-pass of 500 Hz and are sampled at 2.5 kHz. The sensitivities are ours: the paper tells none.
 """
@@ -17,12 +17,12 @@ from scipy import signal as filters
 from texture_core.arrays import Array, Samples
 from texture_drivers.daq import tables
 from texture_simulation.filters import Filter
-from texture_simulation.path import Path
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.converter import Converter
-from texture_simulation.sensors.model import SensorKind, Stream, traits
+from texture_simulation.sensors.model import SensorKind, SimulatedStream, individual_rng
+from texture_simulation.skin_contact import SkinContact
 from texture_simulation.surfaces.surface import Surface
-from texture_simulation.touch import Touch
+from texture_simulation.trajectory import Trajectory
 
 RATE_HZ = tables.RATE_HZ
 # A point a sample: the skin over an element averages over 0.2 mm and more, so that at 0.4 m/s and below nothing is left
@@ -55,19 +55,19 @@ class DaqModel:
         rng: np.random.Generator,
         *,
         finger: int = 0,
-        scans: tuple[int, ...] = (),
+        batch_shape: tuple[int, ...] = (),
         settled: bool = False,
     ) -> None:
-        self.touch = Touch(scene, surface, rng, PATH_RATE_HZ, finger=finger, scans=scans)
+        self.touch = SkinContact(scene, surface, rng, PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
         self._offset_m, self.volt_per_n = _elements(finger)
         self._leak, self._band = Filter(LEAK, settled=settled), Filter(BAND, settled=settled)
-        self._converter = Converter(scene, rng, RATE_HZ, ELEMENTS, LIMITS, scans=scans)
+        self._converter = Converter(scene, rng, RATE_HZ, ELEMENTS, LIMITS, batch_shape=batch_shape)
 
-    def streams(self, path: Path, *, slow: bool = True) -> Mapping[str, Samples]:
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return the 8 channels in V."""
         return {tables.TOPIC: VOLT_PER_COUNT * self._converter.exact(self._exact(path))}
 
-    def advance(self, path: Path) -> NDArray[np.int16]:
+    def advance(self, path: Trajectory) -> NDArray[np.int16]:
         """Return what is measured along the next piece of path.
 
         Parameters
@@ -81,21 +81,21 @@ class DaqModel:
         """
         return self._converter.counts(self._exact(path), np.int16)
 
-    def _exact(self, path: Path) -> Samples:
+    def _exact(self, path: Trajectory) -> Samples:
         pressed_n = self._pressed_n(self.touch.placed(path))
         pressed_n[..., :FILMS, :] = self._leak(pressed_n[..., :FILMS, :])
-        felt_n = self._band(pressed_n)[..., OVERSAMPLING - 1 :: OVERSAMPLING]
-        return np.swapaxes(felt_n, -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
+        sensed_n = self._band(pressed_n)[..., OVERSAMPLING - 1 :: OVERSAMPLING]
+        return np.swapaxes(sensed_n, -1, -2) * (self.volt_per_n / VOLT_PER_COUNT)
 
-    def _pressed_n(self, placed: Path) -> Array:
-        """Return the force that each element feels, (..., 8, n)."""
+    def _pressed_n(self, placed: Trajectory) -> Array:
+        """Return the force that each element senses, (..., 8, n)."""
         return placed.force_n[..., None, :] + self.touch.variation_n(placed, BLUR_M, self._offset_m)
 
 
 @lru_cache(maxsize=16)
 def _elements(finger: int) -> tuple[tuple[Array, Array], Array]:
     """Return where the elements of a finger lie, x and y, (8, 1) m each, and their sensitivities, (8,) V/N."""
-    made = traits(finger)
+    made = individual_rng(finger)
     offset_m = (made.uniform(-PLACE_M, PLACE_M, (ELEMENTS, 1)), made.uniform(-PLACE_M, PLACE_M, (ELEMENTS, 1)))
     return offset_m, made.uniform(*VOLT_PER_N, ELEMENTS) * made.choice([-1.0, 1.0], ELEMENTS)
 
@@ -104,5 +104,5 @@ KIND = SensorKind(
     make=DaqModel,
     path_rate_hz=PATH_RATE_HZ,
     step_points=OVERSAMPLING,
-    streams=(Stream(tables.TOPIC, tables.SENSOR, CHANNELS, 'V', RATE_HZ),),
+    streams=(SimulatedStream(tables.TOPIC, tables.SENSOR, CHANNELS, 'V', RATE_HZ),),
 )

@@ -9,18 +9,18 @@ from typing import Protocol
 import numpy as np
 
 from texture_core.arrays import Samples
-from texture_simulation.path import Path
 from texture_simulation.scene import Scene
+from texture_simulation.skin_contact import SkinContact
 from texture_simulation.surfaces.surface import Surface
-from texture_simulation.touch import Touch
+from texture_simulation.trajectory import Trajectory
 
 
-class Model(Protocol):
+class SensorModel(Protocol):
     """Turns a path, block by block, into what the sensor publishes; what lies between the blocks is continuous."""
 
-    touch: Touch
+    touch: SkinContact
 
-    def streams(self, path: Path, *, slow: bool = True) -> Mapping[str, Samples]:
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return samples by topic, (..., n_samples, n_channels) in the unit the driver publishes.
 
         Parameters
@@ -33,7 +33,7 @@ class Model(Protocol):
 
 
 @dataclass(frozen=True)
-class Stream:
+class SimulatedStream:
     """What a topic holds."""
 
     topic: str
@@ -54,15 +54,15 @@ class MakeModel(Protocol):
         rng: np.random.Generator,
         *,
         finger: int = 0,
-        scans: tuple[int, ...] = (),
+        batch_shape: tuple[int, ...] = (),
         settled: bool = False,
-    ) -> Model:
+    ) -> SensorModel:
         """Return a model.
 
         Parameters
         ----------
         scene, surface
-            How the finger feels, and what.
+            How the finger senses, and what.
         rng
             All randomness: where a sample is touched, what the effects do.
         finger
@@ -93,14 +93,14 @@ class SensorKind:
     make: MakeModel
     path_rate_hz: float
     step_points: int
-    streams: tuple[Stream, ...]
+    streams: tuple[SimulatedStream, ...]
 
     @property
-    def fast(self) -> Stream:
+    def fast(self) -> SimulatedStream:
         """The fast stream."""
         return self.streams[0]
 
 
-def traits(finger: int) -> np.random.Generator:
+def individual_rng(finger: int) -> np.random.Generator:
     """Return the randomness out of which an individual of a sensor is made."""
     return np.random.default_rng([finger, 7])

@@ -1,6 +1,6 @@
 """What the PVDF finger of Hu et al. 2014 measures while it goes along a path.
 
-The film lies over the whole contact and feels its force, less what leaks away; the force sensor behind it feels the
+The film lies over the whole contact and senses its force, less what leaks away; the force sensor behind it senses the
 slow part. The gains are ours: the paper tells none.
 """
 
@@ -17,12 +17,12 @@ from texture_core.arrays import Array, Samples
 from texture_drivers.pvdf import tables
 from texture_drivers.pvdf.charge_leak import ChargeLeak
 from texture_simulation.filters import Filter
-from texture_simulation.path import Path
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.converter import Converter
-from texture_simulation.sensors.model import SensorKind, Stream
+from texture_simulation.sensors.model import SensorKind, SimulatedStream
+from texture_simulation.skin_contact import SkinContact
 from texture_simulation.surfaces.surface import Surface
-from texture_simulation.touch import Touch
+from texture_simulation.trajectory import Trajectory
 
 OVERSAMPLING = 1  # at 0.4 m/s and below the skin blurs what 4 kHz would fold down; what is faster is blurred more
 PATH_RATE_HZ = OVERSAMPLING * tables.FILM_RATE_HZ
@@ -47,17 +47,17 @@ class PvdfModel:
         rng: np.random.Generator,
         *,
         finger: int = 0,
-        scans: tuple[int, ...] = (),
+        batch_shape: tuple[int, ...] = (),
         settled: bool = False,
     ) -> None:
-        self.touch = Touch(scene, surface, rng, PATH_RATE_HZ, finger=finger, scans=scans)
+        self.touch = SkinContact(scene, surface, rng, PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
         self._film = Filter(FILM_BAND, settled=settled)
         self._force_band = Filter(FORCE_BAND, settled=settled)
         self._points = 0
-        self._fast = Converter(scene, rng, tables.FILM_RATE_HZ, 1, LIMITS, scans=scans)
-        self._slow = Converter(scene, rng, tables.FORCE_RATE_HZ, 1, LIMITS, scans=scans, slow=True)
+        self._fast = Converter(scene, rng, tables.FILM_RATE_HZ, 1, LIMITS, batch_shape=batch_shape)
+        self._slow = Converter(scene, rng, tables.FORCE_RATE_HZ, 1, LIMITS, batch_shape=batch_shape, slow=True)
 
-    def streams(self, path: Path, *, slow: bool = True) -> Mapping[str, Samples]:
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return the charge of the film in pC, and the force in N if wanted."""
         force_n = self._pressed_n(path)
         fast = {tables.FILM_TOPIC: tables.FILM_PC_PER_COUNT * self._fast.exact(self._charge(force_n))}
@@ -65,7 +65,7 @@ class PvdfModel:
             return fast
         return {**fast, tables.FORCE_TOPIC: tables.FORCE_N_PER_COUNT * self._slow.exact(self._force(force_n))}
 
-    def advance(self, path: Path) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
+    def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.int16]]:
         """Return what is measured along the next piece of path.
 
         Parameters
@@ -95,7 +95,7 @@ class PvdfModel:
         self._points += force_n.shape[-1]
         return slow_n[..., first::POINTS_PER_FORCE, None] / tables.FORCE_N_PER_COUNT
 
-    def _pressed_n(self, path: Path) -> Array:
+    def _pressed_n(self, path: Trajectory) -> Array:
         placed = self.touch.placed(path)
         return placed.force_n + self.touch.variation_n(placed)
 
@@ -105,7 +105,7 @@ KIND = SensorKind(
     path_rate_hz=PATH_RATE_HZ,
     step_points=OVERSAMPLING,
     streams=(
-        Stream(tables.FILM_TOPIC, tables.FILM_SENSOR, tables.FILM_CHANNELS, 'pC', tables.FILM_RATE_HZ),
-        Stream(tables.FORCE_TOPIC, tables.FORCE_SENSOR, tables.FORCE_CHANNELS, 'N', tables.FORCE_RATE_HZ),
+        SimulatedStream(tables.FILM_TOPIC, tables.FILM_SENSOR, tables.FILM_CHANNELS, 'pC', tables.FILM_RATE_HZ),
+        SimulatedStream(tables.FORCE_TOPIC, tables.FORCE_SENSOR, tables.FORCE_CHANNELS, 'N', tables.FORCE_RATE_HZ),
     ),
 )

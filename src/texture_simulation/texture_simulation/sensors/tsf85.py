@@ -16,14 +16,14 @@ from scipy import signal as filters
 
 from texture_core.arrays import Array, Samples
 from texture_drivers.tsf85 import tables
-from texture_drivers.tsf85.tables import RATE_HZ, TSF85, Layout
+from texture_drivers.tsf85.tables import RATE_HZ, TSF85, Tsf85Layout
 from texture_simulation.filters import Filter
-from texture_simulation.path import Path
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.converter import Converter
-from texture_simulation.sensors.model import SensorKind, Stream, traits
+from texture_simulation.sensors.model import SensorKind, SimulatedStream, individual_rng
+from texture_simulation.skin_contact import SkinContact
 from texture_simulation.surfaces.surface import Surface
-from texture_simulation.touch import Touch
+from texture_simulation.trajectory import Trajectory
 
 OVERSAMPLING = 2  # so that what lies above the band is filtered and not folded into it
 PATH_RATE_HZ = OVERSAMPLING * RATE_HZ
@@ -56,13 +56,13 @@ class Tsf85Model:
         scene: Scene,
         surface: Surface,
         rng: np.random.Generator,
-        layout: Layout = TSF85,
+        layout: Tsf85Layout = TSF85,
         *,
         finger: int = 0,
-        scans: tuple[int, ...] = (),
+        batch_shape: tuple[int, ...] = (),
         settled: bool = False,
     ) -> None:
-        self.touch = Touch(scene, surface, rng, PATH_RATE_HZ, finger=finger, scans=scans)
+        self.touch = SkinContact(scene, surface, rng, PATH_RATE_HZ, finger=finger, batch_shape=batch_shape)
         self._static_rate_hz = layout.static_rate_hz
         self._force_before_n: Array | None = None
         self._band = Filter(BAND, settled=settled)
@@ -70,17 +70,19 @@ class Tsf85Model:
         rows, columns = np.divmod(np.arange(layout.rows * layout.columns), layout.columns)
         self._taxel_x_m = (columns[:, None] - (layout.columns - 1) / 2) * TAXEL_PITCH_M
         self._taxel_y_m = (rows[:, None] - (layout.rows - 1) / 2) * TAXEL_PITCH_M
-        self._baseline = traits(finger).uniform(*STATIC_BASELINE, len(rows))
-        self._fast = Converter(scene, rng, RATE_HZ, 1, FAST_LIMITS, scans=scans)
-        self._slow = Converter(scene, rng, layout.static_rate_hz, len(rows), SLOW_LIMITS, scans=scans, slow=True)
+        self._baseline = individual_rng(finger).uniform(*STATIC_BASELINE, len(rows))
+        self._fast = Converter(scene, rng, RATE_HZ, 1, FAST_LIMITS, batch_shape=batch_shape)
+        self._slow = Converter(
+            scene, rng, layout.static_rate_hz, len(rows), SLOW_LIMITS, batch_shape=batch_shape, slow=True
+        )
 
-    def streams(self, path: Path, *, slow: bool = True) -> Mapping[str, Samples]:
+    def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
         """Return the dynamic channel, and the taxels if wanted, in counts."""
         placed = self.touch.placed(path)
         fast = {'signal': self._fast.exact(self._dynamic(placed))}
         return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast
 
-    def advance(self, path: Path) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
+    def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
         """Return what is measured along the next piece of path.
 
         Parameters
@@ -98,16 +100,16 @@ class Tsf85Model:
         dynamic = self._fast.counts(self._dynamic(placed), np.int16)
         return dynamic[..., 0], self._slow.counts(self._images(placed), np.uint16)
 
-    def _dynamic(self, placed: Path) -> Samples:
+    def _dynamic(self, placed: Trajectory) -> Samples:
         force_n = placed.force_n + self.touch.variation_n(placed)
         before = force_n[..., :1] if self._force_before_n is None else self._force_before_n
         self._force_before_n = force_n[..., -1:]
         rate_n_s = np.diff(force_n, prepend=before) * PATH_RATE_HZ
         return self._band(COUNTS_PER_N_S * rate_n_s)[..., OVERSAMPLING - 1 :: OVERSAMPLING, None]
 
-    def _images(self, placed: Path) -> Samples:
+    def _images(self, placed: Trajectory) -> Samples:
         at = placed.at(self._image_points(len(placed)))
-        texture_n = self.touch.still_n(at, TAXEL_BLUR_M, (self._taxel_x_m, self._taxel_y_m))
+        texture_n = self.touch.static_variation_n(at, TAXEL_BLUR_M, (self._taxel_x_m, self._taxel_y_m))
         pressed_n = self._shares(at.force_n) * (at.force_n[..., None, :] + texture_n)
         return self._baseline + STATIC_COUNTS_PER_N * np.swapaxes(pressed_n, -1, -2)
 
@@ -131,14 +133,16 @@ class Tsf85Model:
         return shares
 
 
-def kind(layout: Layout) -> SensorKind:
+def tsf85_kind(layout: Tsf85Layout) -> SensorKind:
     """Return a kind of TSF-85."""
     return SensorKind(
         make=partial(Tsf85Model, layout=layout),
         path_rate_hz=PATH_RATE_HZ,
         step_points=OVERSAMPLING,
         streams=(
-            Stream('signal', tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, tables.UNIT, RATE_HZ),
-            Stream('signal_static', tables.STATIC_SENSOR, layout.static_channels, tables.UNIT, layout.static_rate_hz),
+            SimulatedStream('signal', tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, tables.UNIT, RATE_HZ),
+            SimulatedStream(
+                'signal_static', tables.STATIC_SENSOR, layout.static_channels, tables.UNIT, layout.static_rate_hz
+            ),
         ),
     )

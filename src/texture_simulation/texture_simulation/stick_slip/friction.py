@@ -26,17 +26,68 @@ class StickSlip:
         If the friction could give out more work than it took in (`PASSIVE`), or falls below the sliding one at rest.
     """
 
-    static: float = param(0.9, 'Coefficient of friction at which a resting tip lets go.', low=0.0, high=5.0)
-    kinetic: float = param(0.5, 'Coefficient of friction of fast sliding.', low=1e-3, high=5.0)
-    stribeck_m_s: float = param(0.05, 'Speed over which friction falls.', unit='m/s', low=1e-4, high=10.0)
-    viscous_s_m: float = param(0.0, 'Growth of the coefficient with speed.', unit='s/m', low=0.0, high=100.0)
-    bristle_1_m: float = param(1.5e5, 'Bristle stiffness for each newton pressed.', unit='1/m', low=1e2, high=1e8)
-    bristle_s_m: float = param(10.0, 'Bristle damping for each newton pressed.', unit='s/m', low=0.0, high=1e4)
-    skin_n_m: float = param(1000.0, 'Stiffness of the skin along the surface.', unit='N/m', low=1.0, high=1e6)
-    skin_n_s_m: float = param(0.4, 'Damping of the skin.', unit='N s/m', low=0.0, high=1e3)
-    mass_kg: float = param(5e-4, 'Mass of the skin that moves along.', unit='kg', low=1e-6, high=1.0)
-    felt: float = param(0.2, 'Newtons that the sensor feels for each newton along the surface.', low=-10.0, high=10.0)
-    step_s: float = param(2.5e-4, 'Longest step of the simulation.', unit='s', low=1e-7, high=0.1)
+    static: float = param(
+        0.9, 'Sets the coefficient of static friction at which a sticking tip starts to slip.', low=0.0, high=5.0
+    )
+    kinetic: float = param(0.5, 'Sets the coefficient of kinetic friction of fast sliding.', low=1e-3, high=5.0)
+    stribeck_m_s: float = param(
+        0.05,
+        'Sets the Stribeck speed over which friction falls from static to kinetic; a larger value falls more slowly.',
+        unit='m/s',
+        low=1e-4,
+        high=10.0,
+    )
+    viscous_s_m: float = param(
+        0.0, 'Sets the growth of the coefficient of friction per speed.', unit='s/m', low=0.0, high=100.0
+    )
+    bristle_1_m: float = param(
+        1.5e5,
+        'Sets the bristle stiffness per normal force; a larger value bends the bristles less.',
+        unit='1/m',
+        low=1e2,
+        high=1e8,
+    )
+    bristle_s_m: float = param(
+        10.0,
+        'Sets the bristle damping per normal force; a larger value damps small motions more.',
+        unit='s/m',
+        low=0.0,
+        high=1e4,
+    )
+    skin_n_m: float = param(
+        1000.0,
+        'Sets the tangential stiffness of the skin; a larger value makes the stick phases shorter.',
+        unit='N/m',
+        low=1.0,
+        high=1e6,
+    )
+    skin_n_s_m: float = param(
+        0.4,
+        'Sets the tangential damping of the skin; a larger value damps the slip phases more.',
+        unit='N s/m',
+        low=0.0,
+        high=1e3,
+    )
+    mass_kg: float = param(
+        5e-4,
+        'Sets the moving mass of the skin; a larger value makes the slip phases longer.',
+        unit='kg',
+        low=1e-6,
+        high=1.0,
+    )
+    force_coupling: float = param(
+        0.2,
+        'Sets the measured force per tangential force on the skin; a larger value shows friction more strongly.',
+        low=-10.0,
+        high=10.0,
+    )
+    step_s: float = param(
+        2.5e-4,
+        'Sets the longest integration step; a shorter step is more exact and costs more computing time.',
+        unit='s',
+        low=1e-7,
+        high=0.1,
+    )
 
     def __post_init__(self) -> None:
         if self.static < self.kinetic:

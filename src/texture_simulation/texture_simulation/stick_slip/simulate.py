@@ -9,10 +9,10 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.catalogue import find
 from texture_core.errors import InvalidData
-from texture_simulation.stick_slip.border import check_step
 from texture_simulation.stick_slip.bristle import AT_REST, Tip, Value
 from texture_simulation.stick_slip.friction import StickSlip
 from texture_simulation.stick_slip.integrators import INTEGRATORS, State, Step
+from texture_simulation.stick_slip.stability_limit import check_step
 
 DEFAULT = 'semi_implicit'
 FEW = 40  # scans; up to so many are faster one after another in floats than together in arrays
@@ -83,7 +83,7 @@ def drag_unchecked(
 
 
 def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
-    """Return the force of the skin on the tip: what the finger feels along the surface."""
+    """Return the force of the skin on the tip: what the finger senses along the surface."""
     pull: Array = friction.skin_n_m * tip.stretch_m + friction.skin_n_s_m * (speed_m_s - tip.slip_m_s)
     return pull
 

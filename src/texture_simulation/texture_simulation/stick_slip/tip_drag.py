@@ -1,4 +1,4 @@
-"""What a sensor feels of stick-slip along a path, block by block."""
+"""Force that a sensor measures from stick-slip along a trajectory, block by block."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
-from texture_simulation.path import Path
-from texture_simulation.stick_slip.border import check_step
 from texture_simulation.stick_slip.bristle import AT_REST, Tip
 from texture_simulation.stick_slip.friction import StickSlip
 from texture_simulation.stick_slip.simulate import DEFAULT, drag, pull_n
+from texture_simulation.stick_slip.stability_limit import check_step
+from texture_simulation.trajectory import Trajectory
 
 JUMP_M_S = 3.0  # what moves faster than this was put elsewhere, it did not slide
 
@@ -47,8 +47,8 @@ class TipDrag:
         self._before: tuple[Array, Array, Array, Array] | None = None  # x, y, speed and force, (..., 1)
         self._forward: tuple[Array, Array] | None = None  # the direction that counts as forward, (..., 1)
 
-    def advance(self, path: Path) -> Array:
-        """Return the force that the sensor feels beside the shape of the surface, (..., n), N.
+    def advance(self, path: Trajectory) -> Array:
+        """Return the force that the sensor senses beside the shape of the surface, (..., n), N.
 
         Parameters
         ----------
@@ -63,8 +63,8 @@ class TipDrag:
         tip = drag(self.friction, speeds, forces, self._step_s, start=self._tip, force_before_n=force_before[..., 0])
         self._tip = Tip(*(values[..., -1] for values in tip))
         self._before = path.x_m[..., -1:], path.y_m[..., -1:], speed_m_s[..., -1:], force_n[..., -1:]
-        felt_n: Array = self.friction.felt * pull_n(self.friction, tip, speeds)
-        return felt_n[..., self._substeps - 1 :: self._substeps]
+        sensed_n: Array = self.friction.force_coupling * pull_n(self.friction, tip, speeds)
+        return sensed_n[..., self._substeps - 1 :: self._substeps]
 
     def _first(self, force_n: Array) -> tuple[Array, Array, Array, Array]:
         """Return what was before the first point, (..., 1) each, and let the tip hang there."""
@@ -76,7 +76,7 @@ class TipDrag:
         self._tip = Tip(pull_n / self.friction.skin_n_m, np.zeros_like(pull_n), bend_m)
         return nothing, nothing, nothing, force_n
 
-    def _along(self, path: Path) -> Array:
+    def _along(self, path: Trajectory) -> Array:
         """Return the speed at each point, (..., n); below 0 while the path goes back the way it came."""
         x_m, y_m = self._before[:2] if self._before else (path.x_m[..., :1], path.y_m[..., :1])
         dx_m, dy_m = np.diff(path.x_m, prepend=x_m), np.diff(path.y_m, prepend=y_m)

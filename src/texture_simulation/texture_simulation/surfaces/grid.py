@@ -19,16 +19,34 @@ class Grid:
     The relief is a product of two profiles; a round Gaussian blurs each of them by itself, so this is exact.
     """
 
-    pitch_x_m: float = param(2e-3, 'Distance of posts along the first direction.', unit='m', low=1e-5, high=0.1)
-    pitch_y_m: float = param(2e-3, 'The same across it.', unit='m', low=1e-5, high=0.1)
-    depth_m: float = param(2e-4, 'Height of posts or ribs.', unit='m', low=0.0, high=0.01)
-    angle_rad: float = param(0.0, 'First direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi)
-    shape: str = param('sine', 'Shape of the posts, or of the hollows.', choices=SHAPES)
-    duty: float = param(0.5, 'Share of the pitch that a post, or a hollow, takes.', low=0.05, high=0.95)
-    relief: str = param('posts', 'What stands out.', choices=('posts', 'net'))
+    pitch_x_m: float = param(
+        2e-3,
+        'Sets the distance of posts along the first direction; a larger pitch lowers the frequency of the signal.',
+        unit='m',
+        low=1e-5,
+        high=0.1,
+    )
+    pitch_y_m: float = param(
+        2e-3,
+        'Sets the distance of posts along the second direction, across the first one.',
+        unit='m',
+        low=1e-5,
+        high=0.1,
+    )
+    depth_m: float = param(
+        2e-4, 'Sets the height of posts or ribs; a larger depth gives a stronger signal.', unit='m', low=0.0, high=0.01
+    )
+    angle_rad: float = param(
+        0.0, 'Sets the first direction, from +x towards +y.', unit='rad', low=-math.pi, high=math.pi
+    )
+    shape: str = param('sine', "Sets the cross-section of the posts or hollows, 'sine' or 'square'.", choices=SHAPES)
+    duty: float = param(0.5, 'Sets the share of the pitch that a post or a hollow takes.', low=0.05, high=0.95)
+    relief: str = param(
+        'posts', "Sets what stands out: 'posts', or a 'net' of ribs between hollows.", choices=('posts', 'net')
+    )
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the height felt at places, (..., n)."""
+        """Return the blurred height at positions, (..., n)."""
         cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
         mean = MEAN.get(self.shape, self.duty)
         along = profile(x_m * cosine + y_m * sine, blur_m, self.pitch_x_m, self.shape, self.duty)

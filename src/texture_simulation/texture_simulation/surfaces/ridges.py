@@ -8,7 +8,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 
-LEAST_FELT = 1e-3  # a harmonic blurred to less than this share is left out
+MIN_TRANSFER = 1e-3  # a harmonic blurred to less than this share is left out
 SHAPES = ('sine', 'square')
 
 
@@ -42,9 +42,9 @@ def profile(across_m: Array, blur_m: Array, pitch_m: float, shape: str, duty: fl
 
 
 def _amplitudes(pitch_m: float, shape: str, duty: float, blur_m: float) -> list[float]:
-    """Return the amplitudes of the harmonics that are felt at all, from the first on."""
+    """Return the amplitudes of the harmonics that are measured at all, from the first on."""
     if shape == 'sine':
         return [0.5]
-    finest = pitch_m / (2 * np.pi * blur_m) * math.sqrt(-2 * math.log(LEAST_FELT))
+    finest = pitch_m / (2 * np.pi * blur_m) * math.sqrt(-2 * math.log(MIN_TRANSFER))
     orders = range(1, max(2, math.ceil(finest)))
     return [2 / (np.pi * order) * math.sin(np.pi * order * duty) for order in orders]

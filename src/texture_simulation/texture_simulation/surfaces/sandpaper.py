@@ -21,10 +21,18 @@ class Sandpaper:
     Sizes of FEPA grades: P60 269 µm, P80 201, P120 125, P240 58.5, P400 35 (ISO 6344).
     """
 
-    grain_m: float = param(2e-4, 'Diameter of a grain.', unit='m', low=2e-5, high=0.01)
-    stands_out_m: float = param(5e-5, 'How far a grain stands out, on average.', unit='m', low=0.0, high=0.005)
-    cover: float = param(0.5, 'Share of the sheet that lies under grains.', low=0.02, high=2.0)
-    seed: int = param(0, 'Which of all such sheets.', low=0)
+    grain_m: float = param(
+        2e-4, 'Sets the diameter of a grain; a larger grain gives lower frequencies.', unit='m', low=2e-5, high=0.01
+    )
+    grain_height_m: float = param(
+        5e-5,
+        'Sets the mean height of a grain above the sheet; a larger height gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=0.005,
+    )
+    cover: float = param(0.5, 'Sets the share of the sheet that lies under grains.', low=0.02, high=2.0)
+    seed: int = param(0, 'Sets the seed of the places and heights of the grains.', low=0)
 
     @property
     def spacing_m(self) -> float:
@@ -40,9 +48,9 @@ class Sandpaper:
         np.add.at(tops, tuple(rng.integers(0, SIDE, (2, count))), rng.uniform(*SIZES, count))
         away = np.minimum(np.arange(SIDE), SIDE - np.arange(SIDE))
         dome = np.maximum(0.0, 1 - (away[:, None] ** 2 + away**2) / (POINTS_PER_GRAIN / 2) ** 2)
-        height = self.stands_out_m * np.fft.irfft2(np.fft.rfft2(tops) * np.fft.rfft2(dome), s=(SIDE, SIDE))
+        height = self.grain_height_m * np.fft.irfft2(np.fft.rfft2(tops) * np.fft.rfft2(dome), s=(SIDE, SIDE))
         return np.asarray(height - height.mean())
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the height felt at places, (..., n)."""
+        """Return the blurred height at positions, (..., n)."""
         return tile_height(self, x_m, y_m, blur_m)

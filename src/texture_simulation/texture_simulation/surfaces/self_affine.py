@@ -19,11 +19,17 @@ class SelfAffine:
     Along any line its power falls as 1/f^s with s = 1 + 2·hurst.
     """
 
-    rms_m: float = param(1e-5, 'Standard deviation of the height.', unit='m', low=0.0, high=1e-3)
-    hurst: float = param(0.8, 'Hurst exponent: 1 is smooth on small scales, 0 jagged.', low=0.0, high=1.0)
-    longest_m: float = param(6e-3, 'Longest wave.', unit='m', low=1e-4, high=0.1)
-    shortest_m: float = param(4e-4, 'Shortest wave.', unit='m', low=1e-5, high=0.01)
-    seed: int = param(0, 'Which of all such surfaces.', low=0)
+    rms_m: float = param(
+        1e-5,
+        'Sets the standard deviation of the height; a larger value gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=1e-3,
+    )
+    hurst: float = param(0.8, 'Sets the Hurst exponent: 1 is smooth on small scales, 0 is jagged.', low=0.0, high=1.0)
+    longest_m: float = param(6e-3, 'Sets the longest wavelength of the relief.', unit='m', low=1e-4, high=0.1)
+    shortest_m: float = param(4e-4, 'Sets the shortest wavelength of the relief.', unit='m', low=1e-5, high=0.01)
+    seed: int = param(0, 'Sets the seed of the random relief.', low=0)
 
     def __post_init__(self) -> None:
         if not 1 < self.longest_m / self.shortest_m <= SIDE / POINTS_PER_WAVE / 2:
@@ -47,5 +53,5 @@ class SelfAffine:
         return np.asarray(height * (self.rms_m / height.std()))
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the height felt at places, (..., n)."""
+        """Return the blurred height at positions, (..., n)."""
         return tile_height(self, x_m, y_m, blur_m)

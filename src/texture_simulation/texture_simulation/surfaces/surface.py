@@ -1,7 +1,7 @@
-"""A surface: heights over a plane, as a soft finger feels them.
+"""A surface: heights over a plane, blurred by the contact of a soft finger.
 
 A surface is a sum of terms. Each kind of term is a frozen dataclass with a method that gives its height at places
-(x, y), blurred by a Gaussian of standard deviation `blur_m`: what is finer than the contact is not felt.
+(x, y), blurred by a Gaussian of standard deviation `blur_m`: detail finer than the contact is averaged out.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 
 from texture_core.arrays import Array
 
-LEAST_BLUR_M, MOST_BLUR_M = 5e-5, 2e-3
+MIN_BLUR_M, MAX_BLUR_M = 5e-5, 2e-3
 
 
 class Term(Protocol):
     """A kind of relief."""
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the height felt at places, (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same."""
+        """Return the blurred height at (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Surface:
     friction: Any = None
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the height felt at places.
+        """Return the blurred height at positions.
 
         Parameters
         ----------
@@ -43,7 +43,7 @@ class Surface:
         -------
         (..., n) m, of zero mean over a large surface
         """
-        blur_m = np.clip(blur_m, LEAST_BLUR_M, MOST_BLUR_M)
+        blur_m = np.clip(blur_m, MIN_BLUR_M, MAX_BLUR_M)
         height = np.zeros(np.broadcast_shapes(x_m.shape, y_m.shape, blur_m.shape))
         for term in self.terms:
             height += term.height_m(x_m, y_m, blur_m)

@@ -11,18 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import AnyArray, Array
-from texture_simulation.surfaces.surface import LEAST_BLUR_M, MOST_BLUR_M
+from texture_simulation.surfaces.surface import MAX_BLUR_M, MIN_BLUR_M
 
 SIDE = 256  # points along each side of a tile; a power of two
 POINTS_PER_WAVE = 4  # of the shortest wave
 # The periodic tile lies askew at the golden slope, so that a slide along x or y never meets the same stretch again.
 TURN_RAD = math.atan((math.sqrt(5) - 1) / 2)
-BLURS_M = np.geomspace(LEAST_BLUR_M, MOST_BLUR_M, 10)  # tiles are made for these and interpolated between
-WORTH_MIXING = 20_000  # points under one blur, from which on a tile of its own is cheaper than mixing point by point
+BLURS_M = np.geomspace(MIN_BLUR_M, MAX_BLUR_M, 10)  # tiles are made for these and interpolated between
+MIN_POINTS_FOR_OWN_TILE = (
+    20_000  # points under one blur, from which on a tile of its own is cheaper than mixing point by point
+)
 TILE_POINTS = (SIDE + 1) ** 2
 
 
-class Random(Protocol):
+class RandomRelief(Protocol):
     """A kind of random relief; hashable, so that its tiles are made once."""
 
     @property
@@ -36,13 +38,13 @@ class Random(Protocol):
         """Return what tells it from others."""
 
 
-def tile_height(random: Random, x_m: Array, y_m: Array, blur_m: Array) -> Array:
+def tile_height(random: RandomRelief, x_m: Array, y_m: Array, blur_m: Array) -> Array:
     """Return the height of random relief at places, (..., n); `blur_m` is (..., n) or (..., 1)."""
     cosine, sine = math.cos(TURN_RAD) / random.spacing_m, math.sin(TURN_RAD) / random.spacing_m
     rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
     level = np.minimum(np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M))), len(BLURS_M) - 1.001)
-    many = level.shape[-1] == 1 and rows.size >= WORTH_MIXING
-    if many and len(levels := np.unique(level)) * WORTH_MIXING <= rows.size:
+    many = level.shape[-1] == 1 and rows.size >= MIN_POINTS_FOR_OWN_TILE
+    if many and len(levels := np.unique(level)) * MIN_POINTS_FOR_OWN_TILE <= rows.size:
         height = _bilinear(_mixed(random, tuple(levels.tolist())), np.searchsorted(levels, level), rows, columns)
         return np.asarray(height, dtype=np.float64)
     low = level.astype(np.intp)
@@ -92,7 +94,7 @@ def _between(tiles: AnyArray, at: NDArray[np.intp], share: NDArray[np.float32]) 
 
 
 @lru_cache(maxsize=64)
-def _mixed(random: Random, levels: tuple[float, ...]) -> AnyArray:
+def _mixed(random: RandomRelief, levels: tuple[float, ...]) -> AnyArray:
     """Return one tile for each of some levels of blur."""
     tiles = []
     for level in levels:
@@ -104,10 +106,10 @@ def _mixed(random: Random, levels: tuple[float, ...]) -> AnyArray:
 
 
 @lru_cache(maxsize=32)
-def _pairs(random: Random) -> AnyArray:
+def _pairs(random: RandomRelief) -> AnyArray:
     """Return the tiles of all levels of blur, each with the next blunter one as imaginary part: found at once.
 
-    All are made at once, 4.8 MB a relief: what a bench holds does not grow with what it has felt.
+    All are made at once, 4.8 MB a relief: what a emulator holds does not grow with what it has measured.
     """
     spectrum, wave_1_m = np.fft.rfft2(random.sharp()), waves_1_m(random.spacing_m)
     blurred = [_blurred(spectrum, wave_1_m, blur_m) for blur_m in BLURS_M]

@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.parameters import param
-from texture_simulation.slow_field import slowly
+from texture_simulation.slow_field import interpolated_field
 
 # Plane waves of 6 to 18 mm that shift the yarns from their even places.
 WAVES_1_M = 2 * np.pi * np.array([[90.0, 40.0], [-55.0, 130.0], [60.0, -75.0], [25.0, 50.0]])
@@ -27,16 +27,48 @@ class Weave:
     yarns by slow waves, as in linen: its lines are broader the finer they are.
     """
 
-    pitch_x_m: float = param(8e-4, 'Distance of the yarns met when sliding along x.', unit='m', low=5e-5, high=0.05)
-    pitch_y_m: float = param(8e-4, 'The same along y.', unit='m', low=5e-5, high=0.05)
-    thickness_x_m: float = param(1e-4, 'How far those met along x stand out.', unit='m', low=0.0, high=0.01)
-    thickness_y_m: float = param(1e-4, 'The same along y.', unit='m', low=0.0, high=0.01)
-    repeat: int = param(2, 'Yarns after which over and under repeat: 2 plain, more a twill.', low=2, high=12)
-    irregular_m: float = param(0.0, 'Standard deviation of the places of the yarns.', unit='m', low=0.0, high=0.005)
-    seed: int = param(0, 'Which of all such cloths.', low=0)
+    pitch_x_m: float = param(
+        8e-4,
+        'Sets the distance of the yarns that a slide along x crosses; a larger pitch lowers the frequency.',
+        unit='m',
+        low=5e-5,
+        high=0.05,
+    )
+    pitch_y_m: float = param(
+        8e-4,
+        'Sets the distance of the yarns that a slide along y crosses; a larger pitch lowers the frequency.',
+        unit='m',
+        low=5e-5,
+        high=0.05,
+    )
+    thickness_x_m: float = param(
+        1e-4,
+        'Sets how far the yarns crossed along x stand out; a larger value gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=0.01,
+    )
+    thickness_y_m: float = param(
+        1e-4,
+        'Sets how far the yarns crossed along y stand out; a larger value gives a stronger signal.',
+        unit='m',
+        low=0.0,
+        high=0.01,
+    )
+    repeat: int = param(
+        2, 'Sets the number of yarns after which the weave repeats: 2 is plain, more is a twill.', low=2, high=12
+    )
+    irregular_m: float = param(
+        0.0,
+        'Sets the standard deviation of the yarn positions; a larger value broadens the spectral lines.',
+        unit='m',
+        low=0.0,
+        high=0.005,
+    )
+    seed: int = param(0, 'Sets the seed of the yarn positions.', low=0)
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the height felt at places, (..., n)."""
+        """Return the blurred height at positions, (..., n)."""
         x_m, y_m = self._even(x_m, y_m)
         across_x, across_y = 2 * np.pi / self.pitch_x_m * x_m, 2 * np.pi / self.pitch_y_m * y_m
         weak_x = np.exp(-0.5 * (2 * np.pi * blur_m / self.pitch_x_m) ** 2)
@@ -60,7 +92,7 @@ class Weave:
             return x_m, y_m
         turns = PHASES + np.random.default_rng(self.seed).uniform(0, 2 * np.pi, PHASES.shape)
         scale_m = self.irregular_m * math.sqrt(2 / len(WAVES_1_M))
-        x_and_y = slowly(lambda x, y: _shift(x, y, turns), x_m, y_m, KNOT_M)
+        x_and_y = interpolated_field(lambda x, y: _shift(x, y, turns), x_m, y_m, KNOT_M)
         return x_m + scale_m * x_and_y.real, y_m + scale_m * x_and_y.imag
 
 

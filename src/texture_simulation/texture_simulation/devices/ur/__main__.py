@@ -12,7 +12,7 @@ import numpy as np
 
 from texture_core.errors import TextureError
 from texture_core.parameters import from_mapping, parameters_of
-from texture_simulation.devices.ur.controller import Controller
+from texture_simulation.devices.ur.controller import EmulatedController
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.server import Server
 
@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         signal.signal(number, lambda number, _frame: signals.append(number))
     try:
         params = read_params(arguments)
-        controller = Controller(params, np.random.default_rng(params.seed))
+        controller = EmulatedController(params, np.random.default_rng(params.seed))
         server = Server(controller, params.ip, params.finger_port)
     except TextureError as error:
         print(f'emulated UR controller: {error}', file=sys.stderr)

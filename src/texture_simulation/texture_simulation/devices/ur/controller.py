@@ -7,19 +7,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from texture_simulation.devices.ur.motions import Stop
+from texture_simulation.devices.ur.motions import StopMove
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.program import ControlProgram
 from texture_simulation.devices.ur.registers import Registers
-from texture_simulation.devices.ur.robot import Robot
-from texture_simulation.devices.ur.tables import CONTROL_SCRIPT, VERSIONS, Safety
+from texture_simulation.devices.ur.robot import EmulatedRobot
+from texture_simulation.devices.ur.tables import CONTROL_SCRIPT, VERSIONS, SafetyMode
 
 STARTING_S = 0.05  # between the upload of a program and its start
 STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 ENDED = object()
 
 
-class Controller:
+class EmulatedController:
     """A controller that knows no clock: each `tick` is one cycle of `step_s`."""
 
     def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
@@ -27,8 +27,8 @@ class Controller:
         self.step_s = 1.0 / self.version.rate_hz
         self.ticks = 0
         self.registers = Registers()
-        self.robot = Robot(params, rng)
-        self.safety = Safety.NORMAL
+        self.robot = EmulatedRobot(params, rng)
+        self.safety = SafetyMode.NORMAL
         self.acknowledge_s = 0.0  # see `Host`; set from outside
         self.program_name = CONTROL_SCRIPT  # of the one that runs, or ran last
         self.loaded = ''  # name of the program that `play` starts
@@ -54,7 +54,7 @@ class Controller:
         self.ticks += 1
         if self._starts_s is not None and self.time_s >= self._starts_s:
             self._start_program()
-        if self._watchdog_s and self.time_s - self.registers.fed_s > self._watchdog_s:
+        if self._watchdog_s and self.time_s - self.registers.last_command_s > self._watchdog_s:
             self.stop_program()
         if self._program is not None and not self.paused and next(self._program, ENDED) is ENDED:
             self.stop_program()
@@ -62,14 +62,14 @@ class Controller:
         if np.linalg.norm(self.robot.force[:3]) > self._params.stop_force_n:
             self.protective_stop()
 
-    def make_up(self) -> None:
+    def catch_up(self) -> None:
         """Do a cycle that should have been done before; it is not the client who was silent in it."""
-        self.registers.fed_s += self.step_s
+        self.registers.last_command_s += self.step_s
         self.tick()
 
     def upload(self, script: str) -> None:
         """Take over a program, which starts a little later; in a protective stop none starts."""
-        if 'rtde_control' in script and self.safety is Safety.NORMAL:
+        if 'rtde_control' in script and self.safety is SafetyMode.NORMAL:
             self.stop_program()
             self._starts_s = self.time_s + STARTING_S
 
@@ -91,7 +91,7 @@ class Controller:
         """End the program, and with it every motion and the watchdog."""
         if self._program is not None:
             self.robot.end_force_mode()
-            self.robot.motion = Stop(STOP_DECELERATION)
+            self.robot.motion = StopMove(STOP_DECELERATION)
         self._program = None
         self.paused = False
         self._starts_s = None
@@ -100,12 +100,12 @@ class Controller:
     def set_watchdog(self, min_frequency_hz: float) -> None:
         """Stop the program when input_int_register_0 comes less often."""
         self._watchdog_s = 1.0 / min_frequency_hz
-        self.registers.fed_s = self.time_s
+        self.registers.last_command_s = self.time_s
 
     def protective_stop(self) -> None:
         """Stop hard; the program ends."""
-        if self.safety is Safety.NORMAL:
-            self.safety = Safety.PROTECTIVE_STOP
+        if self.safety is SafetyMode.NORMAL:
+            self.safety = SafetyMode.PROTECTIVE_STOP
             self._stopped_s = self.time_s
             self.stop_program()
             self.robot.halt()
@@ -114,5 +114,5 @@ class Controller:
         """End a protective stop; return whether it was old enough for that."""
         if self.time_s - self._stopped_s < self._params.unlock_delay_s:
             return False
-        self.safety = Safety.NORMAL
+        self.safety = SafetyMode.NORMAL
         return True

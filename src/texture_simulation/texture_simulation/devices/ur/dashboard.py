@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from texture_simulation.devices.ur.controller import Controller
+from texture_simulation.devices.ur.controller import EmulatedController
 from texture_simulation.devices.ur.tables import SAFETY_NAMES
 
 BANNER = b'Connected: Universal Robots Dashboard Server\n'
@@ -24,10 +24,10 @@ TOO_EARLY = (
 class DashboardSession:
     """The conversation with one client."""
 
-    def __init__(self, controller: Controller, go_offline: Callable[[float], None]) -> None:
+    def __init__(self, controller: EmulatedController, go_offline: Callable[[float], None]) -> None:
         self._controller = controller
         self._go_offline = go_offline
-        self._heard = b''
+        self._received = b''
 
     def greeting(self) -> bytes:
         """Return the line with which the server begins."""
@@ -35,7 +35,7 @@ class DashboardSession:
 
     def receive(self, data: bytes) -> bytes:
         """Take over what came; return the answers."""
-        *lines, self._heard = (self._heard + data).split(b'\n')
+        *lines, self._received = (self._received + data).split(b'\n')
         return b''.join(self._answer(line.decode('utf-8', 'replace').strip()).encode() + b'\n' for line in lines)
 
     def close(self) -> None:
@@ -54,58 +54,58 @@ class DashboardSession:
     def _safety(self) -> str:
         return SAFETY_NAMES[self._controller.safety]
 
-    def _version(self, _rest: str) -> str:
+    def _version(self, _argument: str) -> str:
         numbers = '.'.join(str(number) for number in self._controller.version.numbers)
         return f'URSoftware {numbers} (emulated)'
 
-    def _load(self, rest: str) -> str:
-        self._controller.loaded = rest
-        return f'Loading program: {rest}'
+    def _load(self, argument: str) -> str:
+        self._controller.loaded = argument
+        return f'Loading program: {argument}'
 
-    def _loaded(self, _rest: str) -> str:
+    def _loaded(self, _argument: str) -> str:
         loaded = self._controller.loaded
         return f'Loaded program: {loaded}' if loaded else 'No program loaded'
 
-    def _play(self, _rest: str) -> str:
+    def _play(self, _argument: str) -> str:
         if not self._controller.loaded:
             return 'Failed to execute: play'
         self._controller.play(self._controller.loaded)
         return 'Starting program'
 
-    def _pause(self, _rest: str) -> str:
+    def _pause(self, _argument: str) -> str:
         self._controller.pause()
         return 'Pausing program'
 
-    def _state(self, _rest: str) -> str:
+    def _state(self, _argument: str) -> str:
         controller = self._controller
         state = 'PAUSED' if controller.paused else 'PLAYING' if controller.playing else 'STOPPED'
         return f'{state} {controller.program_name}'
 
-    def _stop(self, _rest: str) -> str:
+    def _stop(self, _argument: str) -> str:
         self._controller.stop_program()
         return 'Stopped'
 
-    def _unlock(self, _rest: str) -> str:
+    def _unlock(self, _argument: str) -> str:
         return 'Protective stop releasing' if self._controller.unlock() else TOO_EARLY
 
-    def _emulate_stop(self, _rest: str) -> str:
+    def _emulate_stop(self, _argument: str) -> str:
         self._controller.protective_stop()
         return f'Safetystatus: {self._safety()}'
 
-    def _emulate_offline(self, rest: str) -> str:
-        return self._with_seconds(rest, self._go_offline, 'Going offline')
+    def _emulate_offline(self, argument: str) -> str:
+        return self._with_seconds(argument, self._go_offline, 'Going offline')
 
-    def _emulate_slow(self, rest: str) -> str:
-        return self._with_seconds(rest, partial(setattr, self._controller, 'acknowledge_s'), 'Acknowledging late')
+    def _emulate_slow(self, argument: str) -> str:
+        return self._with_seconds(argument, partial(setattr, self._controller, 'acknowledge_s'), 'Acknowledging late')
 
     @staticmethod
-    def _with_seconds(rest: str, use: Callable[[float], None], done: str) -> str:
+    def _with_seconds(argument: str, use: Callable[[float], None], done: str) -> str:
         try:
-            seconds = float(rest)
+            seconds = float(argument)
         except ValueError:
             seconds = math.nan
         if not 0 <= seconds < math.inf:
-            return f"came '{rest}'; a number of seconds is needed"
+            return f"came '{argument}'; a number of seconds is needed"
         use(seconds)
         return done
 
@@ -114,7 +114,7 @@ Answer = Callable[[DashboardSession, str], str]
 
 
 def _fixed(text: str) -> Answer:
-    return lambda _session, _rest: text
+    return lambda _session, _argument: text
 
 
 ANSWERS: Mapping[str, Answer] = {
@@ -123,9 +123,9 @@ ANSWERS: Mapping[str, Answer] = {
     'get robot model': _fixed('UR5'),
     'is in remote control': _fixed('true'),
     'robotmode': _fixed('Robotmode: RUNNING'),
-    'safetystatus': lambda session, _rest: f'Safetystatus: {session._safety()}',
-    'safetymode': lambda session, _rest: f'Safetymode: {session._safety()}',
-    'running': lambda session, _rest: f'Program running: {str(session._controller.playing).lower()}',
+    'safetystatus': lambda session, _argument: f'Safetystatus: {session._safety()}',
+    'safetymode': lambda session, _argument: f'Safetymode: {session._safety()}',
+    'running': lambda session, _argument: f'Program running: {str(session._controller.playing).lower()}',
     'programstate': DashboardSession._state,
     'get loaded program': DashboardSession._loaded,
     'isprogramsaved': _fixed('true rtde_control'),

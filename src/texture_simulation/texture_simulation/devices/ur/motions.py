@@ -14,7 +14,7 @@ import numpy as np
 from texture_core.arrays import Array
 
 
-class Motion(Protocol):
+class RobotMove(Protocol):
     """One motion of the robot; `done` when it will not move any further by itself."""
 
     done: bool
@@ -23,7 +23,7 @@ class Motion(Protocol):
         """Return the velocity of the next step, (6,)."""
 
 
-class Stop:
+class StopMove:
     """Lose speed (stopl)."""
 
     def __init__(self, deceleration: float) -> None:
@@ -37,7 +37,7 @@ class Stop:
         return slower
 
 
-class Speed:
+class SpeedMove:
     """Gain a velocity and keep it (speedl)."""
 
     def __init__(self, wanted: Array, acceleration: float) -> None:
@@ -50,7 +50,7 @@ class Speed:
         return approach(velocity, self._wanted, self._acceleration * step_s)
 
 
-class Line:
+class LinearMove:
     """Go to a pose on a straight line, speeding up and slowing down (movel)."""
 
     def __init__(self, goal: Array, speed: float, acceleration: float) -> None:
@@ -63,17 +63,17 @@ class Line:
         """Go on; the last step lands on the goal."""
         if self.done:
             return np.zeros(6)
-        way = self.goal - pose
-        distance = math.sqrt(way @ way)
+        offset = self.goal - pose
+        distance = math.sqrt(offset @ offset)
         faster = math.sqrt(velocity @ velocity) + self._acceleration * step_s
         speed = min(self._speed, faster, math.sqrt(2 * self._acceleration * distance))
         if speed * step_s >= distance:
             self.done = True
             speed = distance / step_s
-        return speed / distance * way if distance > 0 else np.zeros(6)
+        return speed / distance * offset if distance > 0 else np.zeros(6)
 
 
-class Servo:
+class ServoMove:
     """Follow a pose that is moved all the time (servoj of the pose): approach it within the look-ahead time."""
 
     def __init__(self, goal: Array, lookahead_s: float) -> None:
@@ -89,6 +89,6 @@ class Servo:
 
 def approach(now: Array, wanted: Array, step: float) -> Array:
     """Return `now` led towards `wanted` by at most `step`."""
-    way = wanted - now
-    distance = math.sqrt(way @ way)
-    return wanted if distance <= step else now + step / distance * way
+    offset = wanted - now
+    distance = math.sqrt(offset @ offset)
+    return wanted if distance <= step else now + step / distance * offset

@@ -51,8 +51,8 @@ class ControllerProcess:
         )
         if not self._ready(self._process):
             self._process.kill()
-            _, told = self._process.communicate()
-            raise DeviceError(told.strip() or 'the emulated UR controller did not start')
+            _, stderr = self._process.communicate()
+            raise DeviceError(stderr.strip() or 'the emulated UR controller did not start')
 
     @property
     def running(self) -> bool:
@@ -69,7 +69,7 @@ class ControllerProcess:
         """Let it hang."""
         os.kill(self.pid, signal.SIGSTOP)
 
-    def thaw(self) -> None:
+    def resume(self) -> None:
         """Let it go on."""
         os.kill(self.pid, signal.SIGCONT)
 

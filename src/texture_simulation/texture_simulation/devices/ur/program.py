@@ -15,10 +15,10 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.rotation import rotation_matrix
-from texture_simulation.devices.ur.motions import Line, Servo, Speed, Stop
+from texture_simulation.devices.ur.motions import LinearMove, ServoMove, SpeedMove, StopMove
 from texture_simulation.devices.ur.registers import Registers
-from texture_simulation.devices.ur.robot import ForceMode, Robot
-from texture_simulation.devices.ur.tables import DONE, READY, REALTIME, SLOW, Command
+from texture_simulation.devices.ur.robot import EmulatedRobot, ForceMode
+from texture_simulation.devices.ur.tables import DONE, READY, REALTIME, SLOW, ScriptCommand
 
 CONTACT_N = 3.0  # what tool_contact takes for a contact
 RETRACT_STOP = 3.0  # m/s², as in the script
@@ -48,13 +48,13 @@ Steps = Iterator[None]
 class ControlProgram:
     """The running script; `cycles` is advanced once per cycle of the controller and ends with the script."""
 
-    def __init__(self, robot: Robot, registers: Registers, host: Host, step_s: float) -> None:
+    def __init__(self, robot: EmulatedRobot, registers: Registers, host: Host, step_s: float) -> None:
         self._robot = robot
         self._registers = registers
         self._host = host
         self._step_s = step_s
         self._goal = robot.pose
-        self._operation: Line | Stop | None = None  # what runs without the script waiting for it
+        self._operation: LinearMove | StopMove | None = None  # what runs without the script waiting for it
         self._operations = 0
         self._writes = 0
         self._contact_direction: Array | None = None
@@ -65,29 +65,29 @@ class ControlProgram:
         """Obey until told to end; one item per cycle."""
         registers = self._registers
         executed = False
-        self._tell_progress(False)
+        self._report_progress(False)
         registers.int_out[0] = READY
-        while (number := registers.int_in[0]) != Command.STOP_SCRIPT:
+        while (number := registers.int_in[0]) != ScriptCommand.STOP_SCRIPT:
             if number in REALTIME:
-                yield from self._obey(number)
+                yield from self._execute(number)
                 registers.int_out[0] = READY
-            elif number == Command.NONE:
+            elif number == ScriptCommand.NONE:
                 executed = False
                 registers.int_out[0] = READY
             elif not executed:
-                yield from self._obey(number)
+                yield from self._execute(number)
                 if number in SLOW:
                     yield from self._wait(self._host.acknowledge_s)
                 registers.int_out[0] = DONE
                 executed = True
-            yield from self._look_around()
+            yield from self._check_background()
             yield
 
     def _wait(self, seconds: float) -> Steps:
         for _ in range(round(seconds / self._step_s)):
             yield
 
-    def _obey(self, number: int) -> Steps:
+    def _execute(self, number: int) -> Steps:
         handler = COMMANDS.get(number)
         if handler is None:
             if number not in self._unknown:
@@ -98,11 +98,11 @@ class ControlProgram:
         if steps is not None:
             yield from steps
 
-    def _look_around(self) -> Steps:
+    def _check_background(self) -> Steps:
         """Notice the end of an operation in the background, and contacts."""
         if self._operation is not None and self._operation.done:
             self._operation = None
-            self._tell_progress(False)
+            self._report_progress(False)
         direction = self._contact_direction
         if direction is not None and self._robot.touches(direction, CONTACT_N):
             self._contact_direction = None
@@ -112,50 +112,50 @@ class ControlProgram:
     def _vector(self, start: int) -> Array:
         return np.array(self._registers.double_in[start : start + 6])
 
-    def _run(self, motion: Line | Stop, in_background: bool) -> Steps:
+    def _run(self, motion: LinearMove | StopMove, in_background: bool) -> Steps:
         self._robot.motion = motion
         if self._operation is not None:
             self._operation = None
-            self._tell_progress(False)
+            self._report_progress(False)
         if in_background:
             self._operations = (self._operations + 1) % COUNTER_SIZE
             self._operation = motion
-            self._tell_progress(True)
+            self._report_progress(True)
             return
         while not motion.done:
             yield
 
-    def _tell_progress(self, running: bool) -> None:
+    def _report_progress(self, running: bool) -> None:
         self._writes = (self._writes + 1) % COUNTER_SIZE
         word = self._operations << 24 | self._writes << 16 | (RUNNING_BIT if running else 0)
         self._registers.int_out[2] = word
 
     def _retract(self) -> Steps:
         """Stop, and go back to where the contact began."""
-        yield from self._run(Stop(RETRACT_STOP), False)
-        yield from self._run(Line(self._robot.touched_at, RETRACT_SPEED, RETRACT_ACCELERATION), False)
+        yield from self._run(StopMove(RETRACT_STOP), False)
+        yield from self._run(LinearMove(self._robot.touched_at, RETRACT_SPEED, RETRACT_ACCELERATION), False)
 
     def move_l(self) -> Steps:
         """d0-5 pose, d6 speed, d7 acceleration, i1 in the background."""
         self._goal = self._vector(0)
-        line = Line(self._goal, *self._registers.double_in[6:8])
+        line = LinearMove(self._goal, *self._registers.double_in[6:8])
         return self._run(line, self._registers.int_in[1] == 1)
 
     def stop_l(self) -> Steps:
         """d0 deceleration, i1 in the background."""
-        return self._run(Stop(self._registers.double_in[0]), self._registers.int_in[1] == 1)
+        return self._run(StopMove(self._registers.double_in[0]), self._registers.int_in[1] == 1)
 
     def speed_l(self) -> None:
         """d0-5 velocity, d6 acceleration."""
-        self._robot.motion = Speed(self._vector(0), self._registers.double_in[6])
+        self._robot.motion = SpeedMove(self._vector(0), self._registers.double_in[6])
 
     def speed_stop(self) -> Steps:
         """d0 deceleration."""
-        return self._run(Stop(self._registers.double_in[0]), False)
+        return self._run(StopMove(self._registers.double_in[0]), False)
 
     def servo_l(self) -> None:
         """d0-5 pose, d9 look-ahead time."""
-        self._robot.motion = Servo(self._vector(0), self._registers.double_in[9])
+        self._robot.motion = ServoMove(self._vector(0), self._registers.double_in[9])
 
     def force_mode(self) -> None:
         """i1 type, i2-7 selection, d0-5 frame, d6-11 wrench, d12-17 limits; only type 2, the frame as it is."""
@@ -170,8 +170,8 @@ class ControlProgram:
         """End yielding, then stop. What speedl was told goes on afterwards: its thread lives."""
         speeding = self._robot.motion
         self._robot.end_force_mode()
-        yield from self._run(Stop(FORCE_MODE_STOP), False)
-        if isinstance(speeding, Speed):
+        yield from self._run(StopMove(FORCE_MODE_STOP), False)
+        if isinstance(speeding, SpeedMove):
             self._robot.motion = speeding
 
     def zero_ft_sensor(self) -> None:
@@ -209,7 +209,7 @@ class ControlProgram:
     def move_until_contact(self) -> Steps:
         """d0-5 velocity, d6-11 direction of the contact, d12 acceleration."""
         direction = self._vector(6)[:3]
-        self._robot.motion = Speed(self._vector(0), self._registers.double_in[12])
+        self._robot.motion = SpeedMove(self._vector(0), self._registers.double_in[12])
         while not self._robot.touches(direction, CONTACT_N):
             yield
         yield from self._retract()
@@ -230,24 +230,24 @@ class ControlProgram:
 
 
 COMMANDS: Mapping[int, Callable[[ControlProgram], Steps | None]] = {
-    Command.MOVE_L: ControlProgram.move_l,
-    Command.FORCE_MODE: ControlProgram.force_mode,
-    Command.FORCE_MODE_STOP: ControlProgram.force_mode_stop,
-    Command.ZERO_FT_SENSOR: ControlProgram.zero_ft_sensor,
-    Command.SPEED_L: ControlProgram.speed_l,
-    Command.SPEED_STOP: ControlProgram.speed_stop,
-    Command.SERVO_STOP: ControlProgram.speed_stop,
-    Command.SERVO_L: ControlProgram.servo_l,
-    Command.TOOL_CONTACT: ControlProgram.tool_contact,
-    Command.GET_STEPTIME: ControlProgram.get_steptime,
-    Command.GET_TARGET_WAYPOINT: ControlProgram.get_target_waypoint,
-    Command.PROTECTIVE_STOP: ControlProgram.protective_stop,
-    Command.STOP_L: ControlProgram.stop_l,
-    Command.SET_WATCHDOG: ControlProgram.set_watchdog,
-    Command.IS_POSE_WITHIN_SAFETY_LIMITS: ControlProgram.is_pose_within_safety_limits,
-    Command.IS_STEADY: ControlProgram.is_steady,
-    Command.MOVE_UNTIL_CONTACT: ControlProgram.move_until_contact,
-    Command.START_CONTACT_DETECTION: ControlProgram.start_contact_detection,
-    Command.STOP_CONTACT_DETECTION: ControlProgram.stop_contact_detection,
-    Command.READ_CONTACT_DETECTION: ControlProgram.read_contact_detection,
+    ScriptCommand.MOVE_L: ControlProgram.move_l,
+    ScriptCommand.FORCE_MODE: ControlProgram.force_mode,
+    ScriptCommand.FORCE_MODE_STOP: ControlProgram.force_mode_stop,
+    ScriptCommand.ZERO_FT_SENSOR: ControlProgram.zero_ft_sensor,
+    ScriptCommand.SPEED_L: ControlProgram.speed_l,
+    ScriptCommand.SPEED_STOP: ControlProgram.speed_stop,
+    ScriptCommand.SERVO_STOP: ControlProgram.speed_stop,
+    ScriptCommand.SERVO_L: ControlProgram.servo_l,
+    ScriptCommand.TOOL_CONTACT: ControlProgram.tool_contact,
+    ScriptCommand.GET_STEPTIME: ControlProgram.get_steptime,
+    ScriptCommand.GET_TARGET_WAYPOINT: ControlProgram.get_target_waypoint,
+    ScriptCommand.PROTECTIVE_STOP: ControlProgram.protective_stop,
+    ScriptCommand.STOP_L: ControlProgram.stop_l,
+    ScriptCommand.SET_WATCHDOG: ControlProgram.set_watchdog,
+    ScriptCommand.IS_POSE_WITHIN_SAFETY_LIMITS: ControlProgram.is_pose_within_safety_limits,
+    ScriptCommand.IS_STEADY: ControlProgram.is_steady,
+    ScriptCommand.MOVE_UNTIL_CONTACT: ControlProgram.move_until_contact,
+    ScriptCommand.START_CONTACT_DETECTION: ControlProgram.start_contact_detection,
+    ScriptCommand.STOP_CONTACT_DETECTION: ControlProgram.stop_contact_detection,
+    ScriptCommand.READ_CONTACT_DETECTION: ControlProgram.read_contact_detection,
 }

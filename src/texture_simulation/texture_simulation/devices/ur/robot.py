@@ -1,4 +1,4 @@
-"""The emulated robot: a finger that follows motions exactly, yields under force control, and feels the surface."""
+"""The emulated robot: a finger that follows motions exactly, complies under force control, and measures forces."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_simulation.devices.ur.motions import Motion, Stop
+from texture_simulation.devices.ur.contact_plane import ContactPlane
+from texture_simulation.devices.ur.motions import RobotMove, StopMove
 from texture_simulation.devices.ur.params import UrControllerParams
-from texture_simulation.devices.ur.surface import Surface
 
 # Force control of the emulated robot: speed per force error, and the lag of the arm behind it. With 2 kN/m the error
 # fades in about 0.1 s, which is of the order of a real arm's.
@@ -35,7 +35,7 @@ class ForceMode:
     limits: Array
 
 
-class Robot:
+class EmulatedRobot:
     """Physics of the robot, step by step.
 
     Attributes
@@ -50,19 +50,19 @@ class Robot:
     """
 
     def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
-        self.surface = Surface(params)
+        self.surface = ContactPlane(params)
         x, y, z = self.surface.origin
         self.pose: Array = np.array([x, y, z + params.start_height_m, 0.0, 0.0, 0.0])
         self.velocity: Array = np.zeros(6)
         self.force: Array = np.zeros(6)
-        self.motion: Motion = Stop(HALT)
+        self.motion: RobotMove = StopMove(HALT)
         self.force_mode: ForceMode | None = None
         self.touched_at = self.pose
         self._offset: Array = params.force_offset_n * OFFSET_DIRECTION
         self._noise_n = params.force_noise_n
         self._rng = rng
         self._contact: Array = np.zeros(3)
-        self._yielding: Array = np.zeros(3)  # speed of the yielding axes in the frame of the force mode
+        self._compliant_m_s: Array = np.zeros(3)  # speed of the yielding axes in the frame of the force mode
 
     @property
     def pressing_n(self) -> float:
@@ -73,7 +73,7 @@ class Robot:
         """Move for one step."""
         velocity = self.motion.velocity(self.pose, self.velocity, step_s)
         if self.force_mode is not None:
-            velocity = self._yield(velocity, self.force_mode, step_s)
+            velocity = self._comply(velocity, self.force_mode, step_s)
         self.velocity = velocity
         self.pose = self.pose + velocity * step_s
         touched = self._contact.any()
@@ -89,7 +89,7 @@ class Robot:
         self._offset[:3] = -self._contact
 
     def touches(self, direction: Array, threshold_n: float) -> bool:
-        """Return whether a force against a direction, (3,), is felt; a direction of 0 means any."""
+        """Return whether a force against a direction, (3,), is measured; a direction of 0 means any."""
         force = self.force[:3]
         length = math.sqrt(direction @ direction)
         against = math.sqrt(force @ force) if length == 0 else -(force @ direction) / length
@@ -98,19 +98,19 @@ class Robot:
     def end_force_mode(self) -> None:
         """Yield no longer."""
         self.force_mode = None
-        self._yielding = np.zeros(3)
+        self._compliant_m_s = np.zeros(3)
 
     def halt(self) -> None:
         """Stop hard, whatever it was doing."""
         self.end_force_mode()
-        self.motion = Stop(HALT)
+        self.motion = StopMove(HALT)
 
-    def _yield(self, velocity: Array, mode: ForceMode, step_s: float) -> Array:
+    def _comply(self, velocity: Array, mode: ForceMode, step_s: float) -> Array:
         """Replace the velocity along yielding axes by one that brings the force to what is wanted."""
         error = mode.wrench[:3] + mode.axes.T @ self.force[:3]
         wanted = np.clip(ADMITTANCE_M_S_N * error, -mode.limits[:3], mode.limits[:3])
-        self._yielding = self._yielding - (wanted - self._yielding) * math.expm1(-step_s / LAG_S)
+        self._compliant_m_s = self._compliant_m_s - (wanted - self._compliant_m_s) * math.expm1(-step_s / LAG_S)
         along = mode.axes.T @ velocity[:3]
-        along = np.where(mode.selection[:3] > 0, self._yielding, along)
+        along = np.where(mode.selection[:3] > 0, self._compliant_m_s, along)
         turning = np.where(mode.selection[3:] > 0, 0.0, velocity[3:])
         return np.concatenate([mode.axes @ along, turning])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Mapping
 
-from texture_simulation.devices.ur.controller import Controller
-from texture_simulation.devices.ur.tables import FORMATS, Message
+from texture_simulation.devices.ur.controller import EmulatedController
+from texture_simulation.devices.ur.tables import FORMATS, RtdeMessage
 from texture_simulation.devices.ur.variables import INPUTS, OUTPUTS, Getter, Setter
 
 HEADER = struct.Struct('>HB')
@@ -21,10 +21,10 @@ class InputClaims(dict[str, 'RtdeSession']):
 class RtdeSession:
     """The conversation with one client; `package` is what it gets each cycle once it has asked for it."""
 
-    def __init__(self, controller: Controller, claims: InputClaims) -> None:
+    def __init__(self, controller: EmulatedController, claims: InputClaims) -> None:
         self._controller = controller
         self._claims = claims
-        self._heard = b''
+        self._received = b''
         self._output_format = struct.Struct('>')
         self._getters: list[Getter] = []
         self._every_s = controller.step_s
@@ -38,16 +38,16 @@ class RtdeSession:
 
     def receive(self, data: bytes) -> bytes:
         """Take over what came; return the answers."""
-        self._heard += data
+        self._received += data
         answers = b''
-        while len(self._heard) >= HEADER.size:
-            size, kind = HEADER.unpack_from(self._heard)
+        while len(self._received) >= HEADER.size:
+            size, kind = HEADER.unpack_from(self._received)
             if size < HEADER.size:
-                self._heard = b''
+                self._received = b''
                 break
-            if len(self._heard) < size:
+            if len(self._received) < size:
                 break
-            payload, self._heard = self._heard[HEADER.size : size], self._heard[size:]
+            payload, self._received = self._received[HEADER.size : size], self._received[size:]
             handler = HANDLERS.get(kind)
             answer = handler(self, payload) if handler is not None else None
             answers += _message(kind, answer) if answer is not None else b''
@@ -65,7 +65,7 @@ class RtdeSession:
             return b''
         self._due_s = max(self._due_s + self._every_s, controller.time_s)
         values = [value for getter in self._getters for value in getter(controller)]
-        return _message(Message.DATA, bytes([OUTPUT_RECIPE]) + self._output_format.pack(*values))
+        return _message(RtdeMessage.DATA, bytes([OUTPUT_RECIPE]) + self._output_format.pack(*values))
 
     def _on_request_version(self, payload: bytes) -> bytes:
         return bytes([payload == struct.pack('>H', PROTOCOL_VERSION)])
@@ -122,7 +122,7 @@ class InputRecipe:
             for fields in ['>' + FORMATS[INPUTS[name][0]]]
         ]
 
-    def write(self, controller: Controller, data: bytes) -> None:
+    def write(self, controller: EmulatedController, data: bytes) -> None:
         """Write the values in `data`; what has another length is not taken."""
         if len(data) != self._format.size:
             return
@@ -134,13 +134,13 @@ class InputRecipe:
 
 
 HANDLERS: Mapping[int, Callable[[RtdeSession, bytes], bytes | None]] = {
-    Message.REQUEST_VERSION: RtdeSession._on_request_version,
-    Message.CONTROLLER_VERSION: RtdeSession._on_controller_version,
-    Message.SETUP_OUTPUTS: RtdeSession._on_setup_outputs,
-    Message.SETUP_INPUTS: RtdeSession._on_setup_inputs,
-    Message.START: RtdeSession._on_start,
-    Message.PAUSE: RtdeSession._on_pause,
-    Message.DATA: RtdeSession._on_data,
+    RtdeMessage.REQUEST_VERSION: RtdeSession._on_request_version,
+    RtdeMessage.CONTROLLER_VERSION: RtdeSession._on_controller_version,
+    RtdeMessage.SETUP_OUTPUTS: RtdeSession._on_setup_outputs,
+    RtdeMessage.SETUP_INPUTS: RtdeSession._on_setup_inputs,
+    RtdeMessage.START: RtdeSession._on_start,
+    RtdeMessage.PAUSE: RtdeSession._on_pause,
+    RtdeMessage.DATA: RtdeSession._on_data,
 }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from texture_simulation.devices.ur.controller import Controller
+from texture_simulation.devices.ur.controller import EmulatedController
 
 LONGEST_SCRIPT = 1_000_000
 END = b'\nend\n'
@@ -11,9 +11,9 @@ END = b'\nend\n'
 class ScriptSession:
     """The conversation with one client, who sends programs and gets no answer."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: EmulatedController) -> None:
         self._controller = controller
-        self._heard = b''
+        self._received = b''
 
     def greeting(self) -> bytes:
         """Say nothing at the start."""
@@ -21,10 +21,10 @@ class ScriptSession:
 
     def receive(self, data: bytes) -> bytes:
         """Start a program once its last line is there."""
-        self._heard = (self._heard + data)[-LONGEST_SCRIPT:]
-        if self._heard.endswith(END):
-            self._controller.upload(self._heard.decode('utf-8', 'replace'))
-            self._heard = b''
+        self._received = (self._received + data)[-LONGEST_SCRIPT:]
+        if self._received.endswith(END):
+            self._controller.upload(self._received.decode('utf-8', 'replace'))
+            self._received = b''
         return b''
 
     def close(self) -> None:

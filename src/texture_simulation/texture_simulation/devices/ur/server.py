@@ -14,14 +14,14 @@ from functools import partial
 from typing import Protocol
 
 from texture_core.errors import DeviceError
-from texture_core.finger import FingerSender, FingerState
-from texture_simulation.devices.ur.controller import Controller
+from texture_core.finger_state import FingerSender, FingerState
+from texture_simulation.devices.ur.controller import EmulatedController
 from texture_simulation.devices.ur.dashboard import DashboardSession
 from texture_simulation.devices.ur.rtde import InputClaims, RtdeSession
 from texture_simulation.devices.ur.script import ScriptSession
 from texture_simulation.devices.ur.tables import DASHBOARD_PORT, RTDE_PORT, SCRIPT_PORT
 
-MOST_MISSED_CYCLES = 250  # that are made up for; a process that was frozen for longer has lost the time
+MAX_MISSED_CYCLES = 250  # that are made up for; a process that was frozen for longer has lost the time
 CHUNK = 65536
 
 
@@ -50,7 +50,7 @@ class Server:
         If a port cannot be opened.
     """
 
-    def __init__(self, controller: Controller, ip: str, finger_port: int) -> None:
+    def __init__(self, controller: EmulatedController, ip: str, finger_port: int) -> None:
         self._controller = controller
         self._ip = ip
         claims = InputClaims()
@@ -77,8 +77,8 @@ class Server:
             missed = max(0, time.monotonic_ns() - due_ns) // step_ns
             due_ns += (1 + missed) * step_ns
             self._serve()
-            for _ in range(min(missed, MOST_MISSED_CYCLES)):
-                self._controller.make_up()
+            for _ in range(min(missed, MAX_MISSED_CYCLES)):
+                self._controller.catch_up()
             self._controller.tick()
             self._publish()
 
@@ -163,15 +163,15 @@ class Server:
 
 
 class FingerReport:
-    """Tells the emulated bench where the finger is over the surface, in every cycle; nothing if the port is 0."""
+    """Sends the finger state to the emulator in every cycle; nothing if the port is 0."""
 
-    def __init__(self, controller: Controller, port: int) -> None:
+    def __init__(self, controller: EmulatedController, port: int) -> None:
         self._controller = controller
-        self._bench = FingerSender(port)
+        self._emulator = FingerSender(port)
 
     def send(self) -> None:
         """Send one datagram."""
         robot = self._controller.robot
         x, y, z = (robot.pose[:3] - robot.surface.origin).tolist()
         vx, vy, vz = robot.velocity[:3].tolist()
-        self._bench.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))
+        self._emulator.send(FingerState(time.monotonic_ns(), x, y, z, vx, vy, vz, robot.pressing_n))

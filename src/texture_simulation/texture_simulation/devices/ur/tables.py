@@ -15,7 +15,7 @@ SCRIPT_PORT = 30003
 
 
 @dataclass(frozen=True)
-class Version:
+class ControllerVersion:
     """What depends on the version of the control software."""
 
     numbers: tuple[int, int, int, int]
@@ -23,15 +23,15 @@ class Version:
     dashboard: bool  # PolyScope X, version 10, has none
 
 
-VERSIONS: Mapping[str, Version] = {
-    '3.15': Version((3, 15, 8, 0), 125.0, True),
-    '5.12': Version((5, 12, 0, 0), 500.0, True),
-    '5.23': Version((5, 23, 0, 0), 500.0, True),
-    '10.10': Version((10, 10, 0, 0), 500.0, False),
+VERSIONS: Mapping[str, ControllerVersion] = {
+    '3.15': ControllerVersion((3, 15, 8, 0), 125.0, True),
+    '5.12': ControllerVersion((5, 12, 0, 0), 500.0, True),
+    '5.23': ControllerVersion((5, 23, 0, 0), 500.0, True),
+    '10.10': ControllerVersion((10, 10, 0, 0), 500.0, False),
 }
 
 
-class Message(enum.IntEnum):
+class RtdeMessage(enum.IntEnum):
     """Types of RTDE messages."""
 
     REQUEST_VERSION = 86
@@ -59,22 +59,22 @@ FORMATS: Mapping[str, str] = {
 }
 
 
-class Safety(enum.IntEnum):
+class SafetyMode(enum.IntEnum):
     """RTDE variable safety_mode."""
 
     NORMAL = 1
     PROTECTIVE_STOP = 3
 
 
-SAFETY_BITS: Mapping[Safety, int] = {Safety.NORMAL: 1 << 0, Safety.PROTECTIVE_STOP: 1 << 2}
-SAFETY_NAMES: Mapping[Safety, str] = {Safety.NORMAL: 'NORMAL', Safety.PROTECTIVE_STOP: 'PROTECTIVE_STOP'}
+SAFETY_BITS: Mapping[SafetyMode, int] = {SafetyMode.NORMAL: 1 << 0, SafetyMode.PROTECTIVE_STOP: 1 << 2}
+SAFETY_NAMES: Mapping[SafetyMode, str] = {SafetyMode.NORMAL: 'NORMAL', SafetyMode.PROTECTIVE_STOP: 'PROTECTIVE_STOP'}
 ROBOT_RUNNING = 7  # robot_mode
 PROGRAM_STOPPED, PROGRAM_PLAYING, PROGRAM_PAUSED = 1, 2, 4  # runtime_state
 CONTROL_SCRIPT = 'rtde_control'  # how the control script of ur-rtde calls itself
 POWER_ON_BIT, PROGRAM_RUNNING_BIT = 1 << 0, 1 << 1  # robot_status_bits
 
 
-class Command(enum.IntEnum):
+class ScriptCommand(enum.IntEnum):
     """Numbers in input_int_register_0 that the control script obeys."""
 
     NONE = 0
@@ -104,5 +104,7 @@ class Command(enum.IntEnum):
 # The script processes these in every cycle and stays ready; the client does not wait for them.
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
 # What the robot does for some time; a real controller may acknowledge it late.
-SLOW = frozenset({Command.SPEED_STOP, Command.FORCE_MODE_STOP, Command.ZERO_FT_SENSOR, Command.STOP_L})
+SLOW = frozenset(
+    {ScriptCommand.SPEED_STOP, ScriptCommand.FORCE_MODE_STOP, ScriptCommand.ZERO_FT_SENSOR, ScriptCommand.STOP_L}
+)
 READY, DONE = 1, 2  # output_int_register_0

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from texture_simulation.devices.ur.controller import Controller
+from texture_simulation.devices.ur.controller import EmulatedController
 from texture_simulation.devices.ur.registers import COUNT
 from texture_simulation.devices.ur.tables import (
     POWER_ON_BIT,
@@ -20,7 +20,7 @@ from texture_simulation.devices.ur.tables import (
     SAFETY_BITS,
 )
 
-Getter = Callable[[Controller], Sequence[Any]]
+Getter = Callable[[EmulatedController], Sequence[Any]]
 Variable = tuple[str, Getter]
 
 JOINTS = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
@@ -35,11 +35,11 @@ def _register(name: str, index: int) -> Getter:
     return lambda controller: (getattr(controller.registers, name)[index],)
 
 
-def _status_bits(controller: Controller) -> Sequence[int]:
+def _status_bits(controller: EmulatedController) -> Sequence[int]:
     return (POWER_ON_BIT | (PROGRAM_RUNNING_BIT if controller.playing else 0),)
 
 
-def _runtime_state(controller: Controller) -> Sequence[int]:
+def _runtime_state(controller: EmulatedController) -> Sequence[int]:
     if controller.paused:
         return (PROGRAM_PAUSED,)
     return (PROGRAM_PLAYING if controller.playing else PROGRAM_STOPPED,)
@@ -97,29 +97,29 @@ OUTPUTS: Mapping[str, Variable] = {
     **{f'output_double_register_{index}': ('DOUBLE', _register('double_out', index)) for index in range(COUNT)},
 }
 
-Setter = Callable[[Controller, Sequence[Any]], None]
+Setter = Callable[[EmulatedController, Sequence[Any]], None]
 
 
 def _write(name: str, index: int) -> Setter:
-    def setter(controller: Controller, values: Sequence[Any]) -> None:
+    def setter(controller: EmulatedController, values: Sequence[Any]) -> None:
         getattr(controller.registers, name)[index] = values[0]
 
     return setter
 
 
-def _feed(controller: Controller, values: Sequence[Any]) -> None:
+def _write_command(controller: EmulatedController, values: Sequence[Any]) -> None:
     """Write input_int_register_0, which the watchdog watches."""
     controller.registers.int_in[0] = values[0]
-    controller.registers.fed_s = controller.time_s
+    controller.registers.last_command_s = controller.time_s
 
 
-def _ignore(_controller: Controller, _values: Sequence[Any]) -> None:
+def _ignore(_controller: EmulatedController, _values: Sequence[Any]) -> None:
     return
 
 
 INPUTS: Mapping[str, tuple[str, Setter]] = {
     **{f'input_int_register_{index}': ('INT32', _write('int_in', index)) for index in range(COUNT)},
     **{f'input_double_register_{index}': ('DOUBLE', _write('double_in', index)) for index in range(COUNT)},
-    'input_int_register_0': ('INT32', _feed),
+    'input_int_register_0': ('INT32', _write_command),
     'external_force_torque': ('VECTOR6D', _ignore),
 }

@@ -1,0 +1,178 @@
+"""The emulator as a user starts it, in a namespace and a ROS domain of its own."""
+
+import os
+import re
+import signal
+from fnmatch import fnmatch
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.ros
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from texture_bringup.demo.isolation import free_port  # noqa: E402
+from texture_bringup.ros.operator import Operator  # noqa: E402
+from texture_core import resources  # noqa: E402
+from texture_core.errors import InvalidParameter, LaunchFailed  # noqa: E402
+from texture_core.exploration import ExplorationRequest  # noqa: E402
+from texture_evaluation.train import train_from_bags  # noqa: E402
+from texture_evaluation.train_grades import train_grades_from_bags  # noqa: E402
+from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+
+DOMAIN = 61
+DEADLINE_S = 60.0
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05, surface='ridge_2mm_deep')
+STARTED = re.compile(r'\[launch\] (\S+) started \(process (\d+)\)')
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp('bench')
+
+
+def launched(folder: Path, **arguments: object) -> ChildLauncher:
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
+    given = {'device': folder / 'tsf85', 'finger_port': free_port(), 'namespace': 'left', **arguments}
+    return ChildLauncher('bench', given, environment, folder / 'nodes.log')
+
+
+def processes(launcher: ChildLauncher) -> dict[str, int]:
+    """Return the process of each node, by its name."""
+    return {name: int(number) for name, number in STARTED.findall(launcher.log.read_text())}
+
+
+def is_running(pid: int) -> bool:
+    return Path(f'/proc/{pid}').exists()
+
+
+@pytest.fixture(scope='module')
+def bags(folder):
+    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0)
+    return write_simulated(folder / 'bags', plan, np.random.default_rng(0), surfaces=('glass', 'ridge_2mm_deep'))
+
+
+@pytest.fixture(scope='module')
+def roughness_model(folder, bags):
+    grades = folder / 'grades.csv'
+    grades.write_text('texture,grade\nglass,1\nridge_2mm_deep,5\n', encoding='utf-8')
+    train_grades_from_bags('roughness', bags, grades, out=folder / 'rough')
+    return folder / 'rough.json'
+
+
+@pytest.fixture(scope='module')
+def bench(folder, roughness_model):
+    with launched(folder, surface='ridge_2mm_deep', roughness_model=roughness_model) as launcher:
+        yield launcher
+
+
+@pytest.fixture(scope='module')
+def operator(bench):
+    with Operator('left', DOMAIN, bench.check) as operator:
+        operator.wait_for_explorer(DEADLINE_S)
+        operator.wait_for_signal(DEADLINE_S)
+        operator.wait_for_listeners(('features', 'roughness_features'), 1, bench.check)  # who names and who grades
+        operator.set_parameters('explorer', {'estimate_timeout_s': 10.0})  # this machine may be busy
+        yield operator
+
+
+@pytest.fixture(scope='module')
+def models(folder, bags):
+    """Return the paths of a model on the vibration alone and of one with the taxels, both of simulated slides."""
+    for recipe in ('default', 'vibration-and-taxels'):
+        train_from_bags(recipe, bags, out=folder / recipe)
+    return {'vibration': folder / 'default.skops', 'taxels': folder / 'vibration-and-taxels.skops'}
+
+
+def test_the_security_policy_allows_all_that_the_nodes_use(operator) -> None:
+    policy = ElementTree.parse(resources.folder('texture_bringup', 'config/sros2') / 'policy.xml')
+    allowed = {item.text for kind in ('topic', 'service') for item in policy.iter(kind)}
+    allowed |= {f'{action.text}/_action/*' for action in policy.iter('action')}
+    node = operator._node
+    used = {name for name, _ in (*node.get_topic_names_and_types(), *node.get_service_names_and_types())}
+    names = {name.removeprefix('/left') for name in used}
+    assert {'/signal', '/explore', '/explore/_action/send_goal', '/roughness_features'} <= names
+    assert [name for name in names if not any(fnmatch(name, pattern) for pattern in allowed)] == []
+
+
+def test_an_exploration_without_a_model_ends_well_and_says_what_is_missing(operator) -> None:
+    seen = []
+    explored = operator.explore(SLIDE, lambda state, _texture: seen.append(state.phase.value))
+    assert explored.success, explored.message
+    assert 'slide' in seen
+    assert explored.texture.final
+    assert 'model' in explored.texture.message
+
+
+def test_a_roughness_model_grades_beside_the_classifier(operator) -> None:
+    roughness = operator.explore(SLIDE).roughness
+    assert (roughness.valid, roughness.final, roughness.model) == (True, True, 'rough')
+    assert roughness.grade > 3.0
+    assert roughness.grade_std > 0.0
+
+
+def test_a_model_of_simulated_slides_recognises_the_surface_on_the_bench(operator, models) -> None:
+    operator.set_parameters('classifier', {'model': str(models['vibration'])})
+    explored = operator.explore(SLIDE)
+    assert (explored.texture.label, explored.texture.final) == ('ridge_2mm_deep', True)
+    assert explored.texture.confidence > 0.9
+
+
+def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator) -> None:
+    operator.set_parameters('bench', {'surface': 'glass'})
+    assert operator.explore(SLIDE).texture.label == 'glass'
+    with pytest.raises(InvalidParameter, match="did you mean 'leather'"):
+        operator.set_parameters('bench', {'surface': 'lether'})
+
+
+def test_a_model_of_another_recipe_is_not_used_and_the_estimate_says_so(operator, models) -> None:
+    operator.set_parameters('classifier', {'model': str(models['taxels'])})
+    estimate = operator.explore(SLIDE).texture
+    assert estimate.label == ''
+    assert 'signal_static' in estimate.message
+    with pytest.raises(InvalidParameter, match='nowhere'):
+        operator.set_parameters('classifier', {'model': '/nowhere'})
+
+
+@pytest.mark.parametrize(
+    ('asked', 'reason'),
+    [({'motion': 'linear_slid'}, "'linear_slide'"), ({'motion': 'linear_slide', 'speed_m_s': 9.0}, '0.25')],
+)
+def test_an_impossible_exploration_is_refused_with_what_is_allowed(operator, asked, reason) -> None:
+    explored = operator.explore(ExplorationRequest(**asked))
+    assert (explored.success, explored.exploration_id) == (False, '')
+    assert reason in explored.message
+
+
+def test_nothing_moves_when_stopped(operator) -> None:
+    assert operator.stop() == 'nothing is moving'
+
+
+def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operator, bench) -> None:
+    pids = processes(bench)
+    names = ('bench', 'sensor', 'explorer', 'feature_extractor', 'classifier')
+    assert set(pids) == {f'left/{name}' for name in (*names, 'roughness_features', 'roughness_estimator')}
+    os.kill(pids['left/classifier'], signal.SIGKILL)
+    with pytest.raises(LaunchFailed, match='node left/classifier was killed by SIGKILL'):
+        for _ in range(1000):
+            operator.wait_for_signal(DEADLINE_S)
+    assert not any(is_running(pid) for pid in pids.values())
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'sentence'),
+    [
+        ({'scene': 'twelve_texture'}, "did you mean 'twelve_textures'?"),
+        ({'finger_port': 99999}, 'finger_port'),
+        ({'seed': 'x'}, 'seed'),
+    ],
+)
+def test_a_wrong_launch_argument_ends_the_launch_with_a_sentence_of_the_node(folder, wrong, sentence) -> None:
+    with launched(folder, **wrong) as launcher:
+        assert launcher.wait(DEADLINE_S) == 1
+        lines = launcher.log.read_text().splitlines()
+    assert any(line.startswith('[left/') and sentence in line for line in lines), lines
+    assert any('died with exit code 2' in line for line in lines), lines

@@ -1,0 +1,142 @@
+import numpy as np
+import pytest
+
+from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.framing import Frame, pack
+from texture_core.signal import lost_samples
+from texture_drivers.stream_decoder import FramedStream, StreamDecoder
+
+SECOND = 1_000_000_000
+START = 1_700_000_000 * SECOND
+
+
+def stream(kind=1, rate_hz=2500.0, channels=('a', 'b'), topic='signal'):
+    ones = np.ones(len(channels))
+    return FramedStream(topic, kind, f'test/{topic}', rate_hz, channels, 'V', 0.5 * ones, -1.0 * ones)
+
+
+def frame(number, *, kind=1, rows=10, rate_hz=2500.0, first_us=0, columns=2):
+    """A frame whose samples count: row r of the stream holds r in the first channel and −r in the second."""
+    counts = (np.arange(rows) + number * rows) % 30_000
+    body = np.column_stack([counts, -counts][:columns]).astype('<i2').tobytes()
+    return Frame(
+        kind, 1, number % 65536, (first_us + round(number * rows / rate_hz * 1e6)) % 2**32, rows, columns, body
+    )
+
+
+def run(line, numbers, offset_ns=START, **how):
+    """Feed frames one by one, each as its last sample is taken; return what comes, by topic."""
+    batches = {}
+    for number in numbers:
+        sent = frame(number, **how)
+        arrival_ns = offset_ns + round((number + 1) * sent.rows / how.get('rate_hz', 2500.0) * SECOND)
+        for topic, found in line.feed(pack(sent), arrival_ns).items():
+            batches.setdefault(topic, []).extend(found)
+    return batches
+
+
+def test_samples_come_out_in_order_in_units_and_with_their_times():
+    line = StreamDecoder([stream()], 'tip')
+    batches = run(line, range(500))['signal']
+    samples = np.concatenate([batch.samples for batch in batches])
+    skipped = 5000 - len(samples)  # the clock settles for 0.1 s
+    assert 240 <= skipped <= 280
+    np.testing.assert_array_equal(samples[:, 0], 0.5 * np.arange(skipped, 5000) - 1.0)
+    np.testing.assert_array_equal(samples[:, 1], -0.5 * np.arange(skipped, 5000) - 1.0)
+    assert lost_samples(batches) == line.trackers[1].lost == 0
+    assert batches[0].first_sample == 0
+    assert batches[-1].stamp_ns == pytest.approx(START + 4990 / 2500 * SECOND, abs=1e6)
+    assert (batches[0].channels, batches[0].unit, batches[0].frame_id) == (('a', 'b'), 'V', 'tip')
+
+
+def test_a_lost_frame_makes_a_jump_of_exactly_its_samples():
+    line = StreamDecoder([stream()])
+    batches = run(line, [n for n in range(200) if n not in (100, 101, 150)])['signal']
+    assert lost_samples(batches) == line.trackers[1].lost == 30
+    truth = [batch.samples[0, 0] * 2 + 2 for batch in batches]
+    indices = [batch.first_sample for batch in batches]
+    assert np.ptp(np.subtract(truth, indices)) == 0
+
+
+def test_frames_read_at_once_are_one_batch_and_are_split_where_samples_are_missing():
+    line = StreamDecoder([stream()])
+    run(line, range(100))
+    data = b''.join(pack(frame(n)) for n in (100, 101, 103, 104))
+    batches = line.feed(data, START + round(1050 / 2500 * SECOND))['signal']
+    assert [len(batch.samples) for batch in batches] == [20, 20]
+    assert batches[1].first_sample - batches[0].first_sample == 30
+
+
+def test_sequence_and_time_wrap_without_a_trace():
+    line = StreamDecoder([stream()])
+    numbers = range(65536 - 100, 65536 + 100)
+    first_us = 2**32 - round(65536 * 10 / 2500 * 1e6)  # both wrap at frame 65536
+    batches = run(line, numbers, first_us=first_us)['signal']
+    assert lost_samples(batches) == 0
+    assert line.restarts == 0
+    steps_ns = np.diff([batch.stamp_ns for batch in batches])
+    np.testing.assert_allclose(steps_ns, 4e6, rtol=0.02)
+
+
+def test_a_device_that_begins_again_goes_on_at_the_index_of_the_hosts_clock():
+    line = StreamDecoder([stream()])
+    before = run(line, range(1000))['signal'][-1]
+    after = run(line, range(200), offset_ns=START + 10 * SECOND)['signal'][0]  # it began anew 6 s later
+    assert line.restarts == 1
+    assert (after.stamp_ns - before.stamp_ns) / SECOND * 2500 == pytest.approx(
+        after.first_sample - before.first_sample, abs=1
+    )
+
+
+def test_even_a_device_that_begins_again_at_once_is_noticed():
+    line = StreamDecoder([stream()])
+    before = run(line, range(100))['signal'][-1]
+    after = run(line, range(100), offset_ns=before.end_ns)['signal'][0]
+    assert line.restarts == 1
+    assert (after.stamp_ns - before.stamp_ns) / SECOND * 2500 == pytest.approx(
+        after.first_sample - before.first_sample, abs=1
+    )
+
+
+def test_after_a_replug_too():
+    line = StreamDecoder([stream()])
+    before = run(line, range(1000))['signal'][-1]
+    line.restart()
+    after = run(line, range(3000, 3200), offset_ns=START - 5 * SECOND)['signal'][0]
+    assert line.restarts == 0
+    assert (after.stamp_ns - before.stamp_ns) / SECOND * 2500 == pytest.approx(
+        after.first_sample - before.first_sample, abs=1
+    )
+
+
+def test_two_streams_of_one_line_share_its_clock_and_lose_on_their_own():
+    fast, slow = stream(), stream(kind=2, rate_hz=50.0, channels=('f',), topic='signal_static')
+    line = StreamDecoder([fast, slow])
+    static = []
+    for number in range(500):
+        run_ns = START + round((number + 1) / 250 * SECOND)
+        data = pack(frame(number)) if number != 300 else b''
+        if number % 5 == 4:
+            data += pack(frame(number // 5, kind=2, rows=1, rate_hz=50.0, columns=1))
+        static += line.feed(data, run_ns).get('signal_static', [])
+    assert (line.trackers[1].lost, line.trackers[2].lost) == (10, 0)
+    assert line.clock.steps == 0
+    assert np.diff([batch.stamp_ns for batch in static]) == pytest.approx(20e6, rel=0.02)
+
+
+def test_other_kinds_and_contradicting_frames_are_counted_and_passed_over():
+    line = StreamDecoder([stream()])
+    line.feed(pack(Frame(9, 7, 0, 0, 3, 1, b'else')) + pack(Frame(1, 1, 0, 0, 3, 2, b'short')), START)
+    assert (line.other_frames, line.malformed) == (1, 1)
+
+
+def test_a_device_that_speaks_differently_is_reported_in_one_sentence():
+    with pytest.raises(DeviceError, match='sends 3 channels, and 2 are named'):
+        StreamDecoder([stream()]).feed(pack(Frame(1, 1, 0, 0, 1, 3, bytes(6))), START)
+    with pytest.raises(DeviceError, match='sends frames of version 2, and 1 is known'):
+        StreamDecoder([stream()]).feed(pack(Frame(1, 2, 0, 0, 1, 2, bytes(4))), START)
+
+
+def test_a_stream_needs_a_gain_and_an_offset_for_each_channel():
+    with pytest.raises(InvalidParameter, match='2 channels, 1 gains'):
+        FramedStream('signal', 1, 'daq', 2500.0, ('a', 'b'), 'V', np.ones(1), np.zeros(2))

@@ -1,0 +1,75 @@
+"""Read a sensor in a thread, reopen it when it is gone, and report its faults."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+
+from texture_core.errors import DeviceError
+from texture_core.protocols import Sensor
+from texture_core.signal import TactileSignal
+
+RETRY_S = 0.2
+Deliver = Callable[[str, TactileSignal], None]
+LogSentence = Callable[[str], None]
+
+
+class SensorReader:
+    """A thread that reads a sensor, hands each batch on, and opens the sensor again when it is gone.
+
+    Parameters
+    ----------
+    sensor
+        What is read; used by this thread alone.
+    deliver
+        Called with topic and batch, in the thread.
+    warn, tell
+        Called with one sentence when the sensor goes, not at each retry, and when it comes back.
+    """
+
+    def __init__(
+        self, sensor: Sensor, deliver: Deliver, warn: LogSentence = lambda _: None, inform: LogSentence = lambda _: None
+    ) -> None:
+        self.sensor = sensor
+        self.fault = 'not opened yet'  # '' while all is well
+        self.published: dict[str, int] = dict.fromkeys(sensor.expected_rates_hz, 0)
+        self._deliver = deliver
+        self._warn = warn
+        self._inform = inform
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='sensor reader', daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and close the sensor; returns when both are done."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            self._read_until_gone()
+            self.sensor.close()
+            self._stop.wait(RETRY_S)
+
+    def _read_until_gone(self) -> None:
+        try:
+            self.sensor.open()
+            while not self._stop.is_set():
+                for topic, batches in self.sensor.read().items():
+                    self._deliver_all(topic, batches)
+        except DeviceError as error:
+            if self.fault != str(error):
+                self._warn(f'{error}. Trying again every {RETRY_S} s')
+            self.fault = str(error)
+
+    def _deliver_all(self, topic: str, batches: Sequence[TactileSignal]) -> None:
+        for batch in batches:
+            self._deliver(topic, batch)
+            self.published[topic] += len(batch.samples)
+        if batches and self.fault:
+            self._inform('the sensor delivers samples')
+            self.fault = ''

@@ -1,0 +1,227 @@
+"""Streams of samples on a framed serial line: numbered, timed, in physical units. Knows no port.
+
+Each frame (see `texture_core.framing`) carries `rows` consecutive samples of `columns` channels as int16, little
+endian, row after row; its kind tells the stream, its time is that of the first row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecoder
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_drivers.block_counter import BlockCounter
+from texture_drivers.clock import StreamClock
+
+VERSION = 1
+SAMPLE = np.dtype('<i2')
+MICROSECONDS = 1_000_000
+LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock tells the gap
+
+
+@dataclass(frozen=True, eq=False)
+class FramedStream:
+    """What one kind of frames holds, and under what name and in what units it is published.
+
+    Parameters
+    ----------
+    gains, offsets : (n_channels,)
+        Sample in `unit` = gain · count + offset.
+    """
+
+    topic: str
+    kind: int
+    sensor: str
+    rate_hz: float
+    channels: tuple[str, ...]
+    unit: str
+    gains: Array
+    offsets: Array
+
+    def __post_init__(self) -> None:
+        if not len(self.channels) == len(self.gains) == len(self.offsets) > 0:
+            raise InvalidParameter(
+                f"'{self.sensor}' has {len(self.channels)} channels, {len(self.gains)} gains and "
+                f'{len(self.offsets)} offsets; give one of each for every channel'
+            )
+
+    def check(self, frame: Frame) -> None:
+        """Raise DeviceError if a frame is of another version or another number of channels."""
+        if frame.version != VERSION:
+            raise DeviceError(
+                f"'{self.sensor}' sends frames of version {frame.version}, and {VERSION} is known; update the device "
+                'or this driver'
+            )
+        if frame.columns != len(self.channels):
+            raise DeviceError(
+                f"'{self.sensor}' sends {frame.columns} channels, and {len(self.channels)} are named "
+                f'{list(self.channels)}; correct the channels in the settings'
+            )
+
+
+class Block(NamedTuple):
+    """The samples of one frame, with unwrapped time."""
+
+    time_us: int
+    rows: int
+    lost_frames: int
+    data: bytes
+
+
+class StreamDecoder:
+    """Decode the bytes of a framed serial line into the batches of its streams, by topic.
+
+    Frames of other kinds are passed over, so that other traffic may share the line. All streams are timed by one clock.
+
+    Parameters
+    ----------
+    streams
+        What is expected.
+    frame_id
+        For the headers.
+    """
+
+    def __init__(self, streams: Sequence[FramedStream], frame_id: str = '') -> None:
+        self.malformed = 0  # frames that passed the checksum and hold another number of bytes than they say
+        self.other_frames = 0  # frames of other kinds
+        self.restarts = 0  # of the device's clock
+        self.deframer = FrameDecoder()
+        self.clock = StreamClock(MICROSECONDS)
+        self.trackers = {stream.kind: StreamTracker(stream, frame_id) for stream in streams}
+        self._time = CounterUnwrapper(TIME_BITS)
+        self._latest_us: dict[int, int] = {}  # time of the last block of each kind
+        self._newest_us = 0
+
+    def restart(self) -> None:
+        """Go on after an interruption, with the index that the host's clock will tell."""
+        self.deframer.restart()
+        self._restart_streams()
+
+    def feed(self, data: bytes, arrival_ns: int) -> Mapping[str, Sequence[TactileSignal]]:
+        """Return the batches in `data`, which has just arrived; none in the first 0.1 s of a stream.
+
+        Raises
+        ------
+        DeviceError
+            If the device sends another version, other channels or another rate than expected.
+        """
+        blocks = self._blocks(self.deframer.feed(data))
+        if not blocks:
+            return {}
+        newest_us = max(self.trackers[kind].end_us(found[-1]) for kind, found in blocks.items())
+        if newest_us >= self._newest_us:  # an older block of a slower stream tells nothing new
+            self.clock.observe(newest_us, arrival_ns)
+            self._newest_us = newest_us
+        if not self.clock.settled:
+            return {}
+        return {
+            self.trackers[kind].stream.topic: self.trackers[kind].batches(found, self.clock)
+            for kind, found in blocks.items()
+        }
+
+    def _restart_streams(self) -> None:
+        for tracker in self.trackers.values():
+            tracker.interrupt(self.clock)
+        self.clock.restart()
+        self._time = CounterUnwrapper(TIME_BITS)
+        self._latest_us = {}
+        self._newest_us = 0
+
+    def _blocks(self, frames: Sequence[Frame]) -> dict[int, list[Block]]:
+        """Return the blocks of each stream; those before a restart of the device's clock are given up."""
+        blocks: dict[int, list[Block]] = {}
+        for frame in frames:
+            if not self._fits(frame):
+                continue
+            if self._has_restarted(frame):
+                self.restarts += 1
+                self._restart_streams()
+                blocks = {}
+            time_us = self._latest_us[frame.kind] = self._time.advance(frame.time_us)
+            blocks.setdefault(frame.kind, []).append(Block(time_us, frame.rows, frame.lost, frame.body))
+        return blocks
+
+    def _has_restarted(self, frame: Frame) -> bool:
+        """Return whether the device's clock went back, within one stream, or leapt."""
+        if self._time.value is None:
+            return False
+        step_us = self._time.step(frame.time_us)
+        moved_back = self._time.value + step_us < self._latest_us.get(frame.kind, self._time.value + step_us)
+        return moved_back or abs(step_us) > LONGEST_STEP_US
+
+    def _fits(self, frame: Frame) -> bool:
+        tracker = self.trackers.get(frame.kind)
+        if tracker is None:
+            self.other_frames += 1
+            return False
+        tracker.stream.check(frame)
+        if not frame.rows or frame.rows * frame.columns * SAMPLE.itemsize != len(frame.body):
+            self.malformed += 1
+            return False
+        return True
+
+
+class StreamTracker:
+    """Follow one stream: number its blocks and make batches of them."""
+
+    def __init__(self, stream: FramedStream, frame_id: str) -> None:
+        self.stream = stream
+        self.samples = 0  # published
+        self.lost = 0  # between the first one published and the last
+        self._frame_id = frame_id
+        self._counter = BlockCounter(stream.rate_hz, stream.sensor)
+        self._due_ns: int | None = None  # when the next sample would have come, had there been no interruption
+        self._published: int | None = None  # index after the last one
+
+    @property
+    def overrun(self) -> int:
+        """Samples that the device itself left out."""
+        return self._counter.overrun
+
+    def end_us(self, block: Block) -> int:
+        """Return the device's time of a block's last sample."""
+        return block.time_us + round((block.rows - 1) * MICROSECONDS / self.stream.rate_hz)
+
+    def interrupt(self, clock: StreamClock) -> None:
+        """Note by the old clock when the next sample is due."""
+        if self._counter.next_us is not None and clock.settled:
+            self._due_ns = clock.time_ns(self._counter.next_us)
+        self._counter.resume(0)
+
+    def batches(self, blocks: Sequence[Block], clock: StreamClock) -> list[TactileSignal]:
+        """Return the batches that consecutive blocks make: a new one wherever samples are missing."""
+        if self._due_ns is not None:
+            missing_ns = clock.time_ns(blocks[0].time_us) - self._due_ns
+            self._counter.resume(max(0, round(missing_ns * self.stream.rate_hz / NANOSECONDS)))
+            self._due_ns = None
+        runs: list[tuple[int, int, list[bytes]]] = []
+        for block in blocks:
+            expected = self._counter.next_index
+            index = self._counter.place(block.time_us, block.rows, block.lost_frames)
+            if not runs or index != expected:
+                runs.append((index, block.time_us, []))
+            runs[-1][2].append(block.data)
+        return [self._batch(index, clock.time_ns(time_us), b''.join(data)) for index, time_us, data in runs]
+
+    def _batch(self, index: int, stamp_ns: int, data: bytes) -> TactileSignal:
+        counts: NDArray[np.int16] = np.frombuffer(data, dtype=SAMPLE).reshape(-1, len(self.stream.channels))
+        self.lost += 0 if self._published is None else index - self._published
+        self._published = index + len(counts)
+        self.samples += len(counts)
+        return TactileSignal(
+            stamp_ns=stamp_ns,
+            sensor=self.stream.sensor,
+            channels=self.stream.channels,
+            unit=self.stream.unit,
+            sampling_rate_hz=self.stream.rate_hz,
+            first_sample=index,
+            samples=(counts * self.stream.gains + self.stream.offsets).astype(np.float32),
+            frame_id=self._frame_id,
+        )

@@ -1,0 +1,102 @@
+"""Bench and sensor node together in the graph."""
+
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.parameter import Parameter
+from texture_msgs.msg import TactileSignal
+
+from texture_core.errors import UnknownName
+from texture_core.ros.conversions import from_msg
+from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros.qos import SENSOR_QOS
+from texture_drivers.nodes.sensor import SensorNode
+from texture_simulation.nodes.emulator import EmulatorNode
+
+pytestmark = pytest.mark.ros
+
+
+class Bed:
+    """Bench and sensor node, and what they publish."""
+
+    def __init__(self, graph: LocalGraph, link: Path) -> None:
+        self.bench = graph.add(EmulatorNode, sensor_link=str(link), finger_port=0)
+        self.sensor = graph.add(SensorNode, device=str(link))
+        self.batches: list[Any] = []
+        graph.peer.create_subscription(
+            TactileSignal, 'signal', lambda message: self.batches.append(from_msg(message)), SENSOR_QOS
+        )
+        self._reports = graph.listen(DiagnosticArray, '/diagnostics')
+        self.until = graph.until
+
+    @property
+    def level(self) -> int:
+        """The newest level of the sensor; 9 if there is none."""
+        levels = [status.level for report in self._reports for status in report.status if status.name == '/sensor']
+        return int.from_bytes(levels[-1], 'little') if levels else 9
+
+    def set(self, node: Any, **values: Any) -> Any:
+        return node.set_parameters([Parameter(name, value=value) for name, value in values.items()])[0]
+
+
+@pytest.fixture
+def bed(tmp_path: Path) -> Iterator[Bed]:
+    with LocalGraph(64) as graph:
+        yield Bed(graph, tmp_path / 'tsf85')
+    assert not os.path.lexists(tmp_path / 'tsf85')
+
+
+def test_signals_flow_survive_a_replug_and_the_gap_is_in_the_index(bed: Bed) -> None:
+    bed.until(lambda: len(bed.batches) > 50)
+    bed.until(lambda: bed.level == 0)
+    bed.bench._emulator.unplug()
+    bed.until(lambda: bed.level == 2)
+    last = bed.batches[-1]
+    replugged = time.monotonic()
+    bed.bench._emulator.replug()
+    bed.until(lambda: bed.batches[-1] is not last)
+    assert time.monotonic() - replugged < 5.0
+    first = bed.batches[bed.batches.index(last) + 1]
+    missing_s = (first.first_sample - last.next_sample) / 1000
+    assert missing_s == pytest.approx((first.stamp_ns - last.end_ns) / 1e9, abs=0.1)  # this machine may be busy
+    bed.until(lambda: bed.level == 0)
+
+
+def test_the_surface_is_a_parameter_that_refuses_unknown_names(bed: Bed) -> None:
+    result = bed.set(bed.bench, surface='ridge_3m')
+    assert not result.successful
+    assert "did you mean 'ridge_3mm'" in result.reason
+    assert bed.set(bed.bench, surface='ridge_3mm').successful
+    assert bed.bench.get_parameter('surface').value == 'ridge_3mm'
+    assert not bed.set(bed.bench, seed=5).successful
+
+
+def test_the_plug_and_the_line_are_parameters(bed: Bed) -> None:
+    bed.until(lambda: bed.level == 0)
+    assert bed.set(bed.bench, plugged=False).successful
+    bed.until(lambda: bed.level == 2)
+    assert bed.set(bed.bench, plugged=True, bit_flips=0.02).successful
+    bed.until(lambda: bed.sensor._sensor.counts['bogus'] > 5)
+    assert bed.set(bed.bench, bit_flips=0.0).successful
+    bed.until(lambda: bed.level == 0)
+    assert not bed.set(bed.bench, bit_flips=2.0).successful
+
+
+def test_deactivating_stops_the_stream_and_activating_brings_it_back(bed: Bed) -> None:
+    bed.until(lambda: len(bed.batches) > 5)
+    bed.sensor.trigger_deactivate()
+    assert not bed.bench._emulator.device.plugged or bed.sensor._reader is None
+    bed.until(lambda: not bed.bench._emulator.device.streaming)
+    bed.sensor.trigger_activate()
+    count = len(bed.batches)
+    bed.until(lambda: len(bed.batches) > count + 5)
+
+
+def test_a_sensor_that_no_catalogue_knows_is_refused_with_a_sentence(bed: Bed) -> None:
+    with pytest.raises(UnknownName, match="did you mean 'tsf85'"):
+        SensorNode(parameter_overrides=[Parameter('sensor', value='tsf58')])

@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+
+from texture_core.finger_state import FingerState
+from texture_core.signal import NANOSECONDS
+from texture_simulation.finger_track import FingerTrack
+
+MS = NANOSECONDS // 1000
+
+
+def advance(track: FingerTrack, ms: int):
+    return track.advance(ms * MS, 10, 2000.0)
+
+
+def touching(ms: int, x_m: float = 0.0, vx_m_s: float = 0.0, force_n: float = 2.0) -> FingerState:
+    return FingerState(ms * MS, x_m=x_m, vx_m_s=vx_m_s, force_n=force_n)
+
+
+def test_nothing_is_touched_before_anything_is_reported() -> None:
+    track = FingerTrack()
+    assert not advance(track, 5).force_n.any()
+    assert not track.touching
+
+
+def test_a_sliding_finger_is_extrapolated_without_steps() -> None:
+    track = FingerTrack()
+    track.update(touching(0, 0.0, 0.1))
+    pieces = [advance(track, ms).x_m for ms in range(5, 105, 5)]
+    way = np.concatenate(pieces)
+    assert way[-1] == pytest.approx(0.01)
+    assert np.allclose(np.diff(way), 0.1 / 2000)
+
+
+def test_a_correction_is_spread_over_one_block() -> None:
+    track = FingerTrack()
+    track.update(touching(0, 0.0, 0.1))
+    before = advance(track, 5).x_m[-1]
+    track.update(touching(6, 0.0007, 0.1))
+    after = advance(track, 10).x_m
+    assert after[-1] == pytest.approx(0.0011)
+    assert np.allclose(np.diff(after, prepend=before), (after[-1] - before) / 10)
+
+
+def test_an_arm_silent_for_long_has_stopped_and_still_presses() -> None:
+    track = FingerTrack()
+    track.update(touching(0, 0.0, 0.1))
+    advance(track, 150)
+    moved = advance(track, 250)
+    later = advance(track, 300)
+    assert np.ptp(later.x_m) == 0.0
+    assert later.x_m[0] == moved.x_m[-1]
+    assert later.force_n.tolist() == [2.0] * 10
+
+
+def test_being_put_elsewhere_is_no_slide() -> None:
+    track = FingerTrack()
+    track.update(touching(0))
+    advance(track, 5)
+    track.update(touching(5, x_m=0.2))
+    assert advance(track, 10).x_m.tolist() == [0.2] * 10
+
+
+def test_a_state_that_comes_late_is_passed_over() -> None:
+    track = FingerTrack()
+    track.update(touching(10, x_m=0.1))
+    track.update(touching(5, x_m=0.0))
+    assert track.newest == touching(10, x_m=0.1)

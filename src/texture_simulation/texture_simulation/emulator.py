@@ -1,0 +1,199 @@
+"""The emulator: a scene under a finger and an emulated sensor that measures it, in real time."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from texture_core.catalogue import find
+from texture_core.parameters import param
+from texture_simulation.devices.device import EmulatedDevice
+from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.finger_receiver import FingerStateReceiver
+from texture_simulation.live_sensor import LIVE_SENSORS, MakeLiveSensor, live_tsf85
+from texture_simulation.scene import Scene, load_scene
+
+BURST_S = 0.005
+
+
+@dataclass(frozen=True)
+class EmulatorParams:
+    """What is emulated and where it is reached."""
+
+    scene: str = param(
+        'twelve_textures', 'Sets the scene that is emulated: the name of a shipped one or the path of a scene file.'
+    )
+    surface: str = param('glass', 'Sets the surface under the finger; setting it at run time swaps the sample.')
+    seed: int = param(0, 'Sets the seed of all randomness; equal seeds give equal signals.', low=0)
+    sensor: str = param(
+        '',
+        "Sets the emulated sensor, which appears at `sensor_link`; '' takes that of the scene.",
+        choices=('', *LIVE_SENSORS),
+    )
+    sensor_link: str = param(
+        '/tmp/texture/tsf85',
+        'Sets the path of the symbolic link to the emulated sensor, which is the device path of the sensor node.',
+    )
+    finger: int = param(0, 'Sets the index of the finger of a TSF-85 that touches the surface.', low=0, high=1)
+    long_stamps: bool = param(
+        True,
+        'Lets the TSF-85 send 64-bit stamps as firmware from 1.1.7 on does; false sends the 16-bit stamps '
+        'of older firmware.',
+    )
+    daq_link: str = param(
+        '', "Sets the path of the link to a data acquisition finger beside the sensor; '' leaves it out."
+    )
+    pvdf_link: str = param('', "Sets the path of the link to a PVDF finger beside the sensor; '' leaves it out.")
+    plugged: bool = param(True, 'Plugs the emulated sensor in; setting it to false at run time unplugs it.')
+    bit_flips: float = param(
+        0.0,
+        'Sets the probability that one bit of a byte of the sensor flips on the line; it may be set at run time.',
+        low=0.0,
+        high=1.0,
+    )
+    finger_port: int = param(
+        28500,
+        'Sets the UDP port on loopback at which finger states are received; 0 takes any free port.',
+        low=0,
+        high=65535,
+    )
+
+
+class Emulator:
+    """Run a scene and its devices in a thread; usable as a context manager.
+
+    Parameters
+    ----------
+    params
+        See `EmulatorParams`.
+    now_ns
+        Clock of the finger states: CLOCK_MONOTONIC.
+
+    Raises
+    ------
+    TextureError
+        If the scene or the surface is unknown, or the port or the link cannot be had.
+    """
+
+    def __init__(self, params: EmulatorParams, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        rng = np.random.default_rng(params.seed)
+        self.scene: Scene = load_scene(params.scene)
+        self._now_ns = now_ns
+        surface = self.scene.surface(params.surface)
+        for other in self.scene.surfaces.values():  # all tables are made now: swapping takes no time and no memory
+            other.height_m(np.zeros(1), np.zeros(1), np.zeros(1))
+        tsf85 = {
+            name: partial(live_tsf85, layout=name, finger=params.finger, long_stamps=params.long_stamps)
+            for name in ('tsf85', 'tsf85_3x4')
+        }
+        makers: dict[str, MakeLiveSensor] = {**LIVE_SENSORS, **tsf85}
+        sensor = params.sensor or self.scene.sensor
+        find(makers, sensor, 'sensor')
+        links = [(sensor, params.sensor_link), ('daq', params.daq_link), ('pvdf', params.pvdf_link)]
+        self._sensors = [
+            makers[name](self.scene, surface, Path(link).expanduser(), rng) for name, link in links if link
+        ]
+        self.flip_bits(params.bit_flips)
+        self._starts_plugged = params.plugged
+        self._link = FingerStateReceiver(params.finger_port)
+        self._commands: list[Callable[[], None]] = []
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='emulator', daemon=True)
+
+    def __enter__(self) -> Emulator:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    @property
+    def device(self) -> EmulatedDevice:
+        """The device of the sensor on the emulator; those beside it are left out."""
+        return self._sensors[0].device
+
+    @property
+    def finger_port(self) -> int:
+        """UDP port for `texture_core.finger_state.FingerState` datagrams."""
+        return self._link.port
+
+    @property
+    def running(self) -> bool:
+        """Whether time runs on the emulator."""
+        return self._thread.is_alive()
+
+    @property
+    def surface(self) -> str:
+        """Name of the surface under the finger."""
+        return self._sensors[0].model.touch.surface.name
+
+    def set_surface(self, name: str) -> None:
+        """Swap the sample; UnknownName, with the nearest name, if there is none such."""
+        surface = self.scene.surface(name)
+        for sensor in self._sensors:
+            sensor.model.touch.surface = surface
+
+    def start(self) -> None:
+        """Plug the devices in and let time run."""
+        for sensor in self._sensors:
+            sensor.device.plug()
+        if not self._starts_plugged:
+            self.unplug()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread, unplug the devices, remove their links; may be called twice."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        for sensor in self._sensors:
+            sensor.device.unplug()
+        self._link.close()
+
+    def unplug(self) -> None:
+        """Pull the sensor's plug; returns when it is out."""
+        self._in_thread(self.device.unplug)
+
+    def replug(self) -> None:
+        """Plug the sensor in again; it gets another device name and counts from 0."""
+        self._in_thread(self.device.plug)
+
+    def flip_bits(self, probability: float) -> None:
+        """Make the line of the sensor a bad one; 0 makes it a good one again."""
+        self.device.faults = ByteFaults(flip=probability)
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals for the diagnostics."""
+        return {
+            'samples': self._sensors[0].done,
+            'skipped samples': self._sensors[0].skipped,
+            'bytes nobody took': sum(sensor.device.dropped_bytes for sensor in self._sensors),
+            'finger states': self._link.received,
+            'refused datagrams': self._link.refused,
+        }
+
+    def _in_thread(self, command: Callable[[], None]) -> None:
+        """Run a command between two bursts, for only the thread may touch the device."""
+        if not self._thread.is_alive():
+            command()
+            return
+        done = threading.Event()
+        self._commands += [command, done.set]
+        done.wait()
+
+    def _run(self) -> None:
+        while not self._stop.wait(BURST_S):
+            while self._commands:
+                self._commands.pop(0)()
+            states = self._link.states()
+            for sensor in self._sensors:
+                for state in states:
+                    sensor.update(state)
+                sensor.advance(self._now_ns())
