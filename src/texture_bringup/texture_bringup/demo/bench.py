@@ -60,9 +60,11 @@ class DemoBench:
     def recording(self, bag: Path) -> Iterator[None]:
         """Record the topics into a new bag for the length of a `with` block."""
         recorder = ChildLauncher('record', {'out': bag}, self._environment, self._folder / f'{bag.name}.log')
-        before = max(self._operator.listeners(topic) for topic in RECORDED)
+        # The explorer may listen to the signal, too: each topic has a number of its own.
+        wanted = {topic: self._operator.listeners(topic) + 1 for topic in RECORDED}
         with recorder:
-            self._operator.wait_for_listeners(RECORDED, before + 1, recorder.check)
+            for topic, number in wanted.items():
+                self._operator.wait_for_listeners((topic,), number, recorder.check)
             yield
             recorder.check()
 
