@@ -58,7 +58,7 @@ def recorded(gap: int = 0) -> Recorded:
     for part in rows:
         first = part.start + (gap if part.start >= 1100 else 0)
         stamp = round(first / 2200.0 * NANOSECONDS)
-        batches.append(TactileSignal(stamp, 's', ('a',), '', 2200.0, first, tone[first : first + 44]))
+        batches.append(TactileSignal(stamp, 's', ('a',), (), 2200.0, first, tone[first : first + 44]))
     state = ExplorationState(0, 'e', 'linear_slide', Phase.SLIDE, steady_s=2.0, speed_m_s=0.02, surface='cork')
     return Recorded(SLIDES[0], {'signal': batches}, [state])
 

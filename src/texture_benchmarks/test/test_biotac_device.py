@@ -57,7 +57,7 @@ def test_frames_sent_twice_are_counted(make: Make) -> None:
 def test_a_reset_of_the_device_is_an_interruption(make: Make) -> None:
     rig = make()
     before = rig.signal_s(1.0)
-    rig.do(rig.device.reset)
+    rig.run_locked(rig.device.reset)
     after = rig.signal_s(0.5)
     assert rig.sensor.counts['restarts'] == 1
     assert len(set(rig.offsets(after[1:]))) == 1

@@ -89,7 +89,7 @@ def recorded(samples: np.ndarray, rate_hz: float, batch: int) -> Recorded:
     slide = Slide(Path(), 'a/1', 'a', 1, 0, None)
     state = ExplorationState(0, 'a/1', 'linear_slide', Phase.SLIDE, steady_s=len(samples) / rate_hz, surface='a')
     signals = [
-        TactileSignal(0, 'pac', ('pac',), '', rate_hz, first, samples[first : first + batch].astype(np.float32))
+        TactileSignal(0, 'pac', ('pac',), (), rate_hz, first, samples[first : first + batch].astype(np.float32))
         for first in range(0, len(samples), batch)
     ]
     return Recorded(slide, {TOPIC: signals}, [state])

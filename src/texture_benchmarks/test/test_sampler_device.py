@@ -61,7 +61,7 @@ def test_frames_sent_twice_are_counted_and_no_others(make: Make) -> None:
 def test_a_brown_out_is_survived_and_the_gap_is_reported(make: Make) -> None:
     rig = make()
     batches = rig.signal_s(0.5)
-    rig.do(rig.device.reset)
+    rig.run_locked(rig.device.reset)
     batches += rig.signal_s(0.5)
     assert rig.sensor.counts['device restarts'] == 1
     assert lost_samples(batches) == rig.sensor.counts['lost']
@@ -98,8 +98,8 @@ def test_film_and_force_come_as_two_streams_in_their_units(make: Make) -> None:
     topics = make('pvdf', config='', **SWING).read_s(1.0)
     film, force = topics['signal'], topics['signal_static']
     assert lost_samples(film) == lost_samples(force) == 0
-    assert (film[0].sensor, film[0].unit, film[0].sampling_rate_hz) == ('pvdf/film', 'pC', 4096.0)
-    assert (force[0].sensor, force[0].unit, force[0].sampling_rate_hz) == ('pvdf/force', 'N', 64.0)
+    assert (film[0].sensor, film[0].units, film[0].sampling_rate_hz) == ('pvdf/film', ('pC',), 4096.0)
+    assert (force[0].sensor, force[0].units, force[0].sampling_rate_hz) == ('pvdf/force', ('N',), 64.0)
     charge = np.concatenate([batch.samples for batch in film])
     assert charge.max() == pytest.approx(2.0, rel=0.01)  # 1000 counts of 0.002 pC
     assert np.diff(np.concatenate([batch.samples for batch in force]), axis=0) == pytest.approx(0.005, abs=1e-6)
@@ -107,6 +107,6 @@ def test_film_and_force_come_as_two_streams_in_their_units(make: Make) -> None:
 
 def test_the_force_on_the_film_is_restored_if_wanted(make: Make) -> None:
     batches = make('pvdf', config='{restore_from_hz: 0.5}', **SWING).signal_s(2.0)
-    assert batches[-1].unit == 'N'
+    assert batches[-1].units == ('N',)
     late = np.concatenate([batch.samples for batch in batches])[4096:]
     assert np.ptp(late) / 2 == pytest.approx(2.0 / 21.0, rel=0.05)  # far above the corner nothing leaks

@@ -20,7 +20,7 @@ from texture_exploration.safety import RANGES, SafetyLimits
 
 def batch(first, samples, rate_hz=1000.0, channels=('dynamic',)):
     samples = np.asarray(samples, dtype=np.float32).reshape(-1, len(channels))
-    return TactileSignal(0, 'tsf85', channels, 'count', rate_hz, first, samples)
+    return TactileSignal(0, 'tsf85', channels, ('count',) * len(channels), rate_hz, first, samples)
 
 
 def sliding(exploration_id, phase=Phase.SLIDE):

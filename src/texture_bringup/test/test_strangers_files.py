@@ -144,7 +144,7 @@ def messages() -> Iterator[tuple[str, Any, int]]:
             stamp_ns,
         )
         samples = rng.normal(size=(100, 1)).astype(np.float32)
-        yield 'signal', TactileSignal(stamp_ns, 'x', ('a',), 'g', RATE_HZ, 100 * number, samples), stamp_ns
+        yield 'signal', TactileSignal(stamp_ns, 'x', ('a',), ('g',), RATE_HZ, 100 * number, samples), stamp_ns
 
 
 def make_bag(folder: Path) -> None:

@@ -22,15 +22,39 @@ pytestmark = pytest.mark.ros
 STAMP = 1_700_000_000_123_456_789
 EXAMPLES = [
     TactileSignal(
-        STAMP, 'a/b', ('x', 'y'), 'Pa', 2200.0, 2**40, np.array([[1.5, math.nan], [-3e-20, 7]], np.float32), 'tip'
+        STAMP,
+        'a/b',
+        ('x', 'y'),
+        ('Pa', 'N'),
+        2200.0,
+        2**40,
+        np.array([[1.5, math.nan], [-3e-20, 7]], np.float32),
+        'tip',
     ),
-    ExplorationState(STAMP, 'e-1', 'linear_slide', Phase.SLIDE, 0.1, 0.05, 1.0, math.pi / 4, 0.5, 'felt'),
-    FeatureVector(STAMP, 'e-1', 0.5, 0.1, ('a', 'b'), np.array([0.1, math.nan]), 0.05, 1.0, 'f', False, 3, 12),
+    ExplorationState(
+        STAMP, 'e-1', 'linear_slide', Phase.SLIDE, 0.1, 0.05, 1.0, math.pi / 4, 0.5, 'felt', 0.1, -0.2, 3e-3, 'surface'
+    ),
+    FeatureVector(STAMP, 'e-1', 0.5, 0.1, ('a', 'b'), np.array([0.1, math.nan]), 0.05, 1.0, 'f', False, 3, 12, 'tip'),
     FeatureVector(STAMP, 'e-1', 0.0, 0.1, last=True),
     TextureEstimate(
-        STAMP, 'e-1', 'felt', True, 0.9, ('felt', 'wool'), (0.9, 0.1), True, ('felt',), 4, 0.8, True, 1e-4, 'm', 'ok'
+        STAMP,
+        'e-1',
+        'felt',
+        True,
+        0.9,
+        ('felt', 'wool'),
+        (0.9, 0.1),
+        True,
+        ('felt',),
+        4,
+        0.8,
+        True,
+        1e-4,
+        'm',
+        'ok',
+        'tip',
     ),
-    RoughnessEstimate(STAMP, 'e-1', True, 3.5, 0.4, 4, 0.8, True, 1e-4, 'm', 'ok'),
+    RoughnessEstimate(STAMP, 'e-1', True, 3.5, 0.4, 4, 0.8, True, 1e-4, 'm', 'ok', 'tip'),
 ]
 
 
@@ -55,5 +79,12 @@ def test_samples_that_do_not_fill_the_channels_are_refused() -> None:
 
 
 def test_an_unknown_phase_is_refused() -> None:
-    with pytest.raises(InvalidData, match="phase 'dancing'"):
-        from_msg(msg.ExplorationState(phase='dancing'))
+    with pytest.raises(InvalidData, match=r'phase 99; allowed are 0 \(idle\), .*6 \(aborted\)'):
+        from_msg(msg.ExplorationState(phase=99))
+
+
+@pytest.mark.parametrize('phase', Phase)
+def test_each_phase_has_the_constant_of_the_message_and_its_name_beside_it(phase: Phase) -> None:
+    message = to_msg(ExplorationState(STAMP, 'e-1', 'linear_slide', phase))
+    assert message.phase == getattr(msg.ExplorationState, phase.name)
+    assert message.phase_name == phase.value

@@ -28,6 +28,7 @@ class TextureEstimate:
     processing_s: float = 0.0
     model: str = ''
     message: str = ''
+    frame_id: str = ''
 
 
 @dataclass(frozen=True)
@@ -45,3 +46,4 @@ class RoughnessEstimate:
     processing_s: float = 0.0
     model: str = ''
     message: str = ''
+    frame_id: str = ''

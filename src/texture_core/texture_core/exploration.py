@@ -21,6 +21,11 @@ class Phase(str, enum.Enum):
     DONE = 'done'
     ABORTED = 'aborted'
 
+    @property
+    def code(self) -> int:
+        """Number of the phase in the message ExplorationState."""
+        return tuple(Phase).index(self)
+
 
 ENDED = frozenset({Phase.IDLE, Phase.DONE, Phase.ABORTED})
 
@@ -43,6 +48,10 @@ class ExplorationState:
     direction_rad: float = math.nan
     progress: float = math.nan
     surface: str = ''
+    x_m: float = math.nan
+    y_m: float = math.nan
+    z_m: float = math.nan
+    frame_id: str = ''
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ class FeatureVector:
 
     `feature_set` is the fingerprint of the windows, inputs and features that made the values: a model refuses
     vectors of another fingerprint. `skipped` counts the windows left out so far for lost or non-finite samples.
-    `number` counts the vectors that its sender has sent before: a jump is what was lost on the way.
+    `sequence` counts the vectors that its sender has sent before: a jump is what was lost on the way.
     """
 
     start_ns: int
@@ -31,7 +31,8 @@ class FeatureVector:
     feature_set: str = ''
     last: bool = False
     skipped: int = 0
-    number: int = 0
+    sequence: int = 0
+    frame_id: str = ''
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.names),):

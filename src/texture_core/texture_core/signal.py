@@ -23,8 +23,10 @@ class TactileSignal:
     ----------
     stamp_ns
         Time of the first sample, ns since the epoch of the clock in use.
-    sensor, channels, unit
-        Name of the sensor part, of each column, and of the unit ('' if unknown).
+    sensor, channels
+        Name of the sensor part, and of each column.
+    units
+        Unit of each channel, such as 'count' or 'Pa'; () if they are unknown.
     sampling_rate_hz
         Nominal rate, above 0 and at most 1 MHz.
     first_sample
@@ -43,7 +45,7 @@ class TactileSignal:
     stamp_ns: int
     sensor: str
     channels: tuple[str, ...]
-    unit: str
+    units: tuple[str, ...]
     sampling_rate_hz: float
     first_sample: int
     samples: NDArray[np.float32]
@@ -55,6 +57,11 @@ class TactileSignal:
                 f"signal of '{self.sensor}' has samples of shape {self.samples.shape}; "
                 f'(n_samples, {len(self.channels)}) is needed for its channels {list(self.channels)}'
             )
+        if self.units and len(self.units) != len(self.channels):
+            raise InvalidData(
+                f"signal of '{self.sensor}' has {len(self.units)} units for {len(self.channels)} channels; "
+                'give one for each, or none'
+            )
         if not 0 < self.sampling_rate_hz <= MAX_HZ:
             raise InvalidData(
                 f"signal of '{self.sensor}' has a sampling rate of {self.sampling_rate_hz} Hz; "
@@ -62,6 +69,11 @@ class TactileSignal:
             )
         if self.first_sample < 0:
             raise InvalidData(f"signal of '{self.sensor}' starts at sample {self.first_sample}; 0 is the first")
+
+    @property
+    def common_unit(self) -> str:
+        """The unit that all channels share; '' if they differ or are unknown."""
+        return self.units[0] if len(set(self.units)) == 1 else ''
 
     @property
     def next_sample(self) -> int:

@@ -91,7 +91,8 @@ def test_each_sample_has_the_time_of_its_slot() -> None:
     assert times_s == pytest.approx(signal.samples[:, 0] / 4400, abs=1e-6)
     assert static.samples[0].tolist() == [42, 40, 38, *range(0, 38, 2)]  # TDC, TAC, PDC, electrodes
     assert static.channels == ('tdc', 'tac', 'pdc', *(f'electrode{number}' for number in range(1, 20)))
-    assert (signal.sensor, signal.channels, signal.unit, signal.frame_id) == ('biotac/pac', ('pac',), 'count', 'tip')
+    assert (signal.sensor, signal.channels, signal.frame_id) == ('biotac/pac', ('pac',), 'tip')
+    assert signal.units == ('count',)
     assert (signal.sampling_rate_hz, static.sampling_rate_hz) == (2200.0, 100.0)
     assert signal.first_sample == 22 * static.first_sample
 

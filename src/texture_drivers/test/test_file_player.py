@@ -92,7 +92,7 @@ def test_rate_topic_and_unit_can_be_set(params):
     player = FilePlayer(settle(params, '{rate_hz: 100, speed: 2, topic: signal_static, unit: Pa}'), Clock(0.01))
     player.open()
     assert player.expected_rates_hz == {'signal_static': 200.0}
-    assert player.read()['signal_static'][0].unit == 'Pa'
+    assert player.read()['signal_static'][0].units == ('Pa', 'Pa')
 
 
 def test_settings_may_stand_in_a_file(params, tmp_path):

@@ -34,7 +34,7 @@ class Scripted:
         threading.Event().wait(0.001)
         first = self.counts['samples']
         self.counts['samples'] += 10
-        return {'signal': [TactileSignal(0, 's', ('a',), '', 1000.0, first, np.zeros((10, 1), np.float32))]}
+        return {'signal': [TactileSignal(0, 's', ('a',), (), 1000.0, first, np.zeros((10, 1), np.float32))]}
 
     def close(self) -> None:
         self.closed += 1

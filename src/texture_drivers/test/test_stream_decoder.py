@@ -12,7 +12,9 @@ START = 1_700_000_000 * SECOND
 
 def stream(kind=1, rate_hz=2500.0, channels=('a', 'b'), topic='signal'):
     ones = np.ones(len(channels))
-    return FramedStream(topic, kind, f'test/{topic}', rate_hz, channels, 'V', 0.5 * ones, -1.0 * ones)
+    return FramedStream(
+        topic, kind, f'test/{topic}', rate_hz, channels, ('V',) * len(channels), 0.5 * ones, -1.0 * ones
+    )
 
 
 def frame(number, *, kind=1, rows=10, rate_hz=2500.0, first_us=0, columns=2):
@@ -46,7 +48,7 @@ def test_samples_come_out_in_order_in_units_and_with_their_times():
     assert lost_samples(batches) == line.trackers[1].lost == 0
     assert batches[0].first_sample == 0
     assert batches[-1].stamp_ns == pytest.approx(START + 4990 / 2500 * SECOND, abs=1e6)
-    assert (batches[0].channels, batches[0].unit, batches[0].frame_id) == (('a', 'b'), 'V', 'tip')
+    assert (batches[0].channels, batches[0].units, batches[0].frame_id) == (('a', 'b'), ('V', 'V'), 'tip')
 
 
 def test_a_lost_frame_makes_a_jump_of_exactly_its_samples():
@@ -138,5 +140,5 @@ def test_a_device_that_speaks_differently_is_reported_in_one_sentence():
 
 
 def test_a_stream_needs_a_gain_and_an_offset_for_each_channel():
-    with pytest.raises(InvalidParameter, match='2 channels, 1 gains'):
-        FramedStream('signal', 1, 'daq', 2500.0, ('a', 'b'), 'V', np.ones(1), np.zeros(2))
+    with pytest.raises(InvalidParameter, match='2 channels, 2 units, 1 gains'):
+        FramedStream('signal', 1, 'daq', 2500.0, ('a', 'b'), ('V', 'V'), np.ones(1), np.zeros(2))

@@ -249,7 +249,7 @@ def test_acceleration_and_rotation_come_in_si_units_with_the_dynamic_values(feed
     assert indices(imu) == indices(feeder.signal)
     assert [batch.stamp_ns for batch in imu] == [batch.stamp_ns for batch in feeder.signal]
     assert imu[0].channels[:1] + imu[0].channels[-1:] == ('acceleration_x', 'rotation_z')
-    assert imu[0].unit == 'm/s², m/s², m/s², rad/s, rad/s, rad/s'
+    assert imu[0].units == ('m/s²', 'm/s²', 'm/s²', 'rad/s', 'rad/s', 'rad/s')
     turn = np.deg2rad(99.9985)  # 13107 / 131.072 degrees a second
     np.testing.assert_allclose(imu[-1].samples[-1], [0, -9.80665, 9.80665, 0, -turn, turn], rtol=1e-5)
 

@@ -33,7 +33,7 @@ class FramedStream:
     Parameters
     ----------
     gains, offsets : (n_channels,)
-        Sample in `unit` = gain · count + offset.
+        Sample in its unit = gain · count + offset.
     """
 
     topic: str
@@ -41,15 +41,15 @@ class FramedStream:
     sensor: str
     rate_hz: float
     channels: tuple[str, ...]
-    unit: str
+    units: tuple[str, ...]
     gains: Array
     offsets: Array
 
     def __post_init__(self) -> None:
-        if not len(self.channels) == len(self.gains) == len(self.offsets) > 0:
+        if not len(self.channels) == len(self.units) == len(self.gains) == len(self.offsets) > 0:
             raise InvalidParameter(
-                f"'{self.sensor}' has {len(self.channels)} channels, {len(self.gains)} gains and "
-                f'{len(self.offsets)} offsets; give one of each for every channel'
+                f"'{self.sensor}' has {len(self.channels)} channels, {len(self.units)} units, {len(self.gains)} gains "
+                f'and {len(self.offsets)} offsets; give one of each for every channel'
             )
 
     def check(self, frame: Frame) -> None:
@@ -219,7 +219,7 @@ class StreamTracker:
             stamp_ns=stamp_ns,
             sensor=self.stream.sensor,
             channels=self.stream.channels,
-            unit=self.stream.unit,
+            units=self.stream.units,
             sampling_rate_hz=self.stream.rate_hz,
             first_sample=index,
             samples=(counts * self.stream.gains + self.stream.offsets).astype(np.float32),

@@ -149,12 +149,12 @@ def test_broken_messages_are_counted_and_survived(graph, case):
 def test_vectors_that_do_not_come_are_counted_and_a_new_extractor_begins_again(graph, case):
     kind, path, vectors = case
     bench = Bench(graph, kind, path)
-    numbered = [dataclasses.replace(vector, number=7 + k) for k, vector in enumerate(vectors)]
+    numbered = [dataclasses.replace(vector, sequence=7 + k) for k, vector in enumerate(vectors)]
     bench.ask(numbered)
     assert (bench.report()[0], bench.report()[2]['lost_vectors']) == ('OK', 0)
-    bench.ask([dataclasses.replace(vectors[-1], number=9 + len(vectors))])  # two of the same extractor are missing
+    bench.ask([dataclasses.replace(vectors[-1], sequence=9 + len(vectors))])  # two of the same extractor are missing
     assert (bench.report()[0], bench.report()[2]['lost_vectors']) == ('WARN', 2)
-    bench.ask([dataclasses.replace(vectors[-1], number=1)])  # and the first of another one
+    bench.ask([dataclasses.replace(vectors[-1], sequence=1)])  # and the first of another one
     assert bench.report()[2]['lost_vectors'] == 3
 
 

@@ -43,6 +43,11 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
     assert estimates[-1].labels == model.labels
 
 
+def test_an_estimate_carries_the_frame_of_its_vectors(model, examples):
+    stream = [dataclasses.replace(vector, frame_id='tip') for vector in vectors(examples)]
+    assert {estimate.frame_id for estimate in judge(model, stream)} == {'tip'}
+
+
 def test_the_final_estimate_says_how_many_windows_are_missing_from_it(model, examples):
     *windows, last = vectors(examples)
     final = judge(model, [*windows, dataclasses.replace(last, skipped=6)])[-1]

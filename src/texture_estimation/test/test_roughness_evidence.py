@@ -47,9 +47,9 @@ def model():
     return train_grades(recipe(), *graded())
 
 
-def vector(values=(3.0, 0.0, 0.5, 8.0), number=0, identity='e1', **more):
+def vector(values=(3.0, 0.0, 0.5, 8.0), sequence=0, identity='e1', **more):
     made = {'feature_set': FINGERPRINT, 'force_n': 2.0, **more}
-    return FeatureVector(number * 100_000_000, identity, 0.5, 0.1, NAMES, np.array(values), **made)
+    return FeatureVector(sequence * 100_000_000, identity, 0.5, 0.1, NAMES, np.array(values), **made)
 
 
 def last(identity='e1'):
@@ -63,7 +63,7 @@ def never_early(model):
 
 def test_the_grade_of_a_slide_is_that_of_its_windows_with_an_interval(model) -> None:
     evidence = RoughnessEvidence(never_early(model))
-    first, *_, before_last = [evidence.update(vector(number=k)) for k in range(6)]
+    first, *_, before_last = [evidence.update(vector(sequence=k)) for k in range(6)]
     final = evidence.update(last())
     assert final.valid
     assert final.grade == pytest.approx(3.0, abs=0.4)
@@ -71,16 +71,20 @@ def test_the_grade_of_a_slide_is_that_of_its_windows_with_an_interval(model) -> 
     assert 0.0 < final.grade_std < first.grade_std
 
 
+def test_a_grade_carries_the_frame_of_its_vectors(model) -> None:
+    assert RoughnessEvidence(model).update(vector(frame_id='tip')).frame_id == 'tip'
+
+
 def test_more_sliding_never_makes_surer_than_people_agree(model) -> None:
     evidence = RoughnessEvidence(never_early(model))
     for number in range(500):
-        estimate = evidence.update(vector(number=number))
+        estimate = evidence.update(vector(sequence=number))
     assert estimate.grade_std > 0.7 * SPREAD
 
 
 def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(model) -> None:
     evidence = RoughnessEvidence(model)
-    heard = [evidence.update(vector(number=5 * k)) for k in range(50)] + [evidence.update(last())]
+    heard = [evidence.update(vector(sequence=5 * k)) for k in range(50)] + [evidence.update(last())]
     said = [estimate for estimate in heard if estimate]
     assert 3 <= len(said) < 50
     assert [estimate.final for estimate in said] == [False] * (len(said) - 1) + [True]
@@ -117,7 +121,7 @@ def test_a_slide_too_short_and_a_missing_model_are_reported() -> None:
 def test_a_bad_window_among_good_ones_is_left_out(model) -> None:
     evidence = RoughnessEvidence(never_early(model))
     evidence.update(vector())
-    estimate = evidence.update(vector((3.0, 0.0, 9.0, 8.0), number=1))
+    estimate = evidence.update(vector((3.0, 0.0, 9.0, 8.0), sequence=1))
     assert estimate.valid
     assert estimate.windows == 1
     assert 'skids' in estimate.message

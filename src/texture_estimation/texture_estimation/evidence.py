@@ -97,6 +97,7 @@ class Evidence:
             return TextureEstimate(
                 stamp_ns=vector.start_ns,
                 exploration_id=vector.exploration_id,
+                frame_id=vector.frame_id,
                 final=final,
                 model=model.name if model else '',
                 message=self._message or (NO_WINDOW if final else ''),
@@ -114,6 +115,7 @@ class Evidence:
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
+            frame_id=vector.frame_id,
             label=model.labels[best] if decided else '',
             known=decided and self._known is not False,
             confidence=confidence,

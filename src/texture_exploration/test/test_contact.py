@@ -30,7 +30,7 @@ def windows_from(table):
     touching = np.array(touches)[np.searchsorted(stamps, times).clip(max=len(stamps) - 1)]
     samples = touching[:, None].astype(np.float32)
     batches = [
-        TactileSignal(int(times[first]), 's', ('touch',), '', RATE_HZ, first, samples[first : first + 5])
+        TactileSignal(int(times[first]), 's', ('touch',), (), RATE_HZ, first, samples[first : first + 5])
         for first in range(0, len(times), 5)
     ]
     pieces = cut_recording({'signal': batches}, table.states, WINDOWS)

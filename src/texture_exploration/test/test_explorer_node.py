@@ -61,7 +61,7 @@ class Client(Node):
             self.answer(state)
 
     def phases(self, exploration_id):
-        seen = [state.phase for state in self.states if state.exploration_id == exploration_id]
+        seen = [state.phase_name for state in self.states if state.exploration_id == exploration_id]
         return [phase for before, phase in zip([None, *seen], seen, strict=False) if phase != before]
 
 
@@ -99,7 +99,7 @@ class World:
         )
 
     def until_phase(self, phase):
-        self.until(lambda: any(state.phase == phase for state in self.client.states))
+        self.until(lambda: any(state.phase_name == phase for state in self.client.states))
 
     def close(self):
         self.explorer.shutdown()
@@ -139,7 +139,20 @@ def test_a_service_call_explores_and_reports(world):
     world.until_phase('done')
     assert world.client.phases(response.exploration_id) == ['approach', 'contact', 'slide', 'lift', 'done']
     assert {s.surface for s in world.client.states if s.exploration_id} == {'cork'}
-    world.until(lambda: world.client.states[-1].phase == 'idle')
+    world.until(lambda: world.client.states[-1].phase_name == 'idle')
+
+
+def test_states_carry_the_position_of_the_finger_in_the_surface_frame(make_world):
+    world = make_world(surface_frame_id='table')
+    assert world.result(world.call(**QUICK)).success
+    world.until_phase('done')
+    sliding = [state for state in world.client.states if state.phase == msg.ExplorationState.SLIDE]
+    assert {state.header.frame_id for state in world.client.states} == {'table'}
+    begin, end = sliding[0], sliding[-1]
+    passed_s = (to_ns(end.header.stamp) - to_ns(begin.header.stamp)) * 1e-9
+    assert end.x_m - begin.x_m == pytest.approx(QUICK['speed_m_s'] * passed_s, abs=0.003)
+    assert abs(end.y_m - begin.y_m) < 1e-3
+    assert abs(end.z_m) < 2e-3  # pressed on the plane z = 0
 
 
 def test_stamps_are_of_the_ros_clock(world):
@@ -251,7 +264,7 @@ def test_the_action_reports_how_it_goes(world):
     assert result.status == GoalStatus.STATUS_SUCCEEDED
     assert result.result.success
     assert {note.feedback.state.exploration_id for note in world.client.feedback} == {result.result.exploration_id}
-    assert 'slide' in {note.feedback.state.phase for note in world.client.feedback}
+    assert 'slide' in {note.feedback.state.phase_name for note in world.client.feedback}
 
 
 def test_a_cancelled_action_lifts_the_finger(world):
@@ -283,13 +296,13 @@ def cork(state, **values):
 
 
 def test_a_certain_texture_ends_the_slide_early(world):
-    publisher = world.client.estimate(lambda state: cork(state, final=state.phase in ('lift', 'done')))
+    publisher = world.client.estimate(lambda state: cork(state, final=state.phase_name in ('lift', 'done')))
     world.until(publisher.get_subscription_count)
     response = world.result(world.call(**SLOW, early_stopping=True))
     assert response.success
     assert response.message == "ended early: 'cork' is certain with 0.99 after 5 windows"
     assert (response.texture.label, response.texture.final) == ('cork', True)
-    assert max(state.progress for state in world.client.states if state.phase == 'slide') < 0.5
+    assert max(state.progress for state in world.client.states if state.phase_name == 'slide') < 0.5
 
 
 def test_without_a_final_estimate_the_newest_is_given(make_world):

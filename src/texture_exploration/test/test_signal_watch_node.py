@@ -35,7 +35,7 @@ class Finger:
             self._signal.publish(msg.TactileSignal())
 
     def _on_state(self, state):
-        self.phases.append((state.phase, time.monotonic()))
+        self.phases.append((state.phase_name, time.monotonic()))
 
     def ready(self):
         return self._explore.service_is_ready() and self._signal.get_subscription_count() > 0

@@ -176,6 +176,7 @@ class Exploration:
             return
         self._next_state_ns = now_ns + STATE_PERIOD_NS - STATE_SLACK_NS
         vx, vy, _ = arm.velocity
+        x, y, z = arm.position
         self._report(
             ExplorationState(
                 stamp_ns=now_ns,
@@ -188,6 +189,9 @@ class Exploration:
                 direction_rad=step.direction_rad,
                 progress=step.progress,
                 surface=self.request.surface,
+                x_m=x,
+                y_m=y,
+                z_m=z,
             )
         )
 

@@ -52,10 +52,11 @@ def recording(seconds=1.0):
             NANOSECONDS + round(first / RATE_HZ * NANOSECONDS),
             's',
             ('c',),
-            '',
+            (),
             RATE_HZ,
             first,
             samples[first : first + 20],
+            'tip',
         )
         for first in range(0, len(samples), 20)
     ]
@@ -76,6 +77,7 @@ def test_the_node_publishes_what_the_same_recording_gives_offline(bench):
     bench.until(lambda: len(bench.features) == 4)
     bench.states.publish(to_msg(lift()))
     bench.until(lambda: bench.features and bench.features[-1].last)
+    assert {heard.frame_id for heard in bench.features} == {'tip'}
     feature_set = FeatureSet.load('default')
     pieces = cut_recording({'signal': recording()}, [slide(), lift()], feature_set.windows)
     for heard, expected in zip(bench.features, map(feature_set.describe, pieces), strict=True):
@@ -92,13 +94,13 @@ def test_a_slide_whose_sensor_died_ends_all_the_same(bench):
     bench.states.publish(to_msg(lift()))
     bench.until(lambda: bench.features and bench.features[-1].last)
     assert bench.features[-1].skipped == 4
-    assert [vector.number for vector in bench.features] == list(range(len(bench.features)))
+    assert [vector.sequence for vector in bench.features] == list(range(len(bench.features)))
     bench.until(lambda: any('nothing has come yet on signal' in report.status[0].message for report in bench.reports))
 
 
 def test_broken_messages_are_counted_and_survived(bench):
     bench.signals.publish(msg.TactileSignal(sensor='s', channels=['a', 'b'], sampling_rate_hz=1000.0, samples=[1.0]))
-    bench.states.publish(msg.ExplorationState(phase='sleeping'))
+    bench.states.publish(msg.ExplorationState(phase=99))
     bench.until(lambda: bench.node._broken == 2)
     bench.states.publish(to_msg(slide()))
     bench.until(lambda: bench.node._cutter._slides)

@@ -42,7 +42,7 @@ def batches(samples, rate_hz, first_ns=START_NS):
             first_ns + round(first / rate_hz * NANOSECONDS),
             's',
             channels,
-            '',
+            (),
             rate_hz,
             first,
             samples[first : first + step].astype(np.float32),

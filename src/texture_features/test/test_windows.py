@@ -30,7 +30,7 @@ def stream(duration_s, rate_hz=1000.0, batch=5, begin_s=0.0, columns=1):
     rows = np.repeat(np.arange(total, dtype=np.float32)[:, None], columns, axis=1)
     channels = tuple(f'c{column}' for column in range(columns))
     return [
-        TactileSignal(ns(begin_s + first / rate_hz), 's', channels, '', rate_hz, first, rows[first : first + batch])
+        TactileSignal(ns(begin_s + first / rate_hz), 's', channels, (), rate_hz, first, rows[first : first + batch])
         for first in range(0, total, batch)
     ]
 

@@ -31,7 +31,9 @@ STAMP_NS = 1_700_000_000_123_456_789
 
 def signal(first_sample: int = 7, channels: tuple[str, ...] = ('a', 'b')) -> TactileSignal:
     samples = np.arange(5 * len(channels), dtype=np.float32).reshape(5, -1) + first_sample
-    return TactileSignal(STAMP_NS + first_sample, 'x/y', channels, 'count', 1000.0, first_sample, samples, 'tip')
+    return TactileSignal(
+        STAMP_NS + first_sample, 'x/y', channels, ('count',) * len(channels), 1000.0, first_sample, samples, 'tip'
+    )
 
 
 VALUES = [

@@ -8,8 +8,10 @@ from texture_recordings.cdr import TYPES, decode, encode
 @pytest.mark.parametrize(
     'value',
     [
-        ExplorationState(1, 'e', 'circular', Phase.SLIDE, 0.5, 0.1, 2.0, 0.0, 0.5, 'cork'),
-        TextureEstimate(1, 'e', 'cork', True, 0.9, ('cork', 'felt'), (0.9, 0.1), True, ('cork',), 3, 0.7),
+        ExplorationState(1, 'e', 'circular', Phase.SLIDE, 0.5, 0.1, 2.0, 0.0, 0.5, 'cork', 0.1, 0.0, 2e-3, 'surface'),
+        TextureEstimate(
+            1, 'e', 'cork', True, 0.9, ('cork', 'felt'), (0.9, 0.1), True, ('cork',), 3, 0.7, frame_id='tip'
+        ),
         RoughnessEstimate(1, 'e', True, 3.5, 0.4),
     ],
     ids=lambda value: type(value).__name__,

@@ -29,7 +29,7 @@ def write(path: Path, lost: int = 0) -> Path:
             first = 10 * count + (lost if count > 150 else 0)
             bag.write('exploration', state, stamp_ns)
             bag.write(
-                'signal', TactileSignal(stamp_ns, 's', ('a',), '', 1000.0, first, samples), stamp_ns + STEP_NS - 1
+                'signal', TactileSignal(stamp_ns, 's', ('a',), (), 1000.0, first, samples), stamp_ns + STEP_NS - 1
             )
     return path
 

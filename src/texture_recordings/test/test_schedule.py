@@ -20,6 +20,6 @@ def test_long_pauses_are_shortened() -> None:
 def test_losses_and_restarts_of_each_stream_are_counted() -> None:
     continuity = Continuity()
     for stream, first in (('a', 100), ('b', 0), ('a', 104), ('a', 110), ('a', 0), ('b', 4)):
-        continuity.update(stream, TactileSignal(0, 's', ('c',), '', 1.0, first, np.zeros((4, 1), dtype=np.float32)))
+        continuity.update(stream, TactileSignal(0, 's', ('c',), (), 1.0, first, np.zeros((4, 1), dtype=np.float32)))
     assert (continuity.lost['a'], continuity.restarts['a'], continuity.samples['a']) == (2, 1, 16)
     assert (continuity.lost['b'], continuity.restarts['b'], continuity.samples['b']) == (0, 0, 8)

@@ -19,7 +19,7 @@ def write(path: Path, surfaces: list[str], start_s: int) -> Path:
                 state = ExplorationState(stamp_ns + step, name, 'linear_slide', phase, surface=surface)
                 bag.write('exploration', state, stamp_ns + step)
             samples = np.full((1, 1), count, dtype=np.float32)
-            bag.write('signal', TactileSignal(stamp_ns, 's', ('a',), '', 1.0, count, samples), stamp_ns + 5)
+            bag.write('signal', TactileSignal(stamp_ns, 's', ('a',), (), 1.0, count, samples), stamp_ns + 5)
     return path
 
 

@@ -32,7 +32,7 @@ TYPES: Mapping[type, str] = {cls: name for name, cls in MESSAGES.items()}
 Convert = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 # By the type of a field, where it is not the same on both sides: to the wire, and back.
 WIRE: Mapping[Any, Convert] = {
-    Phase: (lambda phase: phase.value, Phase),
+    Phase: (lambda phase: phase.code, lambda code: tuple(Phase)[code]),
     tuple[str, ...]: (list, tuple),
     tuple[float, ...]: (lambda values: np.array(values, dtype=np.float64), lambda values: tuple(values.tolist())),
     Array: (lambda values: np.ascontiguousarray(values, dtype=np.float64), lambda values: values),
@@ -60,6 +60,8 @@ def encode(value: Any) -> bytes:
     types = typestore().types
     cls: type = type(value)
     given = {name: to_wire(getattr(value, name)) for name, (to_wire, _) in _fields(cls).items()}
+    if isinstance(value, ExplorationState):
+        given['phase_name'] = value.phase.value
     seconds, nanoseconds = divmod(next(given.pop(name) for name in STAMPS if name in given), NANOSECONDS)
     header = types['std_msgs/msg/Header'](
         stamp=types['builtin_interfaces/msg/Time'](sec=int(seconds), nanosec=int(nanoseconds)),
@@ -123,7 +125,7 @@ class SignalDecoder:
         samples = np.frombuffer(raw, '<f4', length, tail + INDEX_AND_LENGTH.size)
         like = self._like
         return TactileSignal(
-            seconds * NANOSECONDS + nanoseconds, like.sensor, like.channels, like.unit, like.sampling_rate_hz,
+            seconds * NANOSECONDS + nanoseconds, like.sensor, like.channels, like.units, like.sampling_rate_hz,
             first, samples.reshape(-1, columns), like.frame_id,
         )  # fmt: skip
 

@@ -48,7 +48,7 @@ def test_a_recording_and_an_exploration_are_made_with_every_sensor(sensor: str) 
     for stream in SENSORS[sensor].streams:
         for made in (explored, recorded):
             assert {batch.channels for batch in made[stream.topic]} == {stream.channels}
-            assert {batch.unit for batch in made[stream.topic]} == {stream.unit}
+            assert {batch.common_unit for batch in made[stream.topic]} == {stream.unit}
 
 
 @pytest.mark.parametrize('sensor', SENSORS)

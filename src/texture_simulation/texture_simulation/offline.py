@@ -174,7 +174,7 @@ def _batches(samples: Samples, stream: SimulatedStream, start_ns: int) -> list[T
             stamp_ns=start_ns + round((stream.delay_s + first / stream.rate_hz) * NANOSECONDS),
             sensor=stream.sensor,
             channels=stream.channels,
-            unit=stream.unit,
+            units=(stream.unit,) * len(stream.channels),
             sampling_rate_hz=stream.rate_hz,
             first_sample=first,
             samples=values[first : first + per_batch],

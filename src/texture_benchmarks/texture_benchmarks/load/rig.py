@@ -47,7 +47,7 @@ class RigCase:
     feed
         Called with the device, the first tick and the number of ticks.
     units
-        Unit of each topic that must come.
+        Unit of each topic that must come: one for all of its channels, or one for each.
     config
         Settings of the sensor, so that it publishes counts.
     """
@@ -56,7 +56,7 @@ class RigCase:
     ticks_per_s: float
     samples_per_tick: int
     feed: Feed
-    units: Mapping[str, str]
+    units: Mapping[str, str | tuple[str, ...]]
     modulus: int
     slope: int = 1
     config: str = ''
@@ -102,14 +102,18 @@ def feed_pvdf(device: Any, first: int, ticks: int) -> None:
 
 def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
     """Return how a TSF-85 is fed."""
-    imu = 'm/s², m/s², m/s², rad/s, rad/s, rad/s'
-    units = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count', f'{prefix}imu': imu}
+    imu = ('m/s²',) * 3 + ('rad/s',) * 3
+    units: dict[str, str | tuple[str, ...]] = {
+        f'{prefix}signal': 'count',
+        f'{prefix}signal_static': 'count',
+        f'{prefix}imu': imu,
+    }
     return RigCase(f'{prefix}signal', 1000.0, 1, feed_tsf85(shape), units, 1000)
 
 
 def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
     """Return how a BioTac is fed."""
-    units = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
+    units: dict[str, str | tuple[str, ...]] = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
     return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, slope=2)
 
 

@@ -127,6 +127,12 @@ def _recorded(
         0, slide.exploration_id, 'linear_slide', Phase.SLIDE, steady_s=sliding.duration_s, surface=surface
     )
     signal = TactileSignal(
-        0, stream.sensor, stream.channels, stream.unit, stream.rate_hz, 0, samples.astype(np.float32)
+        0,
+        stream.sensor,
+        stream.channels,
+        (stream.unit,) * len(stream.channels),
+        stream.rate_hz,
+        0,
+        samples.astype(np.float32),
     )
     return Recorded(slide, {TOPIC: [signal]}, [state])

@@ -52,7 +52,7 @@ class Ring:
         self._samples = np.full(size, np.nan)
         self._at, self._next = 0, None
         self.rate_hz, self.sensor = signal.sampling_rate_hz, signal.sensor
-        self.channel, self.unit = signal.channels[0], signal.unit
+        self.channel, self.unit = signal.channels[0], signal.common_unit
 
     def _append(self, fresh: NDArray[np.float64]) -> None:
         places = (self._at + np.arange(len(fresh))) % len(self._samples)

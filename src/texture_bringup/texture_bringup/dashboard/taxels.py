@@ -30,7 +30,7 @@ class Taxels:
         if not len(newest):
             return
         if signal.channels[:MAX_CHANNELS] != self.channels:
-            self.channels, self.unit = signal.channels[:MAX_CHANNELS], signal.unit
+            self.channels, self.unit = signal.channels[:MAX_CHANNELS], signal.common_unit
             self.places = places_of(self.channels)
             self._resting = newest[0]
         self._newest = newest[0]

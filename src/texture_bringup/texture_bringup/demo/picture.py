@@ -68,4 +68,4 @@ def _sliding_part(states: Sequence[ExplorationState], batches: Sequence[TactileS
     start_ns, end_ns = states[0].stamp_ns, states[-1].stamp_ns
     inside = [batch for batch in batches if start_ns <= batch.stamp_ns and batch.end_ns <= end_ns]
     samples: Array = np.concatenate([batch.samples[:, 0] for batch in inside]).astype(np.float64)
-    return samples, inside[0].sampling_rate_hz, inside[0].unit
+    return samples, inside[0].sampling_rate_hz, inside[0].common_unit

@@ -38,7 +38,10 @@ def to_msg(value: Any) -> Any:
         return _signal_to_msg(value)
     stamp, fields = _plan(type(value))
     values = {name: wire(getattr(value, name)) if wire else getattr(value, name) for name, wire, _ in fields}
-    return MESSAGES[type(value)](header=Header(stamp=to_stamp(getattr(value, stamp))), **values)
+    if isinstance(value, ExplorationState):
+        values['phase_name'] = value.phase.value
+    header = Header(stamp=to_stamp(getattr(value, stamp)), frame_id=value.frame_id)
+    return MESSAGES[type(value)](header=header, **values)
 
 
 def from_msg(message: Any) -> Any:
@@ -55,6 +58,7 @@ def from_msg(message: Any) -> Any:
     stamp, fields = _plan(cls)
     values = {name: unwire(getattr(message, name)) if unwire else getattr(message, name) for name, _, unwire in fields}
     values[stamp] = to_ns(message.header.stamp)
+    values['frame_id'] = message.header.frame_id
     return cls(**values)
 
 
@@ -63,7 +67,7 @@ def _signal_to_msg(signal: TactileSignal) -> msg.TactileSignal:
         header=Header(stamp=to_stamp(signal.stamp_ns), frame_id=signal.frame_id),
         sensor=signal.sensor,
         channels=list(signal.channels),
-        unit=signal.unit,
+        units=list(signal.units),
         sampling_rate_hz=float(signal.sampling_rate_hz),
         first_sample=signal.first_sample,
     )
@@ -84,7 +88,7 @@ def _signal_from_msg(message: msg.TactileSignal) -> TactileSignal:
         stamp_ns=to_ns(message.header.stamp),
         sensor=message.sensor,
         channels=channels,
-        unit=message.unit,
+        units=tuple(message.units),
         sampling_rate_hz=message.sampling_rate_hz,
         first_sample=message.first_sample,
         samples=flat.reshape(-1, len(channels)),
@@ -92,13 +96,12 @@ def _signal_from_msg(message: msg.TactileSignal) -> TactileSignal:
     )
 
 
-def _phase(text: str) -> Phase:
-    try:
-        return Phase(text)
-    except ValueError as error:
-        raise InvalidData(
-            f"exploration state has the phase '{text}'; allowed are {', '.join(p.value for p in Phase)}"
-        ) from error
+def _phase(code: int) -> Phase:
+    phases = tuple(Phase)
+    if code >= len(phases):
+        allowed = ', '.join(f'{phase.code} ({phase.value})' for phase in phases)
+        raise InvalidData(f'exploration state has the phase {code}; allowed are {allowed}')
+    return phases[code]
 
 
 def _doubles(values: Array) -> array.array[float]:
@@ -111,7 +114,7 @@ CONVERT: Mapping[Any, tuple[Convert, Convert]] = {
     tuple[str, ...]: (list, tuple),
     tuple[float, ...]: (partial(array.array, 'd'), tuple),
     Array: (_doubles, partial(np.array, dtype=np.float64)),
-    Phase: (lambda phase: phase.value, _phase),
+    Phase: (lambda phase: phase.code, _phase),
 }
 
 
@@ -120,6 +123,7 @@ def _plan(cls: type) -> tuple[str, tuple[tuple[str, Convert, Convert], ...]]:
     """Return which field is the time, and each other one with what it becomes."""
     types = typing.get_type_hints(cls)
     [stamp] = [name for name in STAMPS if types.pop(name, None)]
+    types.pop('frame_id')  # stands in the header, too
     return stamp, tuple((name, *CONVERT.get(kind, (None, None))) for name, kind in types.items())
 
 

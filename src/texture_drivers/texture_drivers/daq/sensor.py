@@ -68,15 +68,14 @@ def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:
 
 
 def stream(rate_hz: float, channels: Sequence[DaqChannel]) -> FramedStream:
-    """Return what the device sends, as the line understands it; units that differ are listed in one text."""
-    units = [channel.unit for channel in channels]
+    """Return what the device sends, as the line understands it."""
     return FramedStream(
         topic=tables.TOPIC,
         kind=tables.KIND,
         sensor=tables.SENSOR,
         rate_hz=rate_hz,
         channels=tuple(channel.name for channel in channels),
-        unit=units[0] if len(set(units)) == 1 else ', '.join(units),
+        units=tuple(channel.unit for channel in channels),
         gains=np.array([channel.gain for channel in channels]),
         offsets=np.array([channel.offset for channel in channels]),
     )

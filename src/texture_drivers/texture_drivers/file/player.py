@@ -146,7 +146,7 @@ class FilePlayer:
             stamp_ns=self._start_ns + round(self._position / self._rate_hz * NANOSECONDS),
             sensor=f'file/{Path(self._params.device).stem}',
             channels=self._channels,
-            unit=self._settings.unit,
+            units=(self._settings.unit,) * len(self._channels),
             sampling_rate_hz=self._rate_hz,
             first_sample=self._first_index + self._position,
             samples=played,

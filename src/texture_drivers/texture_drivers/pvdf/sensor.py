@@ -97,7 +97,7 @@ class PvdfSettings:
                 sensor=tables.FILM_SENSOR,
                 rate_hz=self.film_rate_hz,
                 channels=tables.FILM_CHANNELS,
-                unit='pC',
+                units=('pC',),
                 gains=np.array([self.film_gain_pc]),
                 offsets=np.array([self.film_offset_pc]),
             ),
@@ -107,7 +107,7 @@ class PvdfSettings:
                 sensor=tables.FORCE_SENSOR,
                 rate_hz=self.force_rate_hz,
                 channels=tables.FORCE_CHANNELS,
-                unit='N',
+                units=('N',),
                 gains=np.array([self.force_gain_n]),
                 offsets=np.array([self.force_offset_n]),
             ),
@@ -167,4 +167,4 @@ class Pvdf:
             reconstructor.restart()
         self._next_sample = film.next_sample
         force_n = reconstructor.update(film.samples.astype(np.float64) / COULOMB_PC)
-        return replace(film, unit='N', samples=force_n.astype(np.float32))
+        return replace(film, units=('N',), samples=force_n.astype(np.float32))

@@ -135,7 +135,7 @@ class BatchCutter:
         self._layout = layout
         self._frame_id = frame_id
         self._clock = clock
-        self._motion_channels, self._motion_unit = settings.channels, settings.unit
+        self._motion_channels, self._motion_units = settings.channels, settings.units
         self._motion_gains: Array = settings.gains
         self._next_index: int | None = None  # none published yet
         self._image: tuple[int, ...] | None = None
@@ -182,7 +182,7 @@ class BatchCutter:
             stamp_ns=self._clock.time_ns(first),
             sensor=tables.DYNAMIC_SENSOR,
             channels=tables.DYNAMIC_CHANNELS,
-            unit=tables.UNIT,
+            units=(tables.UNIT,),
             sampling_rate_hz=tables.RATE_HZ,
             first_sample=first,
             samples=np.array([item.dynamic for item in members], dtype=np.float32)[:, None],
@@ -198,7 +198,7 @@ class BatchCutter:
             stamp_ns=self._clock.time_ns(first),
             sensor=tables.MOTION_SENSOR,
             channels=self._motion_channels,
-            unit=self._motion_unit,
+            units=self._motion_units,
             sampling_rate_hz=tables.RATE_HZ,
             first_sample=first,
             samples=(counts * self._motion_gains).astype(np.float32),
@@ -213,7 +213,7 @@ class BatchCutter:
             stamp_ns=self._clock.time_ns(tick * self._frames_per_tick),
             sensor=tables.STATIC_SENSOR,
             channels=self._layout.static_channels,
-            unit=tables.UNIT,
+            units=(tables.UNIT,) * len(self._layout.static_channels),
             sampling_rate_hz=self.static_rate_hz,
             first_sample=tick,
             samples=np.array([image], dtype=np.float32),

@@ -26,9 +26,14 @@ from texture_drivers.tsf85.settings import Tsf85Settings
 
 TAXELS, AXES = tables.STATIC_ROWS * tables.STATIC_COLUMNS, 3
 FIRST_COLUMN = 'Time(ms)'
-ChannelGroup = tuple[str, tuple[str, ...], str, float]
-DYNAMIC: ChannelGroup = (tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, tables.UNIT, tables.RATE_HZ)
-TAXEL: ChannelGroup = (tables.STATIC_SENSOR, tables.STATIC_CHANNELS, tables.UNIT, tables.STATIC_RATE_HZ)
+ChannelGroup = tuple[str, tuple[str, ...], tuple[str, ...], float]
+DYNAMIC: ChannelGroup = (tables.DYNAMIC_SENSOR, tables.DYNAMIC_CHANNELS, (tables.UNIT,), tables.RATE_HZ)
+TAXEL: ChannelGroup = (
+    tables.STATIC_SENSOR,
+    tables.STATIC_CHANNELS,
+    (tables.UNIT,) * TAXELS,
+    tables.STATIC_RATE_HZ,
+)
 MAX_LINE = 10_000  # characters; a number has 25 at most
 COLUMNS = 1 + tables.FINGERS * (1 + TAXELS + AXES + AXES)
 
@@ -85,7 +90,7 @@ class VendorRecording:
         streams = {
             SIGNAL: (DYNAMIC, self.dynamic[lines, finger, None]),
             STATIC: (TAXEL, self.static[ticks, finger]),
-            IMU: ((tables.MOTION_SENSOR, settings.channels, settings.unit, tables.RATE_HZ), motion * settings.gains),
+            IMU: ((tables.MOTION_SENSOR, settings.channels, settings.units, tables.RATE_HZ), motion * settings.gains),
         }
         return {topic: [self._batch(stream, samples)] for topic, (stream, samples) in streams.items()}
 
@@ -95,12 +100,12 @@ class VendorRecording:
         return self.acceleration.reshape(n, -1), self.rotation.reshape(n, -1)
 
     def _batch(self, stream: ChannelGroup, samples: Array) -> TactileSignal:
-        sensor, channels, unit, rate_hz = stream
+        sensor, channels, units, rate_hz = stream
         return TactileSignal(
             stamp_ns=round(self.time_ms[0] * NANOSECONDS / 1000),
             sensor=sensor,
             channels=channels,
-            unit=unit,
+            units=units,
             sampling_rate_hz=rate_hz,
             first_sample=0,
             samples=samples.astype(np.float32),

@@ -58,9 +58,9 @@ class Tsf85Settings:
         return tuple(f'{QUANTITIES[kind][0]}_{axis}' for kind in self.kinds for axis in AXES)
 
     @property
-    def unit(self) -> str:
-        """Units of the columns, one after another."""
-        return ', '.join(QUANTITIES[kind][1] for kind in self.kinds for _ in AXES)
+    def units(self) -> tuple[str, ...]:
+        """Unit of each column."""
+        return tuple(QUANTITIES[kind][1] for kind in self.kinds for _ in AXES)
 
     @property
     def gains(self) -> Array:

@@ -59,7 +59,7 @@ class EstimatorNode(Node):
 
     def _on_features(self, message: msg.FeatureVector) -> None:
         began = time.perf_counter()
-        self._count_lost(message.number)
+        self._count_lost(message.sequence)
         try:
             vector = from_msg(message)
         except TextureError as error:

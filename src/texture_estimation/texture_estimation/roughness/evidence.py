@@ -89,6 +89,7 @@ class RoughnessEvidence:
             return RoughnessEstimate(
                 stamp_ns=vector.start_ns,
                 exploration_id=vector.exploration_id,
+                frame_id=vector.frame_id,
                 final=vector.last,
                 model=model.name if model else '',
                 message=self._message or (NO_WINDOW if vector.last else ''),
@@ -101,6 +102,7 @@ class RoughnessEvidence:
         return RoughnessEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
+            frame_id=vector.frame_id,
             valid=True,
             grade=min(max(self._sum / self._windows, SMOOTH), ROUGH),
             grade_std=std,

@@ -52,6 +52,13 @@ class ArmParams:
     )
 
 
+@dataclass(frozen=True)
+class FrameParams:
+    """The frame of what is published."""
+
+    surface_frame_id: str = param('surface', 'Sets the frame of the surface in the headers of the published states.')
+
+
 class ExplorerNode(Node):
     """Explore on request, as a service or as an action; publish what the finger is doing."""
 
@@ -59,6 +66,7 @@ class ExplorerNode(Node):
         super().__init__('explorer', **kwargs)
         self._early_stopping = declare(self, EarlyStoppingParams, changeable=True)
         self._explorer = self._make_explorer()
+        self._surface_frame_id = declare(self, FrameParams).surface_frame_id
         self._follow_parameters()
         self._ids = ExplorationIds(np.random.default_rng())
         self._open: dict[str, ExplorationEstimates] = {}  # explorations whose caller still waits, by id
@@ -218,7 +226,8 @@ class ExplorerNode(Node):
     def _publish_idle(self) -> None:
         with self._publishing:
             if self._explorer.current is None:
-                self._publish(ExplorationState(self.get_clock().now().nanoseconds, '', '', Phase.IDLE))
+                idle = ExplorationState(self._explorer.now_ns(), '', '', Phase.IDLE)
+                self._publish(self._stamped(idle))
 
     def _publish(self, state: ExplorationState) -> None:
         try:
@@ -231,7 +240,8 @@ class ExplorerNode(Node):
     def _stamped(self, state: ExplorationState) -> ExplorationState:
         """Return the state with its stamp on the clock of ROS instead of CLOCK_MONOTONIC."""
         age_ns = self._explorer.now_ns() - state.stamp_ns
-        return replace(state, stamp_ns=self.get_clock().now().nanoseconds - age_ns)
+        stamp_ns = self.get_clock().now().nanoseconds - age_ns
+        return replace(state, stamp_ns=stamp_ns, frame_id=self._surface_frame_id)
 
     def _report(self) -> DiagnosticReport:
         current, fault = self._explorer.current, self._explorer.fault()

@@ -41,6 +41,7 @@ class FeatureExtractor(Node):
         self._broken = 0
         self._reported = 0
         self._sent = 0
+        self._frame_id = ''  # of the fingertip
         self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         for topic in self._feature_set.topics:
@@ -49,6 +50,7 @@ class FeatureExtractor(Node):
         self._diagnostics = Diagnostics(self, self._report)
 
     def _on_signal(self, topic: str, message: msg.TactileSignal) -> None:
+        self._frame_id = message.header.frame_id
         self._add(partial(self._cutter.add_signal, topic), message)
 
     def _on_state(self, message: msg.ExplorationState) -> None:
@@ -69,7 +71,8 @@ class FeatureExtractor(Node):
     def _publish(self, pieces: list[Piece]) -> None:
         for piece in pieces:
             vector = to_msg(self._feature_set.describe(piece))
-            vector.number = self._sent
+            vector.sequence = self._sent
+            vector.header.frame_id = self._frame_id
             self._publisher.publish(vector)
             self._sent += 1
 

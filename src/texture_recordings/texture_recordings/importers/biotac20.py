@@ -192,7 +192,9 @@ def _batches(indices: AnyArray) -> Iterator[slice]:
 
 def _signal(part: str, channels: tuple[str, ...], stamp_ns: int, first: int, samples: AnyArray) -> TactileSignal:
     rate_hz = 2200.0 if part == 'pac' else 100.0
-    return TactileSignal(stamp_ns, f'biotac/{part}', channels, 'count', rate_hz, first, samples, 'biotac')
+    return TactileSignal(
+        stamp_ns, f'biotac/{part}', channels, ('count',) * len(channels), rate_hz, first, samples, 'biotac'
+    )
 
 
 @dataclass(frozen=True, eq=False)

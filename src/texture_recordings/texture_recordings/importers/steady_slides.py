@@ -109,6 +109,13 @@ def _write_phase(
         samples = slide.samples[index : min(index + step, part.stop)].astype('float32')
         stamp_ns = start_ns + stream.to_ns(index)
         batch = TactileSignal(
-            stamp_ns, stream.sensor, stream.channels, stream.unit, stream.rate_hz, first + index, samples, stream.sensor
+            stamp_ns,
+            stream.sensor,
+            stream.channels,
+            (stream.unit,) * len(stream.channels),
+            stream.rate_hz,
+            first + index,
+            samples,
+            stream.sensor,
         )
         bag.write(stream.topic, batch, start_ns + stream.to_ns(index + len(samples)) + DELAY_NS)
