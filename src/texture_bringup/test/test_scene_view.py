@@ -33,7 +33,7 @@ def test_lines_follow_the_angle_between_way_and_ridges() -> None:
 
 def test_the_skin_senses_less_than_the_surface_has() -> None:
     seen = shown('ets_fine', 'scratched_plastic')
-    assert seen.felt_m.std() < 0.9 * seen.sharp_m.std()
+    assert seen.blurred_m.std() < 0.9 * seen.sharp_m.std()
 
 
 def test_the_way_lies_within_the_relief_that_is_shown() -> None:

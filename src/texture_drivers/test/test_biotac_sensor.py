@@ -110,8 +110,8 @@ def test_a_lost_frame_is_a_jump_of_22_samples() -> None:
 
 def test_after_an_interruption_the_index_goes_on_with_the_time() -> None:
     gone = [None] * 30
-    anew = numbered(range(40), reply(), epoch=2)
-    sensor = opened(FakeLink([*numbered(range(40), reply()), *gone, *anew]))
+    restarted = numbered(range(40), reply(), epoch=2)
+    sensor = opened(FakeLink([*numbered(range(40), reply()), *gone, *restarted]))
     topics = run(sensor, 110)
     stamps = np.array([batch.stamp_ns for batch in topics['signal_static']])
     indices = np.array([batch.first_sample for batch in topics['signal_static']])

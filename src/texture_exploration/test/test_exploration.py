@@ -101,7 +101,7 @@ def test_a_bug_in_the_loop_leaves_no_arm_moving(table):
     assert not table.exploration.outcome.success
 
 
-def test_a_slide_can_end_early_with_success_but_keeps_its_promise(table):
+def test_a_slide_can_end_early_with_success_but_not_before_the_guaranteed_time(table):
     table.when[Phase.SLIDE] = lambda: table.exploration.finish('the texture is certain')
     outcome = table.explore()
     assert (outcome.success, outcome.message) == (True, 'the texture is certain')

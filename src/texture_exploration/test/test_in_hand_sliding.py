@@ -26,10 +26,10 @@ def test_two_seconds_of_sliding_stay_within_the_stroke(table):
 
 def test_nothing_is_guaranteed_for_a_turn(table):
     table.explore(RUB)
-    promised = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
+    guaranteed = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
     slow = [s.stamp_ns for s, _ in sliding(table) if abs(s.speed_m_s - 0.02) > 0.0005]
     assert len(slow) >= 5
-    assert not any(begin <= stamp < end for stamp in slow for begin, end in promised if end > begin)
+    assert not any(begin <= stamp < end for stamp in slow for begin, end in guaranteed if end > begin)
 
 
 def test_the_direction_alternates(table):

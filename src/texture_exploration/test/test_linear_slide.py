@@ -48,8 +48,8 @@ def test_what_a_slide_guarantees_it_keeps(table):
     table.explore()
     end_ns = table.first(Phase.LIFT)[0].stamp_ns
     sliding = [state for state in table.states if state.phase is Phase.SLIDE]
-    promised = [state.stamp_ns + int(state.steady_s * 1e9) for state in sliding]
-    assert max(promised) <= end_ns
+    guaranteed = [state.stamp_ns + int(state.steady_s * 1e9) for state in sliding]
+    assert max(guaranteed) <= end_ns
     assert sliding[0].steady_s == pytest.approx(0.1)
     assert not any(state.steady_s for state in table.states if state.phase is not Phase.SLIDE)
 

@@ -23,9 +23,9 @@ def test_the_finger_keeps_its_speed_and_its_direction_is_where_it_goes(table, na
     table.explore(ExplorationRequest(name))
     slide = [(s, p) for s, p in zip(table.states, table.places, strict=True) if s.phase is Phase.SLIDE]
     steps = [(a, b, (b[0].stamp_ns - a[0].stamp_ns) * 1e-9) for a, b in pairwise(slide)]
-    promised = [step for step in steps if step[2] <= step[0][0].steady_s]
-    assert len(promised) > 0.8 * len(steps)
-    for (state, place), (_, next_place), seconds in promised:
+    guaranteed = [step for step in steps if step[2] <= step[0][0].steady_s]
+    assert len(guaranteed) > 0.8 * len(steps)
+    for (state, place), (_, next_place), seconds in guaranteed:
         way = math.dist(place[:2], next_place[:2])
         assert way / seconds == pytest.approx(state.speed_m_s, rel=0.02)
         heading = math.atan2(next_place[1] - place[1], next_place[0] - place[0])

@@ -26,11 +26,11 @@ class Finger:
         self.streaming, self.phases = True, []
         self.until, peer = graph.until, graph.peer
         self._signal = peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
-        peer.create_timer(0.01, self._feel)
+        peer.create_timer(0.01, self._publish_samples)
         peer.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         self._explore = peer.create_client(srv.Explore, 'explore')
 
-    def _feel(self):
+    def _publish_samples(self):
         if self.streaming:
             self._signal.publish(msg.TactileSignal())
 

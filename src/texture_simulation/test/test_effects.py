@@ -109,9 +109,9 @@ def test_the_skin_resonates_where_and_as_much_as_mass_spring_and_damper() -> Non
 
 def test_the_energy_of_a_pushed_skin_never_grows() -> None:
     skin = Skin(resonance_hz=400.0, damping=0.01).start_force(rng(), RATE_HZ, ())
-    struck = np.zeros(4000)
-    struck[0] = 1.0
-    rung = skin(along_x(0.0, 4000), struck)
+    impulse = np.zeros(4000)
+    impulse[0] = 1.0
+    rung = skin(along_x(0.0, 4000), impulse)
     envelope = np.abs(rung).reshape(-1, 200).max(axis=1)
     assert (np.diff(envelope) <= 0).all()
 

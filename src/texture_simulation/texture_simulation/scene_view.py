@@ -69,7 +69,7 @@ class SceneView:
         Height of the surface around the way, as sharp as it is known.
     way
         Of the finger.
-    along_m, sharp_m, felt_m : (n,)
+    along_m, sharp_m, blurred_m : (n,)
         Way from the start, and the height there: as it is, and as the contact averages it.
     time_s, signal : (n_samples,)
         What the sensor publishes.
@@ -89,7 +89,7 @@ class SceneView:
     way: Trajectory
     along_m: Array
     sharp_m: Array
-    felt_m: Array
+    blurred_m: Array
     time_s: Array
     signal: Array
     frequency_hz: Array
@@ -128,7 +128,7 @@ def view(scene: Scene, surface: str, plan: ViewPlan, rng: np.random.Generator) -
         way=way,
         along_m=plan.speed_m_s / kind.path_rate_hz * np.arange(len(shown), dtype=np.float64),
         sharp_m=_height(touched, shown, MIN_BLUR_M),
-        felt_m=_height(touched, shown, model.touch.blur_m(plan.force_n)),
+        blurred_m=_height(touched, shown, model.touch.blur_m(plan.force_n)),
         time_s=np.arange(len(signal), dtype=np.float64) / kind.fast.rate_hz,
         signal=signal,
         frequency_hz=frequency_hz,

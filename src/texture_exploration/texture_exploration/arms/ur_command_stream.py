@@ -70,7 +70,7 @@ class UrCommandStream:
         self._frame = SurfaceFrame(params.surface_pose)
         self._up = self._frame.to_base((0.0, 0.0, RISE_M_S))
         self._air = FreeAir(params.zero_rise_m, params.zero_steady_n)
-        self._felt_ns = self._rest_ns = 0
+        self._measured_ns = self._rest_ns = 0
         self._rise_from_m: float | None = None
         self._height_m = 0.0
         self._mode = Mode.REST
@@ -78,9 +78,9 @@ class UrCommandStream:
         self._next_is_speed = False
 
     def observe(self, time_ns: int, position_m: Vector, force_n: Vector) -> None:
-        """Take note of what the controller measured last, in the base frame."""
+        """Take over what the controller measured last, in the base frame."""
         place = self._frame.place(position_m)
-        self._height_m, self._felt_ns = place[2], time_ns
+        self._height_m, self._measured_ns = place[2], time_ns
         self._air.update(time_ns, place, self._frame.direction(force_n)[2])
 
     def cycle(self, ur_command: UrCommand | None) -> None:
@@ -134,7 +134,7 @@ class UrCommandStream:
             self._count(False)
             return False
         self._mode = mode
-        self._rest_ns = self._felt_ns
+        self._rest_ns = self._measured_ns
         self._braking = self._next_is_speed = False
         return True
 
@@ -168,7 +168,7 @@ class UrCommandStream:
 
     def _rest(self, _ur_command: UrCommand | None) -> bool:
         """Zero the force sensor as soon as the arm has calmed down in free air."""
-        if self._air.proven and self._felt_ns - self._rest_ns > CALM_NS:
+        if self._air.proven and self._measured_ns - self._rest_ns > CALM_NS:
             with self._watchdog.patient():
                 self._zero()
         return bool(self._control.kickWatchdog())

@@ -42,7 +42,7 @@ VARIABLES = ['timestamp', 'actual_TCP_pose', 'actual_TCP_speed', 'actual_TCP_for
 HANGING_S = 2.0  # no command takes so long
 RESTART_S = 5.0  # of the program on the controller
 LATE_S = 0.02
-STRANGE = (
+OTHER_PROGRAM = (
     'the program on the controller was stopped, and somebody else started one; see who uses the arm, and connect again'
 )
 LOST = 'the connection to the controller was lost; is it still on, and the cable in place?'
@@ -135,13 +135,13 @@ class Worker:
         self._watchdog = Watchdog(self._control, params, lambda seconds: set_alarm(seconds + HANGING_S))
         self._commands = UrCommandStream(self._control, params, self._watchdog)
         self._ur_command: UrCommand | None = None
-        self._felt_ns = 0
+        self._measured_ns = 0
         self._was_playing = False
         self._stopped = False  # the program was stopped, and not by us
-        self._strange = False  # and another one was started since
+        self._other_program = False  # and another one was started since
 
     def run(self) -> str:
-        """Lead the arm until the parent or the controller is gone; return what to say about it."""
+        """Run until the parent or the controller is gone; return the reason in a sentence."""
         try:
             self._set_watchdog()
             threading.Thread(target=self._observer.run, name='observer', daemon=True).start()
@@ -149,8 +149,8 @@ class Worker:
                 if not (self._observer.connected and self._control.isConnected()):
                     return LOST
                 self._watch_program()
-                if self._strange:
-                    return STRANGE
+                if self._other_program:
+                    return OTHER_PROGRAM
                 self._cycle()
         except RuntimeError as error:
             return f'{LOST} ({error})'
@@ -161,29 +161,29 @@ class Worker:
     def _cycle(self) -> None:
         begin = self._control.initPeriod()
         set_alarm(HANGING_S)
-        self._feel()
+        self._take_measurement()
         # What is sent to a controller that does not answer would be obeyed late, when nobody means it any more.
         if self._stopped:
             self._clear()
         elif not self._observer.silent:
             self._commands.cycle(self._ur_command)
-        self._tell()
+        self._update_observer()
         self._control.waitPeriod(begin)
 
-    def _feel(self) -> None:
-        """Let the pilot know what was measured last."""
+    def _take_measurement(self) -> None:
+        """Pass on what was measured last."""
         newest = self._observer.newest
-        if newest is not None and newest.time_ns != self._felt_ns:
-            self._felt_ns = newest.time_ns
+        if newest is not None and newest.time_ns != self._measured_ns:
+            self._measured_ns = newest.time_ns
             self._commands.observe(newest.time_ns, newest.position_m, newest.force_n)
 
-    def _tell(self) -> None:
-        """Let the observer know what to report beside."""
-        pilot, watchdog = self._commands, self._watchdog
-        self._observer.unsteady, self._observer.zeroed = pilot.unsteady, pilot.trusted
+    def _update_observer(self) -> None:
+        """Pass on to the observer what it reports beside the measurements."""
+        commands, watchdog = self._commands, self._watchdog
+        self._observer.unsteady, self._observer.zeroed = commands.unsteady, commands.trusted
         self._observer.counts = Counts(
-            refused=pilot.refused,
-            zeroed=pilot.zeroings,
+            refused=commands.refused,
+            zeroed=commands.zeroings,
             slow_acknowledgements=watchdog.slow,
             slowest_acknowledgement_ms=round(watchdog.slowest_s * 1e3),
         )
@@ -195,13 +195,13 @@ class Worker:
         """
         playing = self._plays()
         self._was_playing |= playing
-        self._strange |= self._stopped and playing
+        self._other_program |= self._stopped and playing
         self._stopped = self._was_playing and not playing
 
     def _let_go(self) -> None:
         """Bring the arm to rest and end its program, whatever ends this process."""
         # Commands to a program that is not ours, or on a lost connection, would make ur-rtde start its own again.
-        ours = not self._stopped and not self._strange
+        ours = not self._stopped and not self._other_program
         if ours and self._observer.connected and not self._observer.silent and self._control.isConnected():
             with contextlib.suppress(RuntimeError):
                 self._commands.rest()
