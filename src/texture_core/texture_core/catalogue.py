@@ -18,6 +18,15 @@ def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
 
     A name with a colon is imported: 'my_package.my_module:MyFeature'.
 
+    Parameters
+    ----------
+    catalogue
+        Names and what they mean.
+    name
+        Name that the user gave, or 'module:Class'.
+    kind
+        Noun for the error sentence, such as 'feature'.
+
     Raises
     ------
     UnknownName
@@ -31,7 +40,17 @@ def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
 
 
 def unknown_name(name: str, known: Iterable[str], kind: str) -> UnknownName:
-    """Return the error for a name that is not among the known ones, with the nearest of them."""
+    """Return the error for a name that is not among the known ones, with the nearest of them.
+
+    Parameters
+    ----------
+    name
+        Name that the user gave.
+    known
+        All names that are allowed.
+    kind
+        Noun for the error sentence, such as 'feature'.
+    """
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean '{near[0]}'?" if near else '.'

@@ -123,7 +123,17 @@ def read_bounded(path: str | Path, most_bytes: int) -> bytes:
 
 
 def read_text(path: str | Path, most_bytes: int, encoding: str = 'utf-8') -> str:
-    """Return the text in a regular file; see `read_bounded`, UnicodeDecodeError (a ValueError) if it is no text."""
+    """Return the text in a regular file; see `read_bounded`, UnicodeDecodeError (a ValueError) if it is no text.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+    most_bytes
+        Largest allowed size in bytes.
+    encoding
+        Encoding of the text.
+    """
     return read_bounded(path, most_bytes).decode(encoding)
 
 
@@ -143,6 +153,11 @@ def read_array(file: Readable, budget: Budget) -> AnyArray:
 
     Memory is taken as the values come, and not as the header promises. Each value counts as 8 bytes at least, since
     it will be computed with as such.
+
+    Returns
+    -------
+    (...)
+        Array of the shape that the file states.
 
     Raises
     ------
@@ -207,7 +222,13 @@ class Archive:
         return self._of_member(name, lambda member: self._whole(member, most))
 
     def array(self, name: str) -> AnyArray:
-        """Return the array in a member, see `read_array`; KeyError if there is no such member."""
+        """Return the array in a member, see `read_array`; KeyError if there is no such member.
+
+        Returns
+        -------
+        (...)
+            Array of the shape that the member states.
+        """
         return self._of_member(name, lambda member: read_array(member, self.budget))
 
     def _whole(self, member: _Counted, most_bytes: int) -> bytes:

@@ -28,7 +28,23 @@ def param(
     high: float | None = None,
     choices: Sequence[str] = (),
 ) -> Any:
-    """Return a dataclass field that knows its unit, range, choices and description."""
+    """Return a dataclass field that knows its unit, range, choices and description.
+
+    Parameters
+    ----------
+    default
+        Default value; a list is copied for each instance.
+    description
+        Whole sentence: what it sets and what changes when it grows.
+    unit
+        Unit such as 'm/s'; '' if it has none.
+    low
+        Lowest allowed value; None for no limit.
+    high
+        Highest allowed value; None for no limit.
+    choices
+        Allowed texts; () for any.
+    """
     metadata = {'description': description, 'unit': unit, 'low': low, 'high': high, 'choices': tuple(choices)}
     if isinstance(default, list):
         return dataclasses.field(default_factory=lambda: list(default), metadata=metadata)

@@ -56,7 +56,13 @@ def load_card(path: Path) -> Any:
 
 
 def parse_yaml(text: str) -> Any:
-    """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it."""
+    """Return the plain values in a text; one of `PARSE_ERRORS` is raised if it is no YAML, or too much of it.
+
+    Raises
+    ------
+    ValueError
+        If the text is too long or its aliases stand for too many values.
+    """
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f'it has {len(text)} characters; {MAX_CHARACTERS} are allowed')
     loader = _BoundedLoader(text)

@@ -23,6 +23,19 @@ def folder(package: str, name: str) -> Path:
 def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix: str = '.yaml') -> Path:
     """Return the file a user means: a path, or the name of a file that the package ships in `subfolder`.
 
+    Parameters
+    ----------
+    name_or_path
+        Path of a file, or name of a shipped one without its suffix.
+    package
+        Package that ships it.
+    subfolder
+        Folder in the package, such as 'config/recipes'.
+    kind
+        Noun for the error sentence, such as 'feature'.
+    suffix
+        Ending of the shipped files.
+
     Raises
     ------
     UnknownName

@@ -51,7 +51,13 @@ class FramedSensor:
         self._line.restart()
 
     def read(self) -> Mapping[str, Sequence[TactileSignal]]:
-        """Wait for the length of one batch and return what arrived."""
+        """Wait for the length of one batch and return what arrived.
+
+        Raises
+        ------
+        DeviceError
+            If the port is not open or is gone, or no valid frame has come for 1 s.
+        """
         if self._port is None:
             raise DeviceError(f"device '{self._params.device}' is not open; open it before reading")
         time.sleep(self._params.batch_s)

@@ -31,7 +31,13 @@ def load_settings(cls: type[T], config: str) -> T:
 
 
 def read_settings(config: str) -> dict[str, Any]:
-    """Return the mapping that `config` means; see `load_settings`."""
+    """Return the mapping that `config` means; see `load_settings`.
+
+    Raises
+    ------
+    InvalidParameter
+        If it is no mapping in YAML.
+    """
     if not config:
         return {}
     if config.lstrip().startswith('{'):

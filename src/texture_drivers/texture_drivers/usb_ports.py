@@ -29,6 +29,17 @@ ListPorts = Callable[[], Iterable[Port]]
 def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts = list_ports.comports) -> str:
     """Return the path that is meant: `device` itself, or for 'auto' that of the only port with one of the numbers.
 
+    Parameters
+    ----------
+    device
+        Path of the device, or 'auto'.
+    usb_ids
+        Vendor and product numbers of the device.
+    kind
+        Name of the device for the error sentence, such as 'TSF-85'.
+    ports
+        Lists the ports of this machine.
+
     Raises
     ------
     DeviceError

@@ -32,6 +32,15 @@ class FingerTrack:
 
         Between two calls speed and change of force are constant; an arm that was put elsewhere leaves no trace of the
         way there.
+
+        Parameters
+        ----------
+        until_ns
+            Time of the last point.
+        n_points
+            Number of points.
+        rate_hz
+            Points a second.
         """
         end = self._expected(until_ns)
         travelled_m = max(abs(end[0] - self._at[0]), abs(end[1] - self._at[1]))

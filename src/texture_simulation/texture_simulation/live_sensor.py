@@ -108,7 +108,25 @@ def live_tsf85(
     finger: int = 0,
     long_stamps: bool = True,
 ) -> LiveSensor:
-    """Return a TSF-85 of which one finger touches."""
+    """Return a TSF-85 of which one finger touches.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    layout
+        Name of the layout of the fingertip.
+    finger
+        Which individual of the sensor.
+    long_stamps
+        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
+    """
     model = tsf85.Tsf85Model(scene, surface, rng, TSF85S[layout])
     device = EmulatedTsf85(link, rng, finger, long_stamps)
     return LiveSensor(
@@ -122,7 +140,19 @@ def live_tsf85(
 
 
 def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
-    """Return a BioTac alone on its board."""
+    """Return a BioTac alone on its board.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    """
     layout = LAYOUTS['biotac']
     model, device = biotac.BioTacModel(scene, surface, rng, layout), EmulatedBioTac(link, rng)
     return LiveSensor(
@@ -136,7 +166,19 @@ def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.G
 
 
 def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
-    """Return the finger of paper 3."""
+    """Return the finger of paper 3.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    """
     model, device = daq.DaqModel(scene, surface, rng), EmulatedDaq(link, rng)
     return LiveSensor(
         model,
@@ -149,7 +191,19 @@ def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Gene
 
 
 def live_pvdf(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
-    """Return the finger of paper 5."""
+    """Return the finger of paper 5.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    """
     model, device = pvdf.PvdfModel(scene, surface, rng), EmulatedPvdf(link, rng)
     rate_hz = pvdf.PATH_RATE_HZ / pvdf.OVERSAMPLING
     return LiveSensor(

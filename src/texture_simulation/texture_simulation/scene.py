@@ -80,7 +80,13 @@ def load_scene(name_or_path: str) -> Scene:
 
 
 def scene_from(name: str, content: Any) -> Scene:
-    """Return the scene that a mapping with `surfaces`, and if wanted `sensor`, `contact` and `effects`, describes."""
+    """Return the scene that a mapping with `surfaces`, and if wanted `sensor`, `contact` and `effects`, describes.
+
+    Raises
+    ------
+    InvalidParameter
+        If a section is missing, unknown or impossible.
+    """
     where = f"scene '{name}'"
     if not isinstance(content, Mapping) or not isinstance(content.get('surfaces'), Mapping):
         raise InvalidParameter(f'{where} has no mapping `surfaces` of names to lists of terms; add one')

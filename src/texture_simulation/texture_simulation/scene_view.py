@@ -101,6 +101,17 @@ class SceneView:
 def view(scene: Scene, surface: str, plan: ViewPlan, rng: np.random.Generator) -> SceneView:
     """Return one slide over a surface at exactly the speed and force of the plan, with the other effects of the scene.
 
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Name of the surface.
+    plan
+        Speed, force, duration and direction.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+
     Raises
     ------
     UnknownName
@@ -155,7 +166,17 @@ def _relief(surface: Surface, way: Trajectory) -> tuple[Array, tuple[float, floa
 
 
 def lines_hz(surface: Surface, speed_m_s: float, direction_rad: float) -> list[float]:
-    """Return where ridges have their first line on a straight slide: speed · |cos(angle to the ridges)| / pitch."""
+    """Return where ridges have their first line on a straight slide: speed · |cos(angle to the ridges)| / pitch.
+
+    Parameters
+    ----------
+    surface
+        Surface that is touched.
+    speed_m_s
+        Speed along the surface.
+    direction_rad
+        Direction of travel, from +x towards +y.
+    """
     waves = [wave for term in surface.terms for wave in WAVES.get(type(term), _no_waves)(term)]
     lines = [speed_m_s * abs(math.cos(angle - direction_rad)) / pitch for pitch, angle in waves]
     return sorted({round(line, 6) for line in lines if line > 1e-3})

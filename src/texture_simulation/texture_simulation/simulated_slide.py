@@ -34,13 +34,35 @@ class SimulatedSlide:
     radius_m: float = 0.0
 
     def steady_path(self, speed_m_s: Array, force_n: Array, n_points: int, rate_hz: float) -> Trajectory:
-        """Return the way at a constant speed, (..., n_points) points; speed and force are (..., 1)."""
+        """Return the way at a constant speed, (..., n_points) points; speed and force are (..., 1).
+
+        Parameters
+        ----------
+        speed_m_s : (..., 1)
+            Constant speed.
+        force_n : (..., 1)
+            Constant normal force.
+        n_points
+            Number of points.
+        rate_hz
+            Points a second.
+        """
         time_s = np.arange(1, n_points + 1) / rate_hz
         return trajectory_along(speed_m_s * time_s, np.broadcast_to(force_n, (*force_n.shape[:-1], n_points)), self)
 
 
 def trajectory_along(travelled_m: Array, force_n: Array, sliding: SimulatedSlide) -> Trajectory:
-    """Return the path with given ways along a line or a circle, (..., n)."""
+    """Return the path with given ways along a line or a circle, (..., n).
+
+    Parameters
+    ----------
+    travelled_m : (..., n)
+        Distance travelled at each point.
+    force_n : (..., n)
+        Normal force at each point.
+    sliding
+        Direction, and the radius of a circle.
+    """
     direction = np.asarray(sliding.direction_rad, dtype=np.float64)[..., None]
     radius_m = sliding.radius_m
     if not radius_m:

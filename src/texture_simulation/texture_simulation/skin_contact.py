@@ -135,7 +135,17 @@ class SkinContact:
         return np.asarray(variation_n)
 
     def static_variation_n(self, placed: Trajectory, blur_m: float, offset_m: tuple[Array, Array]) -> Array:
-        """Return the same of slow elements at chosen points, (..., n_elements, n): without what shakes the skin."""
+        """Return the same of slow elements at chosen points, (..., n_elements, n): without what shakes the skin.
+
+        Parameters
+        ----------
+        placed
+            Points of the trajectory on the sample, n of them.
+        blur_m
+            Length over which each element averages.
+        offset_m : (n_elements, 1)
+            Position x and y of each element in the finger.
+        """
         _, gain = self._blur_and_stiffness(placed.force_n)
         for effect in self._gains:
             gain = gain * effect.gain(placed, self._finger)

@@ -24,6 +24,21 @@ def simulate_slides(
 
     Each slide meets another place of the sample, with the scene's effects. The samples are in the unit the driver
     publishes. Speed, force and direction of `sliding` may be arrays (count,).
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Name of the surface.
+    count
+        Number of slides.
+    sliding
+        Speed, force, direction and duration of the slides.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    finger
+        Which individual of the sensor.
     """
     return simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=False)['signal']
 
@@ -54,6 +69,11 @@ def simulate_slide_streams(
         Which individual of the sensor.
     slow
         Whether the slow stream is wanted.
+
+    Returns
+    -------
+    dict
+        Samples by topic, (count, n_samples, n_channels).
     """
     kind = find(SENSORS, scene.sensor, 'sensor model')
     touched = scene.surface(surface)

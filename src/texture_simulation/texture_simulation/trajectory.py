@@ -34,12 +34,28 @@ class Trajectory:
         return Trajectory(self.x_m + x_m, self.y_m + y_m, self.force_n)
 
     def at(self, indices: NDArray[np.intp] | slice) -> Trajectory:
-        """Return some of its points."""
+        """Return some of its points.
+
+        Returns
+        -------
+        Trajectory
+            Arrays (..., m) for m indices.
+        """
         return Trajectory(self.x_m[..., indices], self.y_m[..., indices], self.force_n[..., indices])
 
 
 def straight(start: tuple[float, float, float], end: tuple[float, float, float], n_points: int) -> Trajectory:
-    """Return `n_points` on the way from (x, y, force) to another, the start left out and the end included."""
+    """Return `n_points` on the way from (x, y, force) to another, the start left out and the end included.
+
+    Parameters
+    ----------
+    start
+        x, y and force before the first point; m and N.
+    end
+        x, y and force at the last point; m and N.
+    n_points
+        Number of points.
+    """
     shares = np.arange(1, n_points + 1) / n_points
     return Trajectory(*(first + (last - first) * shares for first, last in zip(start, end, strict=True)))
 

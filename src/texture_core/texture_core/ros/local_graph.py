@@ -52,7 +52,17 @@ class LocalGraph:
         return self._spun(kind(parameter_overrides=given))
 
     def listen(self, kind: type, topic: str, qos: Any = 10) -> list[Any]:
-        """Return the list to which the messages of a topic will be added."""
+        """Return the list to which the messages of a topic will be added.
+
+        Parameters
+        ----------
+        kind
+            Type of the messages.
+        topic
+            Name of the topic.
+        qos
+            Quality of service, or the depth of the queue.
+        """
         received: list[Any] = []
         self.peer.create_subscription(kind, topic, received.append, qos)
         return received
@@ -62,7 +72,13 @@ class LocalGraph:
         self._executor.spin_once(timeout_sec=timeout_s)
 
     def until(self, condition: Callable[[], Any]) -> None:
-        """Let things happen until the condition holds."""
+        """Let things happen until the condition holds.
+
+        Raises
+        ------
+        TimeoutError
+            If the condition does not hold within the deadline.
+        """
         deadline = time.monotonic() + self._deadline_s
         while not condition():
             if time.monotonic() > deadline:

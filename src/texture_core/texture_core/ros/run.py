@@ -32,6 +32,15 @@ def run(
 
     The node's `shutdown` method, if it has one, is called before it is destroyed, while it can still publish: it joins
     threads and closes devices.
+
+    Parameters
+    ----------
+    make_node
+        Makes the node when ROS is initialised.
+    args
+        Arguments of the command line; None for those of the process.
+    make_executor
+        Makes the executor that spins it.
     """
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     stopped = threading.Event()

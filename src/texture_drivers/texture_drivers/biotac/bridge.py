@@ -56,7 +56,13 @@ class SerialBridge:
         self._tracker.restart()
 
     def read(self) -> Sequence[SpiFrame]:
-        """Wait for bytes and return the replies they complete."""
+        """Wait for bytes and return the replies they complete.
+
+        Raises
+        ------
+        DeviceError
+            If the port is not open or is gone, or the bridge samples another kind of BioTac.
+        """
         if self._port is None:
             raise DeviceError(f"device '{self._device}' is not open; open it before reading")
         data = b''

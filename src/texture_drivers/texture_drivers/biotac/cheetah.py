@@ -75,7 +75,13 @@ class Cheetah:
         self._pause_at = None
 
     def read(self) -> Sequence[SpiFrame]:
-        """Wait for one frame and return it."""
+        """Wait for one frame and return it.
+
+        Raises
+        ------
+        DeviceError
+            If the adapter is not open, or an exchange with it fails.
+        """
         if not self._handle:
             raise DeviceError('the Cheetah adapter is not open; open it before reading')
         size = self._layout.frame_bytes(len(SELECT))

@@ -56,7 +56,13 @@ def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> Frame
 
 
 def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:
-    """Return the converter and its channels; see `texture_drivers.settings.load_settings`."""
+    """Return the converter and its channels; see `texture_drivers.settings.load_settings`.
+
+    Raises
+    ------
+    InvalidParameter
+        If the channels are missing, or two have one name.
+    """
     content = read_settings(config)
     listed = content.pop('channels', None)
     if not isinstance(listed, list) or not listed:

@@ -84,7 +84,13 @@ class FilePlayer:
         self._channels = recording.channels or tuple(f'channel_{i + 1}' for i in range(self._samples.shape[1]))
 
     def read(self) -> Mapping[str, Sequence[TactileSignal]]:
-        """Wait for the length of one batch and return what is due; nothing after the end."""
+        """Wait for the length of one batch and return what is due; nothing after the end.
+
+        Raises
+        ------
+        DeviceError
+            If the recording is not open.
+        """
         samples = self._samples
         if samples is None:
             raise DeviceError(f"recording '{self._params.device}' is not open; open it before reading")

@@ -92,6 +92,11 @@ def load_csv(file: BinaryIO) -> FileRecording:
     """Return a table: one column for each channel, comma, semicolon or blanks between, names in the first line or none.
 
     A column `time_s` gives the rate and is no channel. Lines with # are passed over.
+
+    Raises
+    ------
+    ValueError
+        If names and numbers do not fit, or times are uneven.
     """
     text = io.TextIOWrapper(file, encoding='utf-8-sig')
     first = next(_lines(text), '')
@@ -177,7 +182,13 @@ def _values_bytes(file: BinaryIO) -> int:
 
 
 def load_npz(file: BinaryIO) -> FileRecording:
-    """Return the array `samples`; `rate_hz` and `channels` beside it are used if they are there."""
+    """Return the array `samples`; `rate_hz` and `channels` beside it are used if they are there.
+
+    Raises
+    ------
+    ValueError
+        If there is no array of real numbers called `samples`.
+    """
     arrays = Arrays(file)
     if 'samples' not in arrays:
         raise ValueError(f"it holds {', '.join(arrays.names) or 'nothing'}; an array called 'samples' is needed")

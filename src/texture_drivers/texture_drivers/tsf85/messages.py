@@ -88,6 +88,15 @@ class Tsf85MessageConverter:
     def take(self, topic: str, message: Any, source_ns: int) -> None:
         """Note a message of a topic, named as in `TOPICS`.
 
+        Parameters
+        ----------
+        topic
+            Name of the topic in `TOPICS`.
+        message
+            Message with the attributes of its type.
+        source_ns
+            Time at which it was sent, ns by the clock of the driver's host.
+
         Raises
         ------
         InvalidData

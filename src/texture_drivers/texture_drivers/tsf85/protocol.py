@@ -120,7 +120,13 @@ def _parse_items(payload: bytes, timestamp: Struct, layouts: Mapping[int, Struct
 
 
 def start_command(period_ms: int = 1) -> bytes:
-    """Return the command that makes the device send every `period_ms`, 1 to 255."""
+    """Return the command that makes the device send every `period_ms`, 1 to 255.
+
+    Raises
+    ------
+    ValueError
+        If the period is outside 1 to 255 ms.
+    """
     if not 1 <= period_ms <= 255:
         raise ValueError(f'the period is {period_ms} ms; 1 to 255 can be sent')
     return _command(tables.AUTOSEND, bytes([period_ms]))

@@ -87,7 +87,13 @@ class Tsf85:
         self._interrupt()
 
     def read(self) -> Mapping[str, Sequence[TactileSignal]]:
-        """Wait for the length of one batch and return what arrived."""
+        """Wait for the length of one batch and return what arrived.
+
+        Raises
+        ------
+        DeviceError
+            If the port is not open or is gone, or the device stays silent after three restarts.
+        """
         if self._port is None:
             raise DeviceError(f"device '{self._params.device}' is not open; open it before reading")
         time.sleep(self._params.batch_s)

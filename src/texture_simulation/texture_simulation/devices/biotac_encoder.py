@@ -60,13 +60,37 @@ def encode_replies(values: Values, absent: Sequence[int] = ()) -> Bytes:
 
 
 def reply_frame(sequence: int, time_us: int, values: Values, reply: bytes, version: int = VERSION) -> bytes:
-    """Return one reply on the wire; `values`, (n_slots, n_fingers), are what it holds."""
+    """Return one reply on the wire; `values`, (n_slots, n_fingers), are what it holds.
+
+    Parameters
+    ----------
+    sequence
+        Running number of the frame; wraps at 16 bits.
+    time_us
+        Device's time of its first row; wraps at 32 bits.
+    values : (n_slots, n_fingers)
+        Counts, 0 to 4095.
+    reply
+        Bytes of the reply.
+    version
+        Version of the protocol.
+    """
     rows, columns = values.shape
     return _frame(struct.pack('<cBHIBB', b'B', version, sequence % 2**16, time_us % 2**32, rows, columns) + reply)
 
 
 def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
-    """Return the serial numbers on the wire."""
+    """Return the serial numbers on the wire.
+
+    Parameters
+    ----------
+    sequence
+        Running number of the frame; wraps at 16 bits.
+    time_us
+        Device's time of its first row; wraps at 32 bits.
+    serials
+        Serial number of each place; '' for an empty one.
+    """
     header = struct.pack('<cBHIBB', b'S', VERSION, sequence % 2**16, time_us % 2**32, 1, len(serials))
     return _frame(header + ','.join(serials).encode('ascii'))
 

@@ -95,7 +95,21 @@ class EmulatedSampler(EmulatedDevice):
 
 
 def encode(stream: SampledStream, number: int, time_us: int, counts: Counts, version: int = VERSION) -> bytes:
-    """Return a frame on the wire; number and time wrap."""
+    """Return a frame on the wire; number and time wrap.
+
+    Parameters
+    ----------
+    stream
+        Kind of the frame.
+    number
+        Running number of the frame; wraps at 16 bits.
+    time_us
+        Device's time of its first row; wraps at 32 bits.
+    counts : (n_rows, n_columns)
+        Samples of the frame.
+    version
+        Version of the protocol.
+    """
     rows, columns = counts.shape
     content = struct.pack('<BBHIBB', stream.kind, version, number % 2**16, time_us % 2**32, rows, columns)
     content += counts.astype('<i2').tobytes()

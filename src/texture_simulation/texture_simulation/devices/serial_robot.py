@@ -32,7 +32,13 @@ class EmulatedSerialRobot:
         self._thread = threading.Thread(target=self.run, name=type(self).__name__, daemon=True)
 
     def run(self) -> None:
-        """Let time go by until `closing`."""
+        """Let time go by until `closing`.
+
+        Raises
+        ------
+        NotImplementedError
+            Always: each robot has its own.
+        """
         raise NotImplementedError
 
     def __enter__(self: LineT) -> LineT:

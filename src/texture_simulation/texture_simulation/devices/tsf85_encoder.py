@@ -53,7 +53,19 @@ class Tsf85Encoder:
         return bytes([0x9A, 0x00, 0x58, len(items)]) + items
 
     def encode(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> bytes:
-        """Return the bytes of some milliseconds; see `packets`."""
+        """Return the bytes of some milliseconds; see `packets`.
+
+        Parameters
+        ----------
+        first_ms
+            Device's clock at the first millisecond.
+        dynamic : (n,) or (n, 2)
+            Dynamic values, a row for each millisecond.
+        image : (n_taxels,) or (2, n_taxels)
+            Taxel image.
+        image_is_new
+            Whether the image changed since the last call.
+        """
         return b''.join(self.packets(first_ms, dynamic, image, image_is_new))
 
     def packets(self, first_ms: int, dynamic: Counts, image: Image, image_is_new: bool) -> Iterator[bytes]:

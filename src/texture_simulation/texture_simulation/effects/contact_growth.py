@@ -28,11 +28,23 @@ class PatchGrowth:
     )
 
     def blur_growth(self, force_n: Array) -> Array | float:
-        """Return how much larger the contact is than at 1 N."""
+        """Return how much larger the contact is than at 1 N.
+
+        Returns
+        -------
+        (...)
+            Factor of the contact size, of the shape of `force_n`.
+        """
         return _power(force_n, self.exponent)
 
     def gain_growth(self, force_n: Array) -> Array | float:
-        """Return 1."""
+        """Return 1.
+
+        Returns
+        -------
+        (...)
+            Factor of the stiffness, of the shape of `force_n`.
+        """
         return 1.0
 
 
@@ -48,9 +60,21 @@ class ForceGain:
     )
 
     def blur_growth(self, force_n: Array) -> Array | float:
-        """Return 1."""
+        """Return 1.
+
+        Returns
+        -------
+        (...)
+            Factor of the contact size, of the shape of `force_n`.
+        """
         return 1.0
 
     def gain_growth(self, force_n: Array) -> Array | float:
-        """Return how much stronger a texture is measured than at 1 N."""
+        """Return how much stronger a texture is measured than at 1 N.
+
+        Returns
+        -------
+        (...)
+            Factor of the stiffness, of the shape of `force_n`.
+        """
         return _power(force_n, self.exponent)

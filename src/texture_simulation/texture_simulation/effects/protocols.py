@@ -26,7 +26,22 @@ class SlideEffect(Protocol):
     """Changes what was planned."""
 
     def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Return speed and force as they become, of the same shape."""
+        """Return speed and force as they become, of the same shape.
+
+        Parameters
+        ----------
+        speed_m_s : (count,)
+            Planned speeds.
+        force_n : (count,)
+            Planned normal forces.
+        rng
+            Random numbers of this effect.
+
+        Returns
+        -------
+        (count,), (count,)
+            Speeds in m/s and forces in N.
+        """
 
 
 @runtime_checkable
@@ -34,7 +49,17 @@ class PathEffect(Protocol):
     """Changes where the skin is."""
 
     def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
-        """Return what turns the next piece of path, (..., n) points, into the skin's own."""
+        """Return what turns the next piece of path, (..., n) points, into the skin's own.
+
+        Parameters
+        ----------
+        rng
+            Random numbers of this effect.
+        rate_hz
+            Sampling rate of the samples or points.
+        batch_shape
+            () for one slide, (count,) for many at once.
+        """
 
 
 @runtime_checkable
@@ -42,10 +67,22 @@ class GrowthEffect(Protocol):
     """Lets what the skin makes of a texture depend on the force."""
 
     def blur_growth(self, force_n: Array) -> Array | float:
-        """Return how much larger the contact is than at 1 N."""
+        """Return how much larger the contact is than at 1 N.
+
+        Returns
+        -------
+        (...)
+            Factor of the contact size, of the shape of `force_n`.
+        """
 
     def gain_growth(self, force_n: Array) -> Array | float:
-        """Return how much stronger a texture is measured than at 1 N."""
+        """Return how much stronger a texture is measured than at 1 N.
+
+        Returns
+        -------
+        (...)
+            Factor of the stiffness, of the shape of `force_n`.
+        """
 
 
 @runtime_checkable
@@ -61,7 +98,17 @@ class ForceEffect(Protocol):
     """Changes how the force on the skin varies."""
 
     def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
-        """Return what turns the variation along the next piece of path, (..., n) N, into another."""
+        """Return what turns the variation along the next piece of path, (..., n) N, into another.
+
+        Parameters
+        ----------
+        rng
+            Random numbers of this effect.
+        rate_hz
+            Sampling rate of the samples or points.
+        batch_shape
+            () for one slide, (count,) for many at once.
+        """
 
 
 @runtime_checkable
@@ -71,4 +118,18 @@ class SignalEffect(Protocol):
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
     ) -> SignalFilter:
-        """Return what turns the next samples, (..., n_samples, n_channels) counts, into those with the effect."""
+        """Return what turns the next samples, (..., n_samples, n_channels) counts, into those with the effect.
+
+        Parameters
+        ----------
+        rng
+            Random numbers of this effect.
+        rate_hz
+            Sampling rate of the samples or points.
+        batch_shape
+            () for one slide, (count,) for many at once.
+        channels
+            Number of channels.
+        slow
+            Whether the stream is the slow one.
+        """

@@ -65,6 +65,12 @@ class Converter:
         return np.clip(whole, *self._limits, out=whole)
 
     def counts(self, counts: Samples, kind: type[Integer]) -> NDArray[Integer]:
-        """Return the same as whole numbers."""
+        """Return the same as whole numbers.
+
+        Returns
+        -------
+        (..., n_samples, n_channels)
+            Counts of the type `kind`.
+        """
         whole: NDArray[Integer] = self.exact(counts).astype(kind)
         return whole

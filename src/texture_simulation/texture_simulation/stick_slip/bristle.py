@@ -37,7 +37,21 @@ AT_REST = Tip(0.0, 0.0, 0.0)
 
 
 def rate(friction: StickSlip, tip: Tip, speed_m_s: Value, force_n: Value, exp: Any = math.exp) -> Tip:
-    """Return the derivative of the state under a constant normal force; `exp` is numpy's for arrays."""
+    """Return the derivative of the state under a constant normal force; `exp` is numpy's for arrays.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    tip
+        State of the tip, floats or arrays of one shape.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+    exp
+        `math.exp` for one slide in floats, `numpy.exp` for arrays.
+    """
     stretch, slip, bend = tip
     fading = exp(-slip * slip / friction.stribeck_m_s**2)
     curve = friction.kinetic + (friction.static - friction.kinetic) * fading
@@ -48,14 +62,34 @@ def rate(friction: StickSlip, tip: Tip, speed_m_s: Value, force_n: Value, exp: A
 
 
 def energy_j(friction: StickSlip, tip: Tip, force_n: Value) -> Value:
-    """Return what is stored: movement of the tip, stretched skin, bent bristles."""
+    """Return what is stored: movement of the tip, stretched skin, bent bristles.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    tip
+        State of the tip, floats or arrays of one shape.
+    force_n
+        Normal force, at least 0.
+    """
     moving = friction.mass_kg * tip.slip_m_s**2
     bent = force_n * friction.bristle_1_m * tip.bend_m**2
     return (moving + friction.skin_n_m * tip.stretch_m**2 + bent) / 2
 
 
 def jacobian(friction: StickSlip, slip_m_s: float, force_n: float) -> Array:
-    """Return the derivative of `rate` at rest with unbent bristles, or at steady sliding with slip > 0, (3, 3)."""
+    """Return the derivative of `rate` at rest with unbent bristles, or at steady sliding with slip > 0, (3, 3).
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    slip_m_s
+        Speed of the tip over the surface; 0 if it sticks.
+    force_n
+        Normal force, at least 0.
+    """
     fading = math.exp(-((slip_m_s / friction.stribeck_m_s) ** 2))
     curve = friction.kinetic + (friction.static - friction.kinetic) * fading
     slope = -2 * slip_m_s / friction.stribeck_m_s**2 * (curve - friction.kinetic)

@@ -22,7 +22,17 @@ CORRECTIONS = 2  # solutions of the semi-implicit step: one with the friction of
 
 
 def explicit_euler(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step:
-    """Return Euler's step: state + step·rate."""
+    """Return Euler's step: state + step·rate.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    step_s
+        Length of an integration step.
+    exp
+        `math.exp` for one slide in floats, `numpy.exp` for arrays.
+    """
 
     def step(stretch: Value, slip: Value, bend: Value, speed: Value, force: Value) -> State:
         slope = rate(friction, Tip(stretch, slip, bend), speed, force, exp)
@@ -32,7 +42,17 @@ def explicit_euler(friction: StickSlip, step_s: float, exp: Any = math.exp) -> S
 
 
 def runge_kutta_4(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step:
-    """Return the classical step of fourth order."""
+    """Return the classical step of fourth order.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    step_s
+        Length of an integration step.
+    exp
+        `math.exp` for one slide in floats, `numpy.exp` for arrays.
+    """
 
     def ahead(tip: Tip, slope: Tip, by_s: float) -> Tip:
         return Tip(tip[0] + by_s * slope[0], tip[1] + by_s * slope[1], tip[2] + by_s * slope[2])
@@ -50,7 +70,17 @@ def runge_kutta_4(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
 
 
 def exponential(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step:
-    """Return a split step: each of slip, bend and stretch in turn, solved exactly while the others stand still."""
+    """Return a split step: each of slip, bend and stretch in turn, solved exactly while the others stand still.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    step_s
+        Length of an integration step.
+    exp
+        `math.exp` for one slide in floats, `numpy.exp` for arrays.
+    """
     f = friction
 
     def step(stretch: Value, slip: Value, bend: Value, speed: Value, force: Value) -> State:
@@ -78,6 +108,15 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
         (mass/h + c + N·σ2)·w + N·(σ0·bend' + σ1·(bend' − bend)/h) = mass·slip/h + k·stretch + c·speed
 
     The Stribeck curve g and σ1 are taken at the old slip first, then once again at the slip that this gave.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    step_s
+        Length of an integration step.
+    exp
+        `math.exp` for one slide in floats, `numpy.exp` for arrays.
     """
     stiffness, damping, viscous = friction.skin_n_m, friction.skin_n_s_m, friction.viscous_s_m
     bristle, bristle_damping = friction.bristle_1_m, friction.bristle_s_m

@@ -27,6 +27,15 @@ def slow_drag(friction: StickSlip, speed_m_s: float, force_n: float) -> LimitCyc
 
     The tip lets go at static·force and swings about kinetic·force; without damping it comes to rest as far below, hence
     the period 2·(static − kinetic)·force / (stiffness·speed) + half a period of the skin. Damping shortens the swing.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
     """
     drop_n = (friction.static - friction.kinetic) * force_n
     natural_1_s = math.sqrt(friction.skin_n_m / friction.mass_kg)

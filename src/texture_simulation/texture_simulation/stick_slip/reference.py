@@ -34,7 +34,23 @@ def solve(
     method: str = 'radau',
     tolerance: float = 1e-9,
 ) -> Solution:
-    """Return the movement from rest under constant speed and force at increasing times, (n,)."""
+    """Return the movement from rest under constant speed and force at increasing times, (n,).
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s
+        Constant speed of the base.
+    force_n
+        Constant normal force.
+    times_s : (n,)
+        Increasing times.
+    method
+        One of `SOLVERS`.
+    tolerance
+        Relative tolerance of the solver.
+    """
 
     def slope(_: float, state: Array) -> Tip:
         return rate(friction, Tip(*state.tolist()), speed_m_s, force_n)

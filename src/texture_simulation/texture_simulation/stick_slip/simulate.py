@@ -71,7 +71,29 @@ def drag_unchecked(
     start: Tip = AT_REST,
     force_before_n: Value = 0.0,
 ) -> Tip:
-    """Do as `drag` does, whatever comes of it; to find the borders."""
+    """Do as `drag` does, whatever comes of it; to find the borders.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s : (..., n)
+        Speed of the base at the end of each step.
+    force_n : (..., n)
+        Normal force at the end of each step.
+    step_s
+        Length of an integration step.
+    method
+        One of `INTEGRATORS`.
+    start
+        State of the tip before the first step.
+    force_before_n : (...)
+        Force before the first step.
+
+    Returns
+    -------
+    Tip of arrays (..., n)
+    """
     before = np.concatenate([np.broadcast_to(force_before_n, speed_m_s.shape[:-1])[..., None], force_n[..., :-1]], -1)
     kept = np.divide(
         before, force_n, out=np.ones_like(before), where=force_n > before
@@ -83,7 +105,22 @@ def drag_unchecked(
 
 
 def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
-    """Return the force of the skin on the tip: what the finger senses along the surface."""
+    """Return the force of the skin on the tip: what the finger senses along the surface.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    tip
+        State of the tip, arrays (..., n).
+    speed_m_s : (..., n)
+        Speed of the base.
+
+    Returns
+    -------
+    (..., n)
+        Force in N.
+    """
     pull: Array = friction.skin_n_m * tip.stretch_m + friction.skin_n_s_m * (speed_m_s - tip.slip_m_s)
     return pull
 

@@ -31,6 +31,21 @@ def simulated_max_stable_step_s(
     """Return the step between two where a nudged tip begins to swing ever more; inf if it never does.
 
     Sticking, the base stands and the tip is nudged; sliding, it moves at `slip_m_s`; the state is off by a nudge.
+
+    Parameters
+    ----------
+    method
+        One of `INTEGRATORS`.
+    friction
+        Friction of the surface, and the skin.
+    phase
+        Whether the tip sticks or slides.
+    force_n
+        Normal force, at least 0.
+    slip_m_s
+        Speed of the tip over the surface; 0 if it sticks.
+    between_s
+        Steps between which the limit is sought.
     """
     base_m_s = 0.0 if phase is ContactRegime.STICK else slip_m_s
     low, high = between_s
@@ -57,7 +72,17 @@ def _grows(method: str, friction: StickSlip, base_m_s: float, force_n: float, st
 
 
 def nudged(friction: StickSlip, base_m_s: float, force_n: float) -> Tip:
-    """Return the state of steady sliding (or rest, at 0) with the speed of the tip and the bend off by a nudge."""
+    """Return the state of steady sliding (or rest, at 0) with the speed of the tip and the bend off by a nudge.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    base_m_s
+        Speed of the base; 0 for a tip at rest.
+    force_n
+        Normal force, at least 0.
+    """
     curve = float(coefficient(friction, np.array(base_m_s))) if base_m_s else 0.0
     off = BEND_NUDGE * (curve or friction.kinetic)
     stretch_m = force_n * (curve + friction.viscous_s_m * base_m_s) / friction.skin_n_m

@@ -30,12 +30,32 @@ StepLimit = Callable[[StickSlip, float, float], float]
 
 
 def euler_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) -> float:
-    """Return the longest step of Euler's method: |1 + step·λ| ≤ 1 for each eigenvalue that decays."""
+    """Return the longest step of Euler's method: |1 + step·λ| ≤ 1 for each eigenvalue that decays.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    slip_m_s
+        Speed of the tip over the surface; 0 if it sticks.
+    force_n
+        Normal force, at least 0.
+    """
     return min(-2 * root.real / abs(root) ** 2 for root in _decaying(friction, slip_m_s, force_n))
 
 
 def runge_kutta_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) -> float:
-    """Return the longest step of the classical Runge–Kutta method: |R(step·λ)| ≤ 1 for each eigenvalue that decays."""
+    """Return the longest step of the classical Runge–Kutta method: |R(step·λ)| ≤ 1 for each eigenvalue that decays.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    slip_m_s
+        Speed of the tip over the surface; 0 if it sticks.
+    force_n
+        Normal force, at least 0.
+    """
 
     def growth(size: float, direction: complex) -> float:
         z = size * direction
@@ -51,6 +71,15 @@ def exponential_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) ->
     """Return the longest split step: h·K·tanh(h·D/2m) = 2·D for a spring K and a damper D; h²·K = 4·m without damper.
 
     Sticking, the bristles are part of the spring; sliding, they relax exactly and only the skin is left.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    slip_m_s
+        Speed of the tip over the surface; 0 if it sticks.
+    force_n
+        Normal force, at least 0.
     """
     f = friction
     sticking = slip_m_s == 0.0
@@ -70,6 +99,15 @@ def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) 
     """Return the longest semi-implicit step: h²·k = 4·m + 2·h·D + h²·N·σ0, with D all damping and σ0 only if sticking.
 
     Only the skin's own swing limits it, and not even that while bristles stiffer than the skin hold.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    slip_m_s
+        Speed of the tip over the surface; 0 if it sticks.
+    force_n
+        Normal force, at least 0.
     """
     f = friction
     sticking = slip_m_s == 0.0
@@ -89,13 +127,35 @@ STEP_LIMITS: Mapping[str, StepLimit] = {
 
 
 def max_slip_m_s(friction: StickSlip, speed_m_s: float, force_n: float) -> float:
-    """Return the speed that a tip reaches at most when it slips: that of the base and that of the skin let go."""
+    """Return the speed that a tip reaches at most when it slips: that of the base and that of the skin let go.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+    """
     drop_n = (friction.static - friction.kinetic) * force_n
     return speed_m_s + drop_n / math.sqrt(friction.skin_n_m * friction.mass_kg)
 
 
 def max_stable_step_s(method: str, friction: StickSlip, speed_m_s: float, force_n: float) -> float:
-    """Return the longest stable step at up to a speed and a force: sticking, sliding and off the surface."""
+    """Return the longest stable step at up to a speed and a force: sticking, sliding and off the surface.
+
+    Parameters
+    ----------
+    method
+        One of `INTEGRATORS`.
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+    """
     limit = find(STEP_LIMITS, method, 'integrator')
     slip_m_s = max(max_slip_m_s(friction, speed_m_s, force_n), friction.stribeck_m_s)
     cases = ((0.0, force_n), (slip_m_s, force_n), (slip_m_s, 0.0))
@@ -103,7 +163,21 @@ def max_stable_step_s(method: str, friction: StickSlip, speed_m_s: float, force_
 
 
 def check_step(method: str, friction: StickSlip, step_s: float, speed_m_s: float, force_n: float) -> None:
-    """Raise InvalidParameter if a step is longer than `MARGIN` of the border, or no step at all."""
+    """Raise InvalidParameter if a step is longer than `MARGIN` of the border, or no step at all.
+
+    Parameters
+    ----------
+    method
+        One of `INTEGRATORS`.
+    friction
+        Friction of the surface, and the skin.
+    step_s
+        Length of an integration step.
+    speed_m_s
+        Speed of the base along the surface.
+    force_n
+        Normal force, at least 0.
+    """
     if not step_s > 0:
         raise InvalidParameter(f'a step of {step_s} s; it must be above 0')
     allowed_s = MARGIN * max_stable_step_s(method, friction, speed_m_s, force_n)

@@ -16,20 +16,46 @@ def coefficient(friction: StickSlip, speed_m_s: Array) -> Array:
 
     kinetic + (static − kinetic)·exp(−(speed/stribeck)²).
     Source: Bo & Pavelescu 1982; Armstrong-Hélouvry et al. 1994.
+
+    Returns
+    -------
+    (...)
+        Coefficient at each speed.
     """
     share: Array = np.exp(-((np.asarray(speed_m_s) / friction.stribeck_m_s) ** 2))
     return friction.kinetic + (friction.static - friction.kinetic) * share
 
 
 def steady_force_n(friction: StickSlip, speed_m_s: Array, force_n: float) -> Array:
-    """Return the friction of steady sliding, against the movement, with the viscous part."""
+    """Return the friction of steady sliding, against the movement, with the viscous part.
+
+    Parameters
+    ----------
+    friction
+        Friction of the surface, and the skin.
+    speed_m_s : (...)
+        Speeds of the tip, of either sign.
+    force_n
+        Normal force, at least 0.
+
+    Returns
+    -------
+    (...)
+        Force in N, of the sign of the speed.
+    """
     speed = np.asarray(speed_m_s)
     force: Array = force_n * (np.sign(speed) * coefficient(friction, speed) + friction.viscous_s_m * speed)
     return force
 
 
 def slope_s_m(friction: StickSlip, speed_m_s: Array) -> Array:
-    """Return by how much the coefficient grows with a speed ≥ 0, viscous part included; mostly negative."""
+    """Return by how much the coefficient grows with a speed ≥ 0, viscous part included; mostly negative.
+
+    Returns
+    -------
+    (...)
+        Slope in s/m at each speed.
+    """
     speed = np.asarray(speed_m_s)
     fading = coefficient(friction, speed) - friction.kinetic
     slope: Array = friction.viscous_s_m - 2 * speed / friction.stribeck_m_s**2 * fading

@@ -20,7 +20,17 @@ class Term(Protocol):
     """A kind of relief."""
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same."""
+        """Return the blurred height at (..., n); `blur_m` is (..., n), or (..., 1) where it stays the same.
+
+        Parameters
+        ----------
+        x_m : (..., n)
+            Positions along x.
+        y_m : (..., n)
+            Positions along y.
+        blur_m : (..., n) or (..., 1)
+            Standard deviation of the contact that averages.
+        """
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,19 @@ class RandomRelief(Protocol):
 
 
 def tile_height(random: RandomRelief, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-    """Return the height of random relief at places, (..., n); `blur_m` is (..., n) or (..., 1)."""
+    """Return the height of random relief at places, (..., n); `blur_m` is (..., n) or (..., 1).
+
+    Parameters
+    ----------
+    random
+        Kind of relief.
+    x_m : (..., n)
+        Positions along x.
+    y_m : (..., n)
+        Positions along y.
+    blur_m : (..., n) or (..., 1)
+        Standard deviation of the contact that averages.
+    """
     cosine, sine = math.cos(TURN_RAD) / random.spacing_m, math.sin(TURN_RAD) / random.spacing_m
     rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
     level = np.minimum(np.interp(np.log(blur_m), np.log(BLURS_M), np.arange(len(BLURS_M))), len(BLURS_M) - 1.001)
