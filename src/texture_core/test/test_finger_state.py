@@ -18,14 +18,14 @@ def test_a_foreign_datagram_is_no_state(data: bytes) -> None:
 
 
 def test_the_bench_is_reported_if_it_has_a_port_and_need_not_listen() -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
-        bench.bind((LOOPBACK, 0))
-        bench.settimeout(10.0)
-        sender, silent = FingerSender(bench.getsockname()[1]), FingerSender(0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
+        emulator.bind((LOOPBACK, 0))
+        emulator.settimeout(10.0)
+        sender, silent = FingerSender(emulator.getsockname()[1]), FingerSender(0)
         for _ in range(2):
             silent.send(FingerState(0))
             sender.send(FingerState(7))
-            assert FingerState.from_bytes(bench.recv(256)) == FingerState(7)
+            assert FingerState.from_bytes(emulator.recv(256)) == FingerState(7)
             sender.close()
     sender.send(FingerState(8))
     sender.close()

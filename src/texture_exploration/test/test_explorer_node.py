@@ -349,20 +349,20 @@ def test_a_shutdown_while_moving_lifts_the_finger_and_frees_the_caller(world):
 
 
 def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
-        bench.bind(('127.0.0.1', 0))
-        bench.settimeout(DEADLINE_S)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
+        emulator.bind(('127.0.0.1', 0))
+        emulator.settimeout(DEADLINE_S)
         program = 'from texture_exploration.nodes.explorer import main; main()'
-        port = f'finger_port:={bench.getsockname()[1]}'
+        port = f'finger_port:={emulator.getsockname()[1]}'
         options = ['--ros-args', '-p', port, '-p', 'watch_signal:=false']
         with subprocess.Popen([sys.executable, '-c', program, *options]) as explorer, killed_on_error(explorer):
             client = Client()
             assert client.explore.wait_for_service(DEADLINE_S)
             answer = client.explore.call_async(srv.Explore.Request(**SLOW))
-            fingers = iter(lambda: FingerState.from_bytes(bench.recv(100)), None)
+            fingers = iter(lambda: FingerState.from_bytes(emulator.recv(100)), None)
             assert next(finger for finger in fingers if finger.vx_m_s > 0.009)
             explorer.send_signal(signal.SIGINT)
-            last = last_until_exit(bench, explorer)
+            last = last_until_exit(emulator, explorer)
             rclpy.spin_until_future_complete(client, answer, timeout_sec=DEADLINE_S)
             client.destroy_node()
     assert explorer.returncode == 0
@@ -381,12 +381,12 @@ def killed_on_error(process):
         raise
 
 
-def last_until_exit(bench, process):
+def last_until_exit(emulator, process):
     """Return the last finger state that a process sent; read all the while, the socket holds but few."""
     deadline, last, ended = time.monotonic() + DEADLINE_S, None, False
     while not ended:
         assert time.monotonic() < deadline, 'the process did not end'
         ended = process.poll() is not None
-        while select.select([bench], [], [], 0.05)[0]:
-            last = FingerState.from_bytes(bench.recv(100))
+        while select.select([emulator], [], [], 0.05)[0]:
+            last = FingerState.from_bytes(emulator.recv(100))
     return last

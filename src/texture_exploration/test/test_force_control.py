@@ -48,9 +48,9 @@ def test_an_unstable_gain_is_refused_with_one_that_would_do():
     params = SimulatedArmParams(force_mode=False, force_gain_m_s_n=0.1, max_stiffness_n_m=20000.0, loop_delay_s=0.01)
     with pytest.raises(
         InvalidParameter, match=r"'force_gain_m_s_n' is 0\.1; .* unstable from (\S+) m/s/N on; choose"
-    ) as told:
+    ) as declared:
         SimulatedArm(params, own_thread=False)
-    advised = float(str(told.value).rsplit('choose ', 1)[1].split(',')[0])
+    advised = float(str(declared.value).rsplit('choose ', 1)[1].split(',')[0])
     SimulatedArm(
         SimulatedArmParams(force_mode=False, force_gain_m_s_n=advised, max_stiffness_n_m=20000.0, loop_delay_s=0.01)
     )

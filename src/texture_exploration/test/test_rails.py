@@ -123,8 +123,8 @@ def test_a_silent_device_is_reported(rails):
 
 
 def test_the_bench_is_reported_where_the_finger_is(tmp_path):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
-        bench.bind(('127.0.0.1', 0))
-        bench.settimeout(DEADLINE_S)
-        with EmulatedRails(tmp_path / 'rails', finger_port=bench.getsockname()[1]):
-            assert FingerState.from_bytes(bench.recv(1024)).z_m == pytest.approx(0.01)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
+        emulator.bind(('127.0.0.1', 0))
+        emulator.settimeout(DEADLINE_S)
+        with EmulatedRails(tmp_path / 'rails', finger_port=emulator.getsockname()[1]):
+            assert FingerState.from_bytes(emulator.recv(1024)).z_m == pytest.approx(0.01)

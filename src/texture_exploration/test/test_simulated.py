@@ -123,12 +123,12 @@ def test_a_closed_arm_refuses_commands(clock):
 
 
 def test_the_bench_is_reported_where_the_finger_is(clock):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
-        bench.bind(('127.0.0.1', 0))
-        bench.settimeout(5.0)
-        arm = make(clock, finger_port=bench.getsockname()[1], start_height_m=0.0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
+        emulator.bind(('127.0.0.1', 0))
+        emulator.settimeout(5.0)
+        arm = make(clock, finger_port=emulator.getsockname()[1], start_height_m=0.0)
         run(arm, clock, ArmCommand(tangential_m_s=(0.1, 0.0), normal_m_s=-0.1), 0.004)
-        told = [FingerState.from_bytes(bench.recv(1024)) for _ in range(2)][-1]
+        told = [FingerState.from_bytes(emulator.recv(1024)) for _ in range(2)][-1]
         arm.close()
     assert (told.time_ns, told.vx_m_s, told.x_m) == (4_000_000, 0.1, pytest.approx(0.0004))
     assert told.force_n == pytest.approx(0.8)

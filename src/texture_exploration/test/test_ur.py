@@ -41,7 +41,7 @@ needs_ur_rtde = pytest.mark.skipif(
 )
 
 
-class Bench:
+class EmulatedRig:
     """The emulated controller, and the true state of its finger, as it tells the emulator."""
 
     def __init__(self, ip):
@@ -72,16 +72,16 @@ class Bench:
 
 
 @pytest.fixture(scope='module')
-def bench():
-    bench = Bench('127.0.0.50')
-    bench.controller.start()
-    yield bench
-    bench.close()
+def emulator():
+    emulator = EmulatedRig('127.0.0.50')
+    emulator.controller.start()
+    yield emulator
+    emulator.close()
 
 
 @pytest.fixture
-def arm(bench):
-    arm = UrArm(UrArmParams(ip=bench.ip))
+def arm(emulator):
+    arm = UrArm(UrArmParams(ip=emulator.ip))
     arm.connect()
     yield arm
     arm.close()
@@ -176,10 +176,10 @@ def _answer_version(connection):
 
 
 @needs_ur_rtde
-def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(bench, record_property):
+def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(emulator, record_property):
     phases = []
     explorer = Explorer(
-        UrArm(UrArmParams(ip=bench.ip)),
+        UrArm(UrArmParams(ip=emulator.ip)),
         TouchParams(),
         SafetyLimits(state_timeout_s=1.0),  # a busy machine may hold the process up; silence is tested below
         lambda state: phases.append((state.stamp_ns, state.phase)),
@@ -196,7 +196,7 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(bench, rec
         explorer.close()
     begin_ns = min(stamp for stamp, phase in phases if phase is Phase.SLIDE)
     end_ns = min(stamp for stamp, phase in phases if phase is Phase.LIFT)
-    slide = [finger for finger in list(bench.fingers) if begin_ns <= finger.time_ns < end_ns]
+    slide = [finger for finger in list(emulator.fingers) if begin_ns <= finger.time_ns < end_ns]
     times_s = np.array([finger.time_ns for finger in slide]) * 1e-9
     places_m = np.array([finger.x_m for finger in slide])
     forces_n = np.array([finger.force_n for finger in slide])
@@ -214,16 +214,16 @@ def test_it_touches_holds_2_newtons_slides_50_mm_at_20_mm_s_and_lifts(bench, rec
 
 
 @needs_ur_rtde
-def test_commands_and_states_are_in_the_frame_of_the_surface(bench):
-    wall = UrArm(UrArmParams(ip=bench.ip, surface_ry_rad=np.pi / 2))  # its z is the x of the base
+def test_commands_and_states_are_in_the_frame_of_the_surface(emulator):
+    wall = UrArm(UrArmParams(ip=emulator.ip, surface_ry_rad=np.pi / 2))  # its z is the x of the base
     wall.connect()
     try:
-        before = bench.fingers[-1]
+        before = emulator.fingers[-1]
         goal_m = wall.state().position[2] + 0.01
         keep(wall, ArmCommand(normal_m_s=0.02), lambda: wall.state().position[2] > goal_m)
         wall.stop()
-        wait_for(bench.rests)
-        after = bench.fingers[-1]
+        wait_for(emulator.rests)
+        after = emulator.fingers[-1]
         assert after.x_m - before.x_m > 0.0099
         assert (after.y_m, after.z_m) == pytest.approx((before.y_m, before.z_m), abs=1e-6)
     finally:
@@ -231,86 +231,86 @@ def test_commands_and_states_are_in_the_frame_of_the_surface(bench):
 
 
 @needs_ur_rtde
-def test_the_force_sensor_is_zeroed_in_the_air_but_not_in_contact(arm, bench):
+def test_the_force_sensor_is_zeroed_in_the_air_but_not_in_contact(arm, emulator):
     keep(arm, ArmCommand(normal_m_s=0.02), lambda: arm.state().position[2] > 0.008)
     arm.stop()
-    wait_for(bench.rests)
-    keep(arm, ArmCommand(force_n=2.0), lambda: abs(bench.fingers[-1].force_n - 2.0) < 0.05)
+    wait_for(emulator.rests)
+    keep(arm, ArmCommand(force_n=2.0), lambda: abs(emulator.fingers[-1].force_n - 2.0) < 0.05)
     arm.stop()
-    wait_for(bench.rests)
-    keep(arm, ArmCommand(force_n=3.0), lambda: abs(bench.fingers[-1].force_n - 3.0) < 0.05)
+    wait_for(emulator.rests)
+    keep(arm, ArmCommand(force_n=3.0), lambda: abs(emulator.fingers[-1].force_n - 3.0) < 0.05)
     assert arm.state().force_n == pytest.approx(3.0, abs=0.3)
 
 
 @needs_ur_rtde
-def test_a_protective_stop_is_a_fault_that_recover_clears_without_a_new_process(arm, bench):
-    keep(arm, SLIDING, bench.moves)
+def test_a_protective_stop_is_a_fault_that_recover_clears_without_a_new_process(arm, emulator):
+    keep(arm, SLIDING, emulator.moves)
     worker = arm.worker_pid
-    bench.controller.ask('emulate protective stop')
+    emulator.controller.ask('emulate protective stop')
     wait_for(lambda: faulty(arm) == 'protective stop')
-    wait_for(bench.rests)
+    wait_for(emulator.rests)
     arm.recover()
     assert (faulty(arm), arm.worker_pid) == ('', worker)
-    keep(arm, SLIDING, bench.moves)
+    keep(arm, SLIDING, emulator.moves)
 
 
 @needs_ur_rtde
-def test_connecting_releases_a_protective_stop_only_if_it_is_reported_to(arm, bench):
-    bench.controller.ask('emulate protective stop')
+def test_connecting_releases_a_protective_stop_only_if_it_is_reported_to(arm, emulator):
+    emulator.controller.ask('emulate protective stop')
     arm.close()
     with pytest.raises(DeviceError, match=r'held by its safety system \(PROTECTIVE_STOP\); find out why'):
         arm.connect()
-    willing = UrArm(UrArmParams(ip=bench.ip, unlock_protective_stop=True))
+    willing = UrArm(UrArmParams(ip=emulator.ip, unlock_protective_stop=True))
     willing.connect()
     assert faulty(willing) == ''
     willing.close()
 
 
 @needs_ur_rtde
-def test_a_program_that_was_stopped_by_hand_is_a_fault_that_connecting_clears(arm, bench):
-    bench.controller.ask('stop')
+def test_a_program_that_was_stopped_by_hand_is_a_fault_that_connecting_clears(arm, emulator):
+    emulator.controller.ask('stop')
     wait_for(lambda: faulty(arm).startswith('its control program was stopped'))
     arm.close()
     arm.connect()
     assert faulty(arm) == ''
-    keep(arm, SLIDING, bench.moves)
+    keep(arm, SLIDING, emulator.moves)
 
 
 @needs_ur_rtde
-def test_a_frozen_controller_is_a_fault_within_150_ms_and_stops_when_it_thaws(arm, bench, record_property):
-    keep(arm, SLIDING, bench.moves)
+def test_a_frozen_controller_is_a_fault_within_150_ms_and_stops_when_it_thaws(arm, emulator, record_property):
+    keep(arm, SLIDING, emulator.moves)
     with Ticker() as ticker:
-        bench.controller.freeze()
-        last_ns = bench.fingers[-1].time_ns
+        emulator.controller.freeze()
+        last_ns = emulator.fingers[-1].time_ns
         keep(arm, SLIDING, lambda: faulty(arm))
         silent_s = (time.monotonic_ns() - last_ns) * 1e-9
     record_property('detected_s', silent_s)
     assert 'silent' in faulty(arm)
     assert 0.1 <= silent_s < 0.15 + ticker.worst_s
-    bench.controller.resume()
-    wait_for(lambda: faulty(arm) == '' and bench.rests())
-    keep(arm, SLIDING, bench.moves)
+    emulator.controller.resume()
+    wait_for(lambda: faulty(arm) == '' and emulator.rests())
+    keep(arm, SLIDING, emulator.moves)
 
 
 @needs_ur_rtde
-def test_a_worker_that_is_killed_leaves_the_arm_to_the_watchdog(arm, bench, record_property):
-    keep(arm, SLIDING, bench.moves)
+def test_a_worker_that_is_killed_leaves_the_arm_to_the_watchdog(arm, emulator, record_property):
+    keep(arm, SLIDING, emulator.moves)
     os.kill(arm.worker_pid, signal.SIGKILL)
-    record_property('stopped_s', wait_for(bench.rests))
+    record_property('stopped_s', wait_for(emulator.rests))
     wait_for(lambda: 'connect again' in faulty(arm))
     with pytest.raises(DeviceError, match='connect again'):
         arm.command(SLIDING)
     arm.close()
     arm.connect()
-    keep(arm, SLIDING, bench.moves)
+    keep(arm, SLIDING, emulator.moves)
 
 
 @needs_ur_rtde
-def test_a_worker_that_hangs_is_killed_when_the_arm_is_closed(arm, bench):
-    keep(arm, SLIDING, bench.moves)
+def test_a_worker_that_hangs_is_killed_when_the_arm_is_closed(arm, emulator):
+    keep(arm, SLIDING, emulator.moves)
     worker = arm.worker_pid
     os.kill(worker, signal.SIGSTOP)
-    wait_for(bench.rests)  # the watchdog
+    wait_for(emulator.rests)  # the watchdog
     begin_s = time.monotonic()
     arm.close()
     assert time.monotonic() - begin_s < 5.0
@@ -318,40 +318,40 @@ def test_a_worker_that_hangs_is_killed_when_the_arm_is_closed(arm, bench):
 
 
 @needs_ur_rtde
-def test_when_the_parent_is_killed_the_arm_stops_and_the_worker_ends(bench, record_property):
-    parent = subprocess.Popen([sys.executable, str(PARENT), bench.ip], stdout=subprocess.PIPE, text=True)
+def test_when_the_parent_is_killed_the_arm_stops_and_the_worker_ends(emulator, record_property):
+    parent = subprocess.Popen([sys.executable, str(PARENT), emulator.ip], stdout=subprocess.PIPE, text=True)
     with parent:
         worker = Path('/proc') / parent.stdout.readline().strip()
-        wait_for(bench.moves)
+        wait_for(emulator.moves)
         parent.kill()
-    record_property('stopped_s', wait_for(bench.rests))
+    record_property('stopped_s', wait_for(emulator.rests))
     wait_for(lambda: not worker.exists())
-    again = UrArm(UrArmParams(ip=bench.ip))
+    again = UrArm(UrArmParams(ip=emulator.ip))
     again.connect()
-    keep(again, SLIDING, bench.moves)
+    keep(again, SLIDING, emulator.moves)
     again.close()
 
 
 @needs_ur_rtde
 def test_a_controller_that_was_killed_is_reported_and_reached_again_when_it_is_back():
-    bench = Bench('127.0.0.51')
-    arm = UrArm(UrArmParams(ip=bench.ip))
+    emulator = EmulatedRig('127.0.0.51')
+    arm = UrArm(UrArmParams(ip=emulator.ip))
     try:
-        bench.controller.start()
+        emulator.controller.start()
         arm.connect()
-        keep(arm, SLIDING, bench.moves)
-        bench.controller.stop()
+        keep(arm, SLIDING, emulator.moves)
+        emulator.controller.stop()
         wait_for(lambda: faulty(arm) != '')
         wait_for(lambda: 'connection to the controller was lost' in faulty(arm))
         arm.close()
         with pytest.raises(DeviceError, match='nothing listens'):
             arm.connect()
-        bench.controller.start()
+        emulator.controller.start()
         arm.connect()
-        keep(arm, SLIDING, bench.moves)
+        keep(arm, SLIDING, emulator.moves)
     finally:
         arm.close()
-        bench.close()
+        emulator.close()
 
 
 @needs_ur_rtde

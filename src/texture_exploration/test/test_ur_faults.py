@@ -35,7 +35,7 @@ PRESSING = ArmCommand(force_n=3.0)
 SLIDING = ArmCommand(tangential_m_s=(0.02, 0.0))
 
 
-class Bench:
+class EmulatedRig:
     """The emulated controller, and the true state of its finger."""
 
     def __init__(self, ip, **values):
@@ -68,12 +68,12 @@ class Bench:
 
 @contextlib.contextmanager
 def bench_at(ip, **values):
-    bench = Bench(ip, **values)
+    emulator = EmulatedRig(ip, **values)
     try:
-        bench.controller.start()
-        yield bench
+        emulator.controller.start()
+        yield emulator
     finally:
-        bench.close()
+        emulator.close()
 
 
 @contextlib.contextmanager
@@ -105,7 +105,7 @@ def keep(arm, command, condition):
     return wait_for(step)
 
 
-def press(arm, bench):
+def press(arm, emulator):
     """Press until the arm holds 3 N by its sensor; return the true force."""
     held = deque(maxlen=50)
 
@@ -114,55 +114,55 @@ def press(arm, bench):
         return len(held) == 50 and all(abs(force - 3.0) < 0.2 for force in held)
 
     keep(arm, PRESSING, settled)
-    return bench.force_n
+    return emulator.force_n
 
 
-def gap(arm, bench):
+def gap(arm, emulator):
     """Command nothing for longer than a command holds."""
     time.sleep(2 * UrArmParams().command_timeout_s)
-    wait_for(bench.rests)
+    wait_for(emulator.rests)
 
 
 def test_gaps_between_commands_while_pressing_do_not_zero_the_force_away():
-    with bench_at('127.0.0.70', surface_z_m=0.1 + ABOVE_PLANE_M) as bench, connected(bench.ip) as arm:
-        forces = [press(arm, bench)]
+    with bench_at('127.0.0.70', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator, connected(emulator.ip) as arm:
+        forces = [press(arm, emulator)]
         for _ in range(3):
-            gap(arm, bench)
-            forces.append(press(arm, bench))
+            gap(arm, emulator)
+            forces.append(press(arm, emulator))
         assert forces == [pytest.approx(3.0, abs=0.3)] * 4
-        assert max(finger.force_n for finger in bench.fingers) < 4.5
+        assert max(finger.force_n for finger in emulator.fingers) < 4.5
 
 
 def test_who_connects_in_contact_lifts_before_the_force_sensor_is_zeroed():
-    with bench_at('127.0.0.71', surface_z_m=0.1 + ABOVE_PLANE_M) as bench:
-        with connected(bench.ip) as arm:
-            press(arm, bench)
-        assert bench.force_n > 2.0
-        with connected(bench.ip) as arm:
-            assert press(arm, bench) == pytest.approx(3.0, abs=0.3)
-            assert min(finger.force_n for finger in list(bench.fingers)) == 0.0
-        assert max(finger.force_n for finger in bench.fingers) < 4.5
+    with bench_at('127.0.0.71', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator:
+        with connected(emulator.ip) as arm:
+            press(arm, emulator)
+        assert emulator.force_n > 2.0
+        with connected(emulator.ip) as arm:
+            assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
+            assert min(finger.force_n for finger in list(emulator.fingers)) == 0.0
+        assert max(finger.force_n for finger in emulator.fingers) < 4.5
 
 
 def test_after_a_protective_stop_in_contact_the_same_force_is_pressed_again():
-    with bench_at('127.0.0.72', surface_z_m=0.1 + ABOVE_PLANE_M) as bench, connected(bench.ip) as arm:
-        press(arm, bench)
-        bench.controller.ask('emulate protective stop')
+    with bench_at('127.0.0.72', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator, connected(emulator.ip) as arm:
+        press(arm, emulator)
+        emulator.controller.ask('emulate protective stop')
         wait_for(lambda: arm.state().fault == 'protective stop')
         arm.recover()
-        assert press(arm, bench) == pytest.approx(3.0, abs=0.3)
+        assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
 
 
 def test_after_a_recovery_the_arm_stands_still_until_it_is_reported_to_move(shared):
-    bench, arm = shared
-    keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
-    bench.controller.ask('emulate protective stop')
+    emulator, arm = shared
+    keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
+    emulator.controller.ask('emulate protective stop')
     wait_for(lambda: arm.state().fault == 'protective stop')
-    wait_for(bench.rests)
-    seen = len(bench.fingers)
+    wait_for(emulator.rests)
+    seen = len(emulator.fingers)
     arm.recover()
-    wait_for(lambda: len(bench.fingers) > seen + 250)
-    assert all(finger.vx_m_s == 0.0 for finger in list(bench.fingers)[seen:])
+    wait_for(lambda: len(emulator.fingers) > seen + 250)
+    assert all(finger.vx_m_s == 0.0 for finger in list(emulator.fingers)[seen:])
 
 
 def test_after_a_protective_stop_in_a_slide_and_a_recovery_the_same_request_presses_as_asked():
@@ -175,14 +175,14 @@ def test_after_a_protective_stop_in_a_slide_and_a_recovery_the_same_request_pres
             sliding.set()
             slides.append(state.stamp_ns)
 
-    with bench_at('127.0.0.73', surface_z_m=0.1 + ABOVE_PLANE_M) as bench:
-        arm = UrArm(UrArmParams(ip=bench.ip, silence_s=1.0))  # a busy machine is not what is tested here
+    with bench_at('127.0.0.73', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator:
+        arm = UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0))  # a busy machine is not what is tested here
         explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=2.0), on_state)
         explorer.connect()
         try:
             stopped = explorer.begin('one', request)
             assert sliding.wait(DEADLINE_S)
-            bench.controller.ask('emulate protective stop')
+            emulator.controller.ask('emulate protective stop')
             assert stopped.ended.wait(DEADLINE_S)
             assert 'protective stop' in stopped.outcome.message
             explorer.recover()
@@ -192,7 +192,7 @@ def test_after_a_protective_stop_in_a_slide_and_a_recovery_the_same_request_pres
             assert again.outcome.success, (again.outcome.message, explorer.arm_counts())
         finally:
             explorer.close()
-        forces = [finger.force_n for finger in bench.fingers if slides[0] <= finger.time_ns <= slides[-1]]
+        forces = [finger.force_n for finger in emulator.fingers if slides[0] <= finger.time_ns <= slides[-1]]
         assert sum(forces) / len(forces) == pytest.approx(3.0, rel=0.1)
 
 
@@ -208,37 +208,37 @@ def test_after_a_protective_stop_in_a_slide_and_a_recovery_the_same_request_pres
     ],
 )
 def test_a_command_out_of_range_is_refused_and_the_arm_stops(command, shared):
-    bench, arm = shared
-    keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
+    emulator, arm = shared
+    keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
     with pytest.raises(CommandRefused, match=r'was refused and the arm stopped: the .* allowed is'):
         arm.command(command)
-    wait_for(bench.rests, UrArmParams().command_timeout_s + 5.0)
+    wait_for(emulator.rests, UrArmParams().command_timeout_s + 5.0)
 
 
 @pytest.fixture(scope='module')
 def shared():
     """Return a emulator and a connected arm, for faults that leave both whole."""
-    with bench_at('127.0.0.74') as bench, connected(bench.ip) as arm:
-        yield bench, arm
+    with bench_at('127.0.0.74') as emulator, connected(emulator.ip) as arm:
+        yield emulator, arm
 
 
 @pytest.fixture(scope='module')
 def late():
     """Return a emulator whose controller acknowledges 300 ms late what the robot does, and an arm connected to it."""
-    with bench_at('127.0.0.75') as bench, connected(bench.ip) as arm:
-        assert bench.controller.ask('emulate slow 0.3') == 'Acknowledging late'
-        yield bench, arm
+    with bench_at('127.0.0.75') as emulator, connected(emulator.ip) as arm:
+        assert emulator.controller.ask('emulate slow 0.3') == 'Acknowledging late'
+        yield emulator, arm
 
 
 def test_slow_acknowledgements_of_stops_and_zeroing_do_not_trip_the_watchdog(late):
-    bench, arm = late
+    emulator, arm = late
     for _ in range(2):
-        keep(arm, ArmCommand(normal_m_s=0.02), lambda: bench.fingers[-1].vz_m_s > 0.01)
+        keep(arm, ArmCommand(normal_m_s=0.02), lambda: emulator.fingers[-1].vz_m_s > 0.01)
         arm.stop()
-        wait_for(bench.rests)
-        assert press(arm, bench) == pytest.approx(3.0, abs=0.3)
+        wait_for(emulator.rests)
+        assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
         arm.stop()
-        wait_for(bench.rests)
+        wait_for(emulator.rests)
     assert arm.state().fault == ''
     counts = arm.counts
     assert (counts['refused'], counts['zeroed'] >= 1) == (0, True)
@@ -247,51 +247,51 @@ def test_slow_acknowledgements_of_stops_and_zeroing_do_not_trip_the_watchdog(lat
 
 
 def test_after_a_slow_acknowledgement_the_watchdog_guards_the_moving_arm_as_before(late):
-    bench, arm = late
-    keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
+    emulator, arm = late
+    keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
     os.kill(arm.worker_pid, signal.SIGSTOP)
-    begin = bench.fingers[-1]
+    begin = emulator.fingers[-1]
     try:
-        wait_for(bench.rests)
+        wait_for(emulator.rests)
     finally:
         os.kill(arm.worker_pid, signal.SIGCONT)
-    end = bench.fingers[-1]
+    end = emulator.fingers[-1]
     # The watchdog waits 100 ms; what is more is this machine, but not the second that it waits for a stop.
     assert end.x_m - begin.x_m < 0.02 * 0.5
-    assert bench.controller.ask('programState').startswith('STOPPED')
+    assert emulator.controller.ask('programState').startswith('STOPPED')
 
 
 def test_a_program_of_somebody_else_is_not_stopped_unless_it_is_said():
-    with bench_at('127.0.0.76') as bench:
-        bench.controller.ask('load external_control.urp')
-        assert bench.controller.ask('play') == 'Starting program'
+    with bench_at('127.0.0.76') as emulator:
+        emulator.controller.ask('load external_control.urp')
+        assert emulator.controller.ask('play') == 'Starting program'
         refused = r"another program is on the controller at .* \('PLAYING external_control\.urp'\).*'take_over' to true"
         with pytest.raises(DeviceError, match=refused):
-            UrArm(UrArmParams(ip=bench.ip)).connect()
-        assert bench.controller.ask('programState') == 'PLAYING external_control.urp'
-        bench.controller.ask('pause')
+            UrArm(UrArmParams(ip=emulator.ip)).connect()
+        assert emulator.controller.ask('programState') == 'PLAYING external_control.urp'
+        emulator.controller.ask('pause')
         with pytest.raises(DeviceError, match='PAUSED external_control'):
-            UrArm(UrArmParams(ip=bench.ip)).connect()
-        with connected(bench.ip, take_over=True) as arm:
-            keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
-            assert bench.controller.ask('programState') == 'PLAYING rtde_control'
+            UrArm(UrArmParams(ip=emulator.ip)).connect()
+        with connected(emulator.ip, take_over=True) as arm:
+            keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
+            assert emulator.controller.ask('programState') == 'PLAYING rtde_control'
 
 
 def test_polyscope_x_which_has_no_dashboard_reports_by_rtde_that_a_program_runs():
     # On a busy machine the watchdog would end the program that is to be seen.
-    with bench_at('127.0.0.77', version='10.10') as bench, connected(bench.ip, watchdog_hz=1.0) as arm:
+    with bench_at('127.0.0.77', version='10.10') as emulator, connected(emulator.ip, watchdog_hz=1.0) as arm:
         with pytest.raises(DeviceError, match=r"another program is on the controller .*'runtime state 2'"):
-            UrArm(UrArmParams(ip=bench.ip)).connect()
+            UrArm(UrArmParams(ip=emulator.ip)).connect()
         assert arm.state().fault == ''
 
 
 def test_a_program_that_somebody_starts_meanwhile_is_a_fault_and_gets_no_commands():
-    with bench_at('127.0.0.78') as bench, connected(bench.ip) as arm:
-        keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
-        bench.controller.ask('stop')
+    with bench_at('127.0.0.78') as emulator, connected(emulator.ip) as arm:
+        keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
+        emulator.controller.ask('stop')
         wait_for(lambda: arm.state().fault.startswith('its control program was stopped'))
-        bench.controller.ask('load external_control.urp')
-        bench.controller.ask('play')
+        emulator.controller.ask('load external_control.urp')
+        emulator.controller.ask('play')
 
         def fault():
             try:
@@ -301,15 +301,15 @@ def test_a_program_that_somebody_starts_meanwhile_is_a_fault_and_gets_no_command
 
         wait_for(lambda: 'somebody else started one' in fault())
         arm.close()
-        assert bench.controller.ask('programState') == 'PLAYING external_control.urp'
+        assert emulator.controller.ask('programState') == 'PLAYING external_control.urp'
 
 
 def test_our_own_program_that_a_killed_process_left_does_not_lock_us_out():
-    with bench_at('127.0.0.79') as bench:
-        arm = UrArm(UrArmParams(ip=bench.ip))
+    with bench_at('127.0.0.79') as emulator:
+        arm = UrArm(UrArmParams(ip=emulator.ip))
         for _ in range(2):
             arm.connect()
-            keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
+            keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
             os.kill(arm.worker_pid, signal.SIGKILL)
             arm.close()
         arm.connect()
@@ -317,12 +317,12 @@ def test_our_own_program_that_a_killed_process_left_does_not_lock_us_out():
 
 
 def test_our_own_program_that_was_left_without_a_watchdog_does_not_lock_us_out():
-    with bench_at('127.0.0.81') as bench:
-        with socket.create_connection((bench.ip, 30003)) as port:
+    with bench_at('127.0.0.81') as emulator:
+        with socket.create_connection((emulator.ip, 30003)) as port:
             port.sendall(b'def rtde_control():\nend\n')  # as ur-rtde sends it before a watchdog is set
-            wait_for(lambda: bench.controller.ask('running') == 'Program running: true')
-        with connected(bench.ip) as arm:
-            keep(arm, SLIDING, lambda: bench.fingers[-1].vx_m_s > 0.01)
+            wait_for(lambda: emulator.controller.ask('running') == 'Program running: true')
+        with connected(emulator.ip) as arm:
+            keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
 
 
 @pytest.mark.parametrize(

@@ -197,7 +197,7 @@ class ForceLoop:
         self._period_s = period_s
         self.stiffness = StiffnessEstimate()
         self.lag = LagEstimate()
-        self._told = params  # what was declared; `_params` holds what was measured
+        self._declared = params  # what was declared; `_params` holds what was measured
         self._observer = self._new_observer()
         self._surface_m: float | None = None  # where the finger met it last
         self._chosen_for = math.nan
@@ -244,7 +244,7 @@ class ForceLoop:
 
     def _pressing_m_s(self, wanted_n: float) -> float:
         """Return how fast the finger may be pressed on: what is soft now may have a hard base."""
-        depth_m = self._params.press_impact_share * wanted_n / self._told.max_stiffness_n_m
+        depth_m = self._params.press_impact_share * wanted_n / self._declared.max_stiffness_n_m
         return depth_m * self._patience / self._reaction_s(self._params)
 
     def approach_m_s(self, height_m: float) -> float:
@@ -260,34 +260,34 @@ class ForceLoop:
     @property
     def _closing_m(self) -> float:
         """How deep the finger may run into the surface before it reacts, m."""
-        depth_m = self._told.max_impact_depth_m
+        depth_m = self._declared.max_impact_depth_m
         estimated_n_m = self.stiffness.value_n_m
         if self._delayed and not self.stiffness.empty and not math.isnan(estimated_n_m):
-            depth_m *= max(1.0, self._told.max_stiffness_n_m / estimated_n_m)
+            depth_m *= max(1.0, self._declared.max_stiffness_n_m / estimated_n_m)
         return depth_m * self._patience
 
     @property
     def _patience(self) -> float:
         """How many times harder than declared an arm that is later than declared may meet a surface."""
-        return min(LATE_IMPACT, self._reaction_s(self._params) / self._reaction_s(self._told))
+        return min(LATE_IMPACT, self._reaction_s(self._params) / self._reaction_s(self._declared))
 
     def _reaction_s(self, params: ForceLoopParams) -> float:
         return params.loop_delay_s + REACTION_PERIODS * self._period_s
 
     @property
     def _delayed(self) -> bool:
-        return self._params.loop_delay_s > self._told.loop_delay_s
+        return self._params.loop_delay_s > self._declared.loop_delay_s
 
     def _adapt_to_lag(self) -> None:
         """Take over the measured lag if it is longer than declared."""
         lag_s = self.lag.value_s
-        told = self._told
-        late = lag_s > told.loop_delay_s + UNDECLARED_PERIODS * self._period_s  # not if it is NaN
-        delay_s = math.ceil(lag_s * 1e3) * 1e-3 if late else told.loop_delay_s
+        declared = self._declared
+        late = lag_s > declared.loop_delay_s + UNDECLARED_PERIODS * self._period_s  # not if it is NaN
+        delay_s = math.ceil(lag_s * 1e3) * 1e-3 if late else declared.loop_delay_s
         if delay_s == self._params.loop_delay_s:
             return
-        integral_s = max(told.integral_s, INTEGRAL_LAGS * delay_s) if late else told.integral_s
-        self._params = replace(told, loop_delay_s=min(delay_s, LONGEST_DELAY_S), integral_s=integral_s)
+        integral_s = max(declared.integral_s, INTEGRAL_LAGS * delay_s) if late else declared.integral_s
+        self._params = replace(declared, loop_delay_s=min(delay_s, LONGEST_DELAY_S), integral_s=integral_s)
         self._observer = self._new_observer()
         self.controller = self._new_controller()
         self._chosen_for = math.nan

@@ -185,14 +185,14 @@ def test_the_bench_is_reported_where_the_finger_is_and_how_hard_it_presses(tmp_p
         motors.write(motor, 116, struct.pack('<i', 2048 + round(angle_rad / 0.001533981)))
         motors.write(motor, 64, b'\1')
     deadline = time.monotonic() + DEADLINE_S
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
-        bench.bind(('127.0.0.1', 0))
-        bench.settimeout(DEADLINE_S)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
+        emulator.bind(('127.0.0.1', 0))
+        emulator.settimeout(DEADLINE_S)
         state = FingerState(0)
-        with EmulatedDynamixelBus(tmp_path / 'bus', motors, finger, bench.getsockname()[1]):
+        with EmulatedDynamixelBus(tmp_path / 'bus', motors, finger, emulator.getsockname()[1]):
             while state.x_m < 0.0085 or state.force_n < 0.95:
                 assert time.monotonic() < deadline
-                state = FingerState.from_bytes(bench.recv(1024))
+                state = FingerState.from_bytes(emulator.recv(1024))
     assert state.x_m == pytest.approx(0.009, abs=5e-4)
     assert state.y_m == 0.0
     assert state.force_n == pytest.approx(1.0, rel=0.05)

@@ -44,14 +44,14 @@ class Arm:
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Emulator]:
+def emulator(tmp_path: Path) -> Iterator[Emulator]:
     params = EmulatorParams(surface='ridge_2mm_deep', sensor_link=str(tmp_path / 'tsf85'), finger_port=0)
     with Emulator(params) as made:
         yield made
 
 
 @pytest.fixture
-def sensor(bench: Emulator, tmp_path: Path) -> Iterator[Tsf85]:
+def sensor(emulator: Emulator, tmp_path: Path) -> Iterator[Tsf85]:
     made = Tsf85(SensorParams(device=str(tmp_path / 'tsf85')))
     made.open()
     yield made
@@ -59,8 +59,8 @@ def sensor(bench: Emulator, tmp_path: Path) -> Iterator[Tsf85]:
 
 
 @pytest.fixture
-def arm(bench: Emulator) -> Iterator[Arm]:
-    made = Arm(bench.finger_port)
+def arm(emulator: Emulator) -> Iterator[Arm]:
+    made = Arm(emulator.finger_port)
     yield made
     made.stop()
 
@@ -98,24 +98,26 @@ def test_nothing_is_measured_while_no_arm_reports(sensor: Tsf85) -> None:
     assert values(read(sensor, 300)).std() < 50
 
 
-def test_the_sample_can_be_swapped_while_the_finger_slides(bench: Emulator, sensor: Tsf85, arm: Arm) -> None:
+def test_the_sample_can_be_swapped_while_the_finger_slides(emulator: Emulator, sensor: Tsf85, arm: Arm) -> None:
     rough = values(read(sensor, 1000))[-400:].std()
-    bench.set_surface('glass')
+    emulator.set_surface('glass')
     read(sensor, 300)
     assert values(read(sensor, 400)).std() < 0.2 * rough
     with pytest.raises(UnknownName, match="did you mean 'glass'"):
-        bench.set_surface('glas')
-    assert bench.surface == 'glass'
+        emulator.set_surface('glas')
+    assert emulator.surface == 'glass'
 
 
-def test_replugging_gives_another_device_behind_the_same_link(bench: Emulator, sensor: Tsf85, tmp_path: Path) -> None:
+def test_replugging_gives_another_device_behind_the_same_link(
+    emulator: Emulator, sensor: Tsf85, tmp_path: Path
+) -> None:
     before = read(sensor, 200)[-1]
-    bench.unplug()
+    emulator.unplug()
     assert not os.path.lexists(tmp_path / 'tsf85')
     with pytest.raises(DeviceError):
         read(sensor, 1000)
     sensor.close()
-    bench.replug()
+    emulator.replug()
     sensor.open()
     after = read(sensor, 200)[0]
     assert after.first_sample - before.next_sample == sensor.counts['lost'] > 50
@@ -123,11 +125,11 @@ def test_replugging_gives_another_device_behind_the_same_link(bench: Emulator, s
     assert (after.first_sample - before.next_sample) / 1000 == pytest.approx(gap_s, abs=0.02)
 
 
-def test_a_bad_line_costs_samples_and_every_one_is_counted(bench: Emulator, sensor: Tsf85) -> None:
+def test_a_bad_line_costs_samples_and_every_one_is_counted(emulator: Emulator, sensor: Tsf85) -> None:
     read(sensor, 200)
-    bench.device.faults = ByteFaults(drop=1e-3)
+    emulator.device.faults = ByteFaults(drop=1e-3)
     batches = read(sensor, 3000)
-    bench.device.faults = ByteFaults()
+    emulator.device.faults = ByteFaults()
     batches += read(sensor, 200)
     share = lost_samples(batches) / (batches[-1].next_sample - batches[0].first_sample)
     # A packet has 47 bytes, so 1 − 0.999^47 = 4.6 % are hit; each may take its forerunner or successor along.
@@ -137,8 +139,8 @@ def test_a_bad_line_costs_samples_and_every_one_is_counted(bench: Emulator, sens
     assert (batches[-1].first_sample - batches[0].first_sample) / 1000 == pytest.approx(span_s, abs=0.01)
 
 
-def test_a_device_that_is_silent_after_opening_is_woken(bench: Emulator, tmp_path: Path) -> None:
-    bench.device.ignored_starts = 3  # the one of opening and two more
+def test_a_device_that_is_silent_after_opening_is_woken(emulator: Emulator, tmp_path: Path) -> None:
+    emulator.device.ignored_starts = 3  # the one of opening and two more
     sensor = Tsf85(SensorParams(device=str(tmp_path / 'tsf85')))
     sensor.open()
     read(sensor, 300)
@@ -157,15 +159,15 @@ def test_the_second_finger_and_old_firmware_are_understood(tmp_path: Path) -> No
     assert values(batches).std() > 5
 
 
-def test_a_taken_port_is_reported_in_a_sentence(bench: Emulator, tmp_path: Path) -> None:
+def test_a_taken_port_is_reported_in_a_sentence(emulator: Emulator, tmp_path: Path) -> None:
     with pytest.raises(DeviceError, match='choose another'):
-        Emulator(EmulatorParams(sensor_link=str(tmp_path / 'other'), finger_port=bench.finger_port))
+        Emulator(EmulatorParams(sensor_link=str(tmp_path / 'other'), finger_port=emulator.finger_port))
 
 
-def test_what_is_no_finger_state_is_counted(bench: Emulator) -> None:
+def test_what_is_no_finger_state_is_counted(emulator: Emulator) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
-        line.sendto(b'hello', ('127.0.0.1', bench.finger_port))
+        line.sendto(b'hello', ('127.0.0.1', emulator.finger_port))
     deadline = time.monotonic() + DEADLINE_S
-    while not bench.counts['refused datagrams']:
+    while not emulator.counts['refused datagrams']:
         assert time.monotonic() < deadline
-    assert bench.counts['refused datagrams'] == 1
+    assert emulator.counts['refused datagrams'] == 1

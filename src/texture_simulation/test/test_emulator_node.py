@@ -25,7 +25,7 @@ class Bed:
     """Bench and sensor node, and what they publish."""
 
     def __init__(self, graph: LocalGraph, link: Path) -> None:
-        self.bench = graph.add(EmulatorNode, sensor_link=str(link), finger_port=0)
+        self.emulator = graph.add(EmulatorNode, sensor_link=str(link), finger_port=0)
         self.sensor = graph.add(SensorNode, device=str(link))
         self.batches: list[Any] = []
         graph.peer.create_subscription(
@@ -54,11 +54,11 @@ def bed(tmp_path: Path) -> Iterator[Bed]:
 def test_signals_flow_survive_a_replug_and_the_gap_is_in_the_index(bed: Bed) -> None:
     bed.until(lambda: len(bed.batches) > 50)
     bed.until(lambda: bed.level == 0)
-    bed.bench._emulator.unplug()
+    bed.emulator._emulator.unplug()
     bed.until(lambda: bed.level == 2)
     last = bed.batches[-1]
     replugged = time.monotonic()
-    bed.bench._emulator.replug()
+    bed.emulator._emulator.replug()
     bed.until(lambda: bed.batches[-1] is not last)
     assert time.monotonic() - replugged < 5.0
     first = bed.batches[bed.batches.index(last) + 1]
@@ -68,30 +68,30 @@ def test_signals_flow_survive_a_replug_and_the_gap_is_in_the_index(bed: Bed) -> 
 
 
 def test_the_surface_is_a_parameter_that_refuses_unknown_names(bed: Bed) -> None:
-    result = bed.set(bed.bench, surface='ridge_3m')
+    result = bed.set(bed.emulator, surface='ridge_3m')
     assert not result.successful
     assert "did you mean 'ridge_3mm'" in result.reason
-    assert bed.set(bed.bench, surface='ridge_3mm').successful
-    assert bed.bench.get_parameter('surface').value == 'ridge_3mm'
-    assert not bed.set(bed.bench, seed=5).successful
+    assert bed.set(bed.emulator, surface='ridge_3mm').successful
+    assert bed.emulator.get_parameter('surface').value == 'ridge_3mm'
+    assert not bed.set(bed.emulator, seed=5).successful
 
 
 def test_the_plug_and_the_line_are_parameters(bed: Bed) -> None:
     bed.until(lambda: bed.level == 0)
-    assert bed.set(bed.bench, plugged=False).successful
+    assert bed.set(bed.emulator, plugged=False).successful
     bed.until(lambda: bed.level == 2)
-    assert bed.set(bed.bench, plugged=True, bit_flips=0.02).successful
+    assert bed.set(bed.emulator, plugged=True, bit_flips=0.02).successful
     bed.until(lambda: bed.sensor._sensor.counts['bogus'] > 5)
-    assert bed.set(bed.bench, bit_flips=0.0).successful
+    assert bed.set(bed.emulator, bit_flips=0.0).successful
     bed.until(lambda: bed.level == 0)
-    assert not bed.set(bed.bench, bit_flips=2.0).successful
+    assert not bed.set(bed.emulator, bit_flips=2.0).successful
 
 
 def test_deactivating_stops_the_stream_and_activating_brings_it_back(bed: Bed) -> None:
     bed.until(lambda: len(bed.batches) > 5)
     bed.sensor.trigger_deactivate()
-    assert not bed.bench._emulator.device.plugged or bed.sensor._reader is None
-    bed.until(lambda: not bed.bench._emulator.device.streaming)
+    assert not bed.emulator._emulator.device.plugged or bed.sensor._reader is None
+    bed.until(lambda: not bed.emulator._emulator.device.streaming)
     bed.sensor.trigger_activate()
     count = len(bed.batches)
     bed.until(lambda: len(bed.batches) > count + 5)

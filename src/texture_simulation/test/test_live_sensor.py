@@ -27,7 +27,7 @@ SPEED_M_S, FORCE_N = 0.1, 2.0  # over ridges of 2 mm: 50 Hz
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> Iterator[Emulator]:
+def emulator(tmp_path: Path) -> Iterator[Emulator]:
     params = EmulatorParams(
         surface='ridge_2mm_deep',
         sensor_link=str(tmp_path / 'tsf85'),
@@ -40,7 +40,7 @@ def bench(tmp_path: Path) -> Iterator[Emulator]:
 
 
 @pytest.fixture
-def arm(bench: Emulator) -> Iterator[None]:
+def arm(emulator: Emulator) -> Iterator[None]:
     """An arm whose finger slides for ever along x."""
     stop = threading.Event()
 
@@ -51,7 +51,7 @@ def arm(bench: Emulator) -> Iterator[None]:
                 now_ns = time.monotonic_ns()
                 x_m = SPEED_M_S * (now_ns - start_ns) / 1e9
                 state = FingerState(now_ns, x_m=x_m, vx_m_s=SPEED_M_S, force_n=FORCE_N)
-                line.sendto(state.to_bytes(), ('127.0.0.1', bench.finger_port))
+                line.sendto(state.to_bytes(), ('127.0.0.1', emulator.finger_port))
 
     thread = threading.Thread(target=run)
     thread.start()
@@ -79,20 +79,20 @@ def peak_hz(samples: np.ndarray, rate_hz: float) -> float:
     return float(np.fft.rfftfreq(len(samples), 1 / rate_hz)[spectrum.argmax()])
 
 
-def test_the_daq_finger_senses_the_ridges_at_speed_over_pitch(bench: Emulator, arm: None, tmp_path: Path) -> None:
+def test_the_daq_finger_senses_the_ridges_at_speed_over_pitch(emulator: Emulator, arm: None, tmp_path: Path) -> None:
     samples = read(daq(SensorParams(device=str(tmp_path / 'daq'))), 3.0)['signal'][2500:]
     assert peak_hz(samples[:, 0], 2500.0) == pytest.approx(50.0, abs=1.0)
 
 
-def test_the_pvdf_finger_senses_ridges_and_force(bench: Emulator, arm: None, tmp_path: Path) -> None:
+def test_the_pvdf_finger_senses_ridges_and_force(emulator: Emulator, arm: None, tmp_path: Path) -> None:
     found = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 3.0)
     assert peak_hz(found['signal'][4096:, 0], 4096.0) == pytest.approx(50.0, abs=1.0)
     assert found['signal_static'][64:].mean() == pytest.approx(FORCE_N, rel=0.05)
 
 
-def test_swapping_the_sample_is_measured_by_all(bench: Emulator, arm: None, tmp_path: Path) -> None:
+def test_swapping_the_sample_is_measured_by_all(emulator: Emulator, arm: None, tmp_path: Path) -> None:
     rough = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 2.0)['signal'][4096:].std()
-    bench.set_surface('glass')
+    emulator.set_surface('glass')
     smooth = read(Pvdf(SensorParams(device=str(tmp_path / 'pvdf'))), 2.0)['signal'][4096:].std()
     assert smooth < 0.3 * rough
 
@@ -107,9 +107,9 @@ def test_after_a_stall_of_the_machine_time_has_gone_on(tmp_path: Path) -> None:
 
 def test_the_bench_may_hold_a_biotac_alone(tmp_path: Path) -> None:
     params = EmulatorParams(sensor='biotac', sensor_link=str(tmp_path / 'biotac'), finger_port=0)
-    with Emulator(params) as bench:
+    with Emulator(params) as emulator:
         found = read(BioTac(SensorParams(device=str(tmp_path / 'biotac'))), 1.0)
-    assert bench.counts['bytes nobody took'] == 0
+    assert emulator.counts['bytes nobody took'] == 0
     assert found['signal'].mean() == pytest.approx(2030, abs=30)  # nothing touches: PAC idles
     assert found['signal_static'].shape[1] == 22
 

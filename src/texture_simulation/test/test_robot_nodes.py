@@ -25,12 +25,12 @@ def graph():
 
 @pytest.mark.parametrize('name', NODES)
 def test_the_device_lives_with_its_node_and_reports_where_the_finger_is(name, graph, tmp_path):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
-        bench.bind(('127.0.0.1', 0))
-        bench.settimeout(DEADLINE_S)
-        node = graph.add(NODES[name], link=str(tmp_path / name), finger_port=bench.getsockname()[1])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
+        emulator.bind(('127.0.0.1', 0))
+        emulator.settimeout(DEADLINE_S)
+        node = graph.add(NODES[name], link=str(tmp_path / name), finger_port=emulator.getsockname()[1])
         before_ns = time.monotonic_ns()
-        while (state := FingerState.from_bytes(bench.recv(1024))).time_ns < before_ns:
+        while (state := FingerState.from_bytes(emulator.recv(1024))).time_ns < before_ns:
             pass
         assert (state.z_m, state.force_n) == (pytest.approx(0.01), 0.0)
         assert (tmp_path / name).exists()

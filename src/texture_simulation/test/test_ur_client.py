@@ -95,11 +95,11 @@ def test_other_versions_let_the_client_move(version):
 
 
 def test_it_reports_the_bench_where_the_finger_is():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bench:
-        bench.bind(('127.0.0.1', 0))
-        bench.settimeout(10.0)
-        with ControllerProcess(UrControllerParams(ip='127.0.0.61', finger_port=bench.getsockname()[1])):
-            states = [FingerState.from_bytes(bench.recv(256)) for _ in range(200)]
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as emulator:
+        emulator.bind(('127.0.0.1', 0))
+        emulator.settimeout(10.0)
+        with ControllerProcess(UrControllerParams(ip='127.0.0.61', finger_port=emulator.getsockname()[1])):
+            states = [FingerState.from_bytes(emulator.recv(256)) for _ in range(200)]
     assert (states[-1].x_m, states[-1].z_m, states[-1].force_n) == (0.0, pytest.approx(0.01), 0.0)
     rate_hz = 199 / ((states[-1].time_ns - states[0].time_ns) * 1e-9)
     assert 100 < rate_hz < 600  # 500 Hz on a machine that is not busy

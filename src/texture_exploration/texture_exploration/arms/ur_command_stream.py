@@ -33,7 +33,7 @@ MAX_RISES = 5.0  # a finger that is lifted to zero its sensor rises at most by s
 class Mode(enum.Enum):
     """What the arm is doing."""
 
-    REST = enum.auto()
+    STANDSTILL = enum.auto()
     SPEED = enum.auto()
     FORCE = enum.auto()  # speed along the surface, force along its normal
 
@@ -73,7 +73,7 @@ class UrCommandStream:
         self._measured_ns = self._rest_ns = 0
         self._rise_from_m: float | None = None
         self._height_m = 0.0
-        self._mode = Mode.REST
+        self._mode = Mode.STANDSTILL
         self._braking = False
         self._next_is_speed = False
 
@@ -87,21 +87,21 @@ class UrCommandStream:
         """Send what is due; None commands standstill."""
         ur_command = self._lifted_first(ur_command)
         mode = _mode(ur_command)
-        self._braking &= mode is Mode.REST
+        self._braking &= mode is Mode.STANDSTILL
         if mode is not self._mode and not self._change(mode):
             return
         if mode is Mode.FORCE:
             self._air.presume_contact()
         self._count(STREAM[mode](self, ur_command))
 
-    def rest(self) -> None:
+    def stand_still(self) -> None:
         """Stop at once, and return when the arm stands still."""
         with self._watchdog.patient():
             self._stop()
 
     def reset(self) -> None:
         """The program on the controller was started again: the arm is at rest, in contact or not."""
-        self._mode = Mode.REST
+        self._mode = Mode.STANDSTILL
         self._braking = False
         self.trusted = self.unsteady = False
         self._rise_from_m = None
@@ -115,7 +115,7 @@ class UrCommandStream:
         if self.unsteady:
             return None
         if self._air.proven:
-            return ur_command if self._mode is Mode.REST else None
+            return ur_command if self._mode is Mode.STANDSTILL else None
         if self._rise_from_m is None:
             self._rise_from_m = self._height_m
         self.unsteady = self._height_m - self._rise_from_m > MAX_RISES * self._params.zero_rise_m
@@ -123,14 +123,14 @@ class UrCommandStream:
 
     def _change(self, mode: Mode) -> bool:
         """Leave the present mode; return whether the new one has begun."""
-        if mode is Mode.REST and not self._braking:
+        if mode is Mode.STANDSTILL and not self._braking:
             # A command that streams takes effect at once; those that follow wait for each other.
             self._braking = True
             self._count(bool(self._control.speedL([0.0] * 6, STOP_DECELERATION_M_S2, 1.0 / self._params.rate_hz)))
             return False
         if not self._leave(mode):
             return False
-        if mode is not Mode.REST and not self._watchdog.armed and not self._watchdog.arm():
+        if mode is not Mode.STANDSTILL and not self._watchdog.armed and not self._watchdog.arm():
             self._count(False)
             return False
         self._mode = mode
@@ -140,12 +140,12 @@ class UrCommandStream:
 
     def _leave(self, mode: Mode) -> bool:
         """Do what ends the present mode; return whether that is enough for the new one."""
-        if mode is Mode.REST:
-            self.rest()
+        if mode is Mode.STANDSTILL:
+            self.stand_still()
         elif self._mode is Mode.FORCE:
             with self._watchdog.patient():
                 self._count(self._watchdog.call(self._control.forceModeStop))
-        elif self._mode is Mode.REST and self._air.proven:
+        elif self._mode is Mode.STANDSTILL and self._air.proven:
             with self._watchdog.patient():
                 return self._zero()
         return True
@@ -155,7 +155,7 @@ class UrCommandStream:
         self._count(self._watchdog.call(self._control.speedStop, STOP_DECELERATION_M_S2))
         if self._mode is Mode.FORCE:
             self._count(self._watchdog.call(self._control.forceModeStop))
-        self._mode = Mode.REST
+        self._mode = Mode.STANDSTILL
 
     def _zero(self) -> bool:
         """Zero the force sensor, at rest and in free air; return whether the controller did."""
@@ -166,7 +166,7 @@ class UrCommandStream:
         self._air.presume_contact()  # the force is another one now; the next zeroing needs a proof of its own
         return taken
 
-    def _rest(self, _ur_command: UrCommand | None) -> bool:
+    def _hold_still(self, _ur_command: UrCommand | None) -> bool:
         """Zero the force sensor as soon as the arm has calmed down in free air."""
         if self._air.proven and self._measured_ns - self._rest_ns > CALM_NS:
             with self._watchdog.patient():
@@ -193,7 +193,7 @@ class UrCommandStream:
 
 
 STREAM: Mapping[Mode, Callable[[UrCommandStream, Any], bool]] = {
-    Mode.REST: UrCommandStream._rest,
+    Mode.STANDSTILL: UrCommandStream._hold_still,
     Mode.SPEED: UrCommandStream._speed,
     Mode.FORCE: UrCommandStream._force,
 }
@@ -201,5 +201,5 @@ STREAM: Mapping[Mode, Callable[[UrCommandStream, Any], bool]] = {
 
 def _mode(ur_command: UrCommand | None) -> Mode:
     if ur_command is None:
-        return Mode.REST
+        return Mode.STANDSTILL
     return Mode.SPEED if ur_command.force_n is None else Mode.FORCE

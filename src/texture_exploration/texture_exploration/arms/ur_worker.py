@@ -204,7 +204,7 @@ class Worker:
         ours = not self._stopped and not self._other_program
         if ours and self._observer.connected and not self._observer.silent and self._control.isConnected():
             with contextlib.suppress(RuntimeError):
-                self._commands.rest()
+                self._commands.stand_still()
                 set_alarm(HANGING_S)
                 self._control.stopScript()
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 
-class Model(NamedTuple):
+class MotorModel(NamedTuple):
     """Scale of the current in A per count, and torque per current in N·m/A."""
 
     name: str
@@ -18,17 +18,17 @@ class Model(NamedTuple):
     torque_nm_a: float
 
 
-MODELS: Mapping[int, Model] = {
-    1000: Model('XH430-W350', 0.00134, 3.4 / 1.3),
-    1010: Model('XH430-W210', 0.00134, 2.5 / 1.3),
-    1020: Model('XM430-W350', 0.00269, 4.1 / 2.3),
-    1030: Model('XM430-W210', 0.00269, 3.0 / 2.3),
-    1190: Model('XL330-M077', 0.001, 0.215 / 1.47),
-    1200: Model('XL330-M288', 0.001, 0.52 / 1.47),
-    1210: Model('XC330-T181', 0.001, 0.76 / 0.80),
-    1220: Model('XC330-T288', 0.001, 0.92 / 0.80),
-    1230: Model('XC330-M181', 0.001, 0.60 / 1.80),
-    1240: Model('XC330-M288', 0.001, 0.93 / 1.80),
+MODELS: Mapping[int, MotorModel] = {
+    1000: MotorModel('XH430-W350', 0.00134, 3.4 / 1.3),
+    1010: MotorModel('XH430-W210', 0.00134, 2.5 / 1.3),
+    1020: MotorModel('XM430-W350', 0.00269, 4.1 / 2.3),
+    1030: MotorModel('XM430-W210', 0.00269, 3.0 / 2.3),
+    1190: MotorModel('XL330-M077', 0.001, 0.215 / 1.47),
+    1200: MotorModel('XL330-M288', 0.001, 0.52 / 1.47),
+    1210: MotorModel('XC330-T181', 0.001, 0.76 / 0.80),
+    1220: MotorModel('XC330-T288', 0.001, 0.92 / 0.80),
+    1230: MotorModel('XC330-M181', 0.001, 0.60 / 1.80),
+    1240: MotorModel('XC330-M288', 0.001, 0.93 / 1.80),
 }
 TOLERANCE = 0.2  # of the torque of a count: motors of one model differ by less, and friction hides the rest
 

@@ -42,7 +42,7 @@ class PtyPort:
         os.set_blocking(device_end, False)
         self._ends = (device_end, host_end)  # the host end stays open here, or reading fails while no driver is there
         try:
-            _lead(self.link, os.ttyname(host_end))
+            _point_link(self.link, os.ttyname(host_end))
         except OSError as error:
             self.unplug()
             raise DeviceError(
@@ -82,7 +82,7 @@ class PtyPort:
         self.dropped_bytes += len(data) - sent
 
 
-def _lead(link: Path, target: str) -> None:
+def _point_link(link: Path, target: str) -> None:
     """Make or change a symbolic link at once, so that it is never missing; a file that is no link is left alone."""
     link.parent.mkdir(parents=True, exist_ok=True)
     if link.exists() and not link.is_symlink():
