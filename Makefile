@@ -6,7 +6,7 @@ TEST_JOBS ?= 4
 # Public recordings for evaluation, if they lie beside the repository or where the user says.
 export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
-.PHONY: setup demo test lint bench docs clean
+.PHONY: setup demo test lint benchmark docs clean
 
 setup:
 	@$(PYTHON) tools/workspace.py
@@ -22,8 +22,8 @@ lint: setup
 test: setup lint
 	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile
 
-bench: setup
-	@.venv/bin/texture bench all
+benchmark: setup
+	@.venv/bin/texture benchmark all
 
 docs: setup
 	@$(RUN) python docs/build.py out/site

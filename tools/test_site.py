@@ -30,7 +30,7 @@ from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.exploration import Exploration
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -160,8 +160,8 @@ def test_the_motion_of_the_page_slides_along_its_bows(examples: Path) -> None:
 def test_the_feature_of_the_page_counts_the_crossings_of_a_tone(examples: Path) -> None:
     crossings = importlib.import_module('my_textures.crossings').Crossings()
     tone = np.sin(2 * np.pi * 50 * np.arange(1000) / 1000 + 0.1)[:, None]
-    assert crossings(Windows(tone, 1000.0)).shape == (1, 1)
-    assert crossings(Windows(tone, 1000.0)).item() == pytest.approx(100, abs=1)
+    assert crossings(WindowBatch(tone, 1000.0)).shape == (1, 1)
+    assert crossings(WindowBatch(tone, 1000.0)).item() == pytest.approx(100, abs=1)
     assert [parameter.name for parameter in parameters_of(type(crossings))] == ['level']
 
 

@@ -6,20 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_benchmarks.result import Bench
+from texture_benchmarks.result import BenchmarkOptions
 from texture_benchmarks.scenes import run as scenes
 from texture_benchmarks.scenes.trial import (
     ADDED,
     FRICTION,
     PATCH,
-    TOUCHINGS,
-    Difference,
-    Touching,
-    Worth,
+    TOUCH_PROTOCOLS,
+    MeanDifference,
+    TermEffect,
+    TouchProtocol,
     ablate,
     completed,
-    describe,
-    feel,
+    extract_features,
+    simulate_features,
     variants,
     with_one_more,
 )
@@ -27,7 +27,7 @@ from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.effects.noise import Noise
 from texture_simulation.scene import Scene, load_scene, scene_from
 
-TOUCHING = Touching((0.1,), (1.0, 8.0), duration_s=0.2)
+TOUCHING = TouchProtocol((0.1,), (1.0, 8.0), duration_s=0.2)
 
 
 def two_ridges(**effects: dict) -> Scene:
@@ -40,7 +40,7 @@ def two_ridges(**effects: dict) -> Scene:
 def test_every_band_holds_the_power_of_its_frequencies() -> None:
     time_s = np.arange(1000) / 1000
     tones = np.stack([np.sin(2 * np.pi * hertz * time_s) for hertz in (20.0, 200.0)])[..., None]
-    bands = describe(tones, 1000.0)
+    bands = extract_features(tones, 1000.0)
     edges_hz = np.geomspace(5.0, 500.0, bands.shape[1] + 1)
     for band, hertz in zip(bands.argmax(axis=1), (20.0, 200.0), strict=True):
         assert edges_hz[band] - 2 <= hertz <= edges_hz[band + 1] + 2
@@ -48,17 +48,17 @@ def test_every_band_holds_the_power_of_its_frequencies() -> None:
 
 def test_a_term_that_decides_is_found_and_one_that_does_nothing_is_idle() -> None:
     scene = two_ridges(noise={'fast_count': 300.0}, drift={'count_per_sqrt_s': 1e-6})
-    worths = {worth.term: worth for worth in ablate(scene, TOUCHING, 80, 4, 0).worths}
-    assert worths['noise'].easier.mean > 0.05
-    assert worths['noise'].verdict == 'decides'
-    assert abs(worths['drift'].unprepared.mean) < 0.05
+    term_effects = {term_effect.term: term_effect for term_effect in ablate(scene, TOUCHING, 80, 4, 0).term_effects}
+    assert term_effects['noise'].easier.mean > 0.05
+    assert term_effects['noise'].verdict == 'decides'
+    assert abs(term_effects['drift'].unprepared.mean) < 0.05
 
 
 def test_what_grows_with_the_force_stays_at_its_mean_when_removed_and_comes_back_the_same(monkeypatch) -> None:
     scene = two_ridges(patch_growth={})
     removed = variants(scene, TOUCHING)['patch_growth']
     assert removed.contact.blur_m == pytest.approx(scene.contact.blur_m * 4.5 ** (1 / 3))
-    monkeypatch.setattr('texture_benchmarks.scenes.trial.LEFT', {'ridges': dict(scene.effects)})
+    monkeypatch.setattr('texture_benchmarks.scenes.trial.REMOVED_EFFECTS', {'ridges': dict(scene.effects)})
     again = completed(removed, TOUCHING)
     assert again.effects == scene.effects
     assert again.contact.blur_m == pytest.approx(scene.contact.blur_m)
@@ -66,7 +66,7 @@ def test_what_grows_with_the_force_stays_at_its_mean_when_removed_and_comes_back
 
 def test_friction_and_the_patch_filter_can_be_removed_as_effects_can() -> None:
     scene = load_scene('sticky')
-    others = variants(scene, TOUCHINGS['sticky'])
+    others = variants(scene, TOUCH_PROTOCOLS['sticky'])
     assert set(others) == {*scene.effects, PATCH, FRICTION}
     assert all(surface.friction is None for surface in others[FRICTION].surfaces.values())
     assert others[PATCH].contact.blur_m < scene.contact.blur_m
@@ -74,24 +74,24 @@ def test_friction_and_the_patch_filter_can_be_removed_as_effects_can() -> None:
 
 def test_slides_follow_from_the_seed_and_are_dealt_out_to_fingers() -> None:
     scene = replace(two_ridges(), effects={'noise': Noise(5.0)})
-    first, again, other = (feel(scene, TOUCHING, 3, seed, (0, 1)) for seed in ([1], [1], [2]))
+    first, again, other = (simulate_features(scene, TOUCHING, 3, seed, (0, 1)) for seed in ([1], [1], [2]))
     assert np.array_equal(first.values, again.values)
     assert not np.array_equal(first.values, other.values)
     assert first.codes.tolist() == [0] * 6 + [1] * 6
 
 
 def test_a_difference_matters_if_it_is_certain_and_large() -> None:
-    assert Difference(0.02, 0.01).matters
-    assert not Difference(0.02, 0.03).matters
-    assert not Difference(0.002, 0.001).matters
-    nothing = Difference(0.0, 0.005)
-    assert Worth('quiet', nothing, nothing, Difference(-0.1, 0.01)).verdict == 'idle'
-    assert Worth('loud', nothing, Difference(-0.1, 0.01), nothing).verdict == 'decides'
-    assert Worth('unclear', Difference(0.003, 0.05), nothing, nothing).verdict == 'open'
+    assert MeanDifference(0.02, 0.01).matters
+    assert not MeanDifference(0.02, 0.03).matters
+    assert not MeanDifference(0.002, 0.001).matters
+    nothing = MeanDifference(0.0, 0.005)
+    assert TermEffect('quiet', nothing, nothing, MeanDifference(-0.1, 0.01)).verdict == 'idle'
+    assert TermEffect('loud', nothing, MeanDifference(-0.1, 0.01), nothing).verdict == 'decides'
+    assert TermEffect('unclear', MeanDifference(0.003, 0.05), nothing, nothing).verdict == 'open'
 
 
 def test_every_effect_is_named_by_a_scene_or_measured_by_itself() -> None:
-    scenes_of_all = [completed(load_scene(name), touching) for name, touching in TOUCHINGS.items()]
+    scenes_of_all = [completed(load_scene(name), touch_protocol) for name, touch_protocol in TOUCH_PROTOCOLS.items()]
     named = {effect for scene in scenes_of_all for effect in scene.effects}
     assert named | set(ADDED) == set(EFFECTS)
     assert not named & set(ADDED)
@@ -99,7 +99,7 @@ def test_every_effect_is_named_by_a_scene_or_measured_by_itself() -> None:
 
 
 def test_scenes_are_cheap_drive_devices_in_time_and_every_term_is_weighed(tmp_path: Path) -> None:
-    result = scenes.run(Bench(tmp_path, quick=True))
+    result = scenes.run(BenchmarkOptions(tmp_path, quick=True))
     numbers = result.numbers
     assert result.write(tmp_path).is_file()
     assert all(drawn.is_file() for drawn in result.charts)

@@ -10,58 +10,60 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.endurance import report
-from texture_benchmarks.endurance.books import SignalBook, Totals
-from texture_benchmarks.endurance.faults import FAULTS, strikes
-from texture_benchmarks.endurance.orders import orders
-from texture_benchmarks.endurance.pace import Pace, measure_pace
+from texture_benchmarks.endurance.accounting import SampleAccount, Totals
+from texture_benchmarks.endurance.endurance_record import EnduranceRecord, ExplorationRecord, FaultEvent
+from texture_benchmarks.endurance.faults import FAULTS, planned_faults
+from texture_benchmarks.endurance.machine_speed import MachineSpeed, measure_machine_speed
+from texture_benchmarks.endurance.planned_explorations import planned_explorations
 from texture_benchmarks.endurance.processes import Processes
-from texture_benchmarks.endurance.record import Explored, Record, Struck
-from texture_benchmarks.endurance.usage import Use, read_use
-from texture_benchmarks.endurance.verdict import judge, lives, unexplained_vectors
+from texture_benchmarks.endurance.requirements import check_requirements, lives, unexplained_vectors
+from texture_benchmarks.endurance.usage import ProcessUsage, read_usage
 
 HOUR_S = 3600
 MIB = 2**20
 
 
-def uses(node='bench', pid=1, end_s=HOUR_S, growth=0.0):
+def usages(node='emulator', pid=1, end_s=HOUR_S, growth=0.0):
     """Return looks at a process of 50 MiB that uses 20 % of a core and may grow evenly."""
     return [
-        Use(float(s), node, pid, int(50 * MIB * (1 + growth * s / end_s)), 20 * MIB, 0.2 * s, 8, 20)
+        ProcessUsage(float(s), node, pid, int(50 * MIB * (1 + growth * s / end_s)), 20 * MIB, 0.2 * s, 8, 20)
         for s in range(0, end_s + 1, 10)
     ]
 
 
 def explored(**changed):
     given = {'begin_s': 0.0, 'end_s': 2.0, 'motion': 'linear_slide', 'surface': 'glass', 'wanted': 'success'}
-    return Explored(**{**given, 'ending': 'success', 'message': 'the motion ended as asked', **changed})
+    return ExplorationRecord(**{**given, 'ending': 'success', 'message': 'the motion ended as asked', **changed})
 
 
 def record(**changed):
     given = {
-        'begin_s': 0.0, 'end_s': float(HOUR_S), 'seed': 0, 'explored': [explored()], 'struck': [], 'uses': uses(),
-        'paces': [], 'totals': {}, 'signal': SignalBook(), 'vectors': 10, 'unanswered': {}, 'said': [], 'ends': [],
-        'trouble': '',
+        'begin_s': 0.0, 'end_s': float(HOUR_S), 'seed': 0, 'explored': [explored()], 'fault_events': [],
+        'usages': usages(),
+        'machine_speeds': [], 'totals': {},
+        'signal': SampleAccount(), 'vectors': 10, 'unanswered': {}, 'said': [], 'ends': [],
+        'ended_early_by': '',
     }  # fmt: skip
-    return Record(**{**given, **changed})
+    return EnduranceRecord(**{**given, **changed})
 
 
 def failed(**changed):
     """Return what does not hold."""
-    return [verdict.asked for verdict in judge(record(**changed)) if not verdict.holds]
+    return [result.asked for result in check_requirements(record(**changed)) if not result.holds]
 
 
 def test_the_same_seed_gives_the_same_faults_and_all_kinds_come() -> None:
-    first, second = (list(islice(strikes(np.random.default_rng(3), 20.0), 300)) for _ in range(2))
+    first, second = (list(islice(planned_faults(np.random.default_rng(3), 20.0), 300)) for _ in range(2))
     assert first == second
-    assert {strike.name for strike in first} == set(FAULTS)
-    assert np.mean([strike.quiet_s for strike in first]) == pytest.approx(20.0, rel=0.2)
+    assert {planned_fault.name for planned_fault in first} == set(FAULTS)
+    assert np.mean([planned_fault.quiet_s for planned_fault in first]) == pytest.approx(20.0, rel=0.2)
 
 
 def test_orders_are_possible_but_for_those_meant_to_be_refused() -> None:
-    given = list(islice(orders(np.random.default_rng(0), ['glass', 'leather']), 300))
-    speeds = [order.request.speed_m_s for order in given if not order.mistaken]
+    given = list(islice(planned_explorations(np.random.default_rng(0), ['glass', 'leather']), 300))
+    speeds = [order.request.speed_m_s for order in given if not order.invalid_on_purpose]
     assert 0.02 < min(speeds) < max(speeds) < 0.25
-    assert any(order.mistaken for order in given)
+    assert any(order.invalid_on_purpose for order in given)
     assert any(order.stop_after_s > 0 for order in given)
     assert {order.request.surface for order in given} == {'glass', 'leather'}
 
@@ -74,7 +76,7 @@ def test_counters_are_added_up_over_the_lives_of_a_node() -> None:
 
 
 def test_the_book_of_samples_knows_losses_and_new_beginnings() -> None:
-    book = SignalBook()
+    book = SampleAccount()
     for index, stamp_ms in ((0, 0), (10, 10), (30, 30), (0, 540)):
         book.update(index, 10, stamp_ms * 1_000_000, 1000.0)
     assert (book.samples, book.gaps, book.restarts) == (40, 10, 1)
@@ -96,11 +98,11 @@ def test_processes_are_known_from_the_output_of_the_launcher(tmp_path) -> None:
 
 
 def test_what_this_process_uses_is_read_and_one_that_has_ended_uses_nothing() -> None:
-    own = read_use('test', os.getpid(), 1.0)
+    own = read_usage('test', os.getpid(), 1.0)
     assert own.resident_bytes > own.own_bytes > MIB
     assert own.cpu_s > 0
     assert own.threads > 0
-    assert read_use('none', 2**22 + 1, 1.0) is None
+    assert read_usage('none', 2**22 + 1, 1.0) is None
 
 
 def test_a_calm_hour_holds_everything() -> None:
@@ -113,10 +115,10 @@ def test_a_calm_hour_holds_everything() -> None:
         ({'explored': [explored(end_s=80.0)]}, 'every exploration ends'),
         ({'explored': [explored(ending='aborted', message='')]}, 'every abort is named'),
         ({'explored': [explored(ending='aborted', message='why')]}, 'every abort is named'),
-        ({'struck': [Struck('bench frozen', 5.0, 6.0, math.nan, '')]}, 'after every fault'),
+        ({'fault_events': [FaultEvent('emulator frozen', 5.0, 6.0, math.nan, '')]}, 'after every fault'),
         ({'ends': ['sensor died with exit code 1']}, 'no process ends'),
-        ({'uses': uses(growth=0.05)}, 'memory of each process'),
-        ({'trouble': 'it was interrupted'}, 'the run goes to its end'),
+        ({'usages': usages(growth=0.05)}, 'memory of each process'),
+        ({'ended_early_by': 'it was interrupted'}, 'the run goes to its end'),
         ({'unanswered': {'a': 1}, 'explored': [explored(exploration_id='a')]}, 'every feature vector'),
     ],
 )
@@ -125,25 +127,27 @@ def test_what_does_not_hold_is_named(changed, asked) -> None:
 
 
 def test_computing_time_that_rises_is_seen() -> None:
-    rising = [Use(use.time_s, 'bench', 1, MIB, MIB, 1e-4 * use.time_s**2, 8, 20) for use in uses()]
-    assert failed(uses=rising) == ['computing time is flat']
+    rising = [ProcessUsage(use.time_s, 'emulator', 1, MIB, MIB, 1e-4 * use.time_s**2, 8, 20) for use in usages()]
+    assert failed(usages=rising) == ['computing time is flat']
 
 
 def test_a_machine_that_grows_slower_is_not_taken_for_computing_time_that_rises() -> None:
-    slower = [Pace(use.time_s, 0.01 + 2e-6 * use.time_s) for use in uses()]
-    work_s = np.cumsum([0.2 * 10 * pace.work_s / 0.01 for pace in slower])
-    same_work = [replace(use, cpu_s=float(s)) for use, s in zip(uses(), work_s, strict=True)]
-    assert failed(uses=same_work) == ['computing time is flat']
-    assert failed(uses=same_work, paces=slower) == []
-    assert failed(paces=[replace(pace, work_s=1e-4 / pace.work_s) for pace in slower]) == ['computing time is flat']
+    slower = [MachineSpeed(use.time_s, 0.01 + 2e-6 * use.time_s) for use in usages()]
+    work_s = np.cumsum([0.2 * 10 * machine_speed.work_s / 0.01 for machine_speed in slower])
+    same_work = [replace(use, cpu_s=float(s)) for use, s in zip(usages(), work_s, strict=True)]
+    assert failed(usages=same_work) == ['computing time is flat']
+    assert failed(usages=same_work, machine_speeds=slower) == []
+    assert failed(
+        machine_speeds=[replace(machine_speed, work_s=1e-4 / machine_speed.work_s) for machine_speed in slower]
+    ) == ['computing time is flat']
 
 
 def test_the_fixed_piece_of_work_takes_some_milliseconds_of_this_thread() -> None:
-    assert 1e-4 < measure_pace(0.0).work_s < 1.0
+    assert 1e-4 < measure_machine_speed(0.0).work_s < 1.0
 
 
 def test_samples_that_nobody_counted_are_seen() -> None:
-    book = SignalBook()
+    book = SampleAccount()
     book.update(0, 10, 0, 1000.0)
     book.update(60, 10, 60_000_000, 1000.0)
     assert failed(signal=book) == ['every lost sample is counted']
@@ -151,7 +155,7 @@ def test_samples_that_nobody_counted_are_seen() -> None:
 
 
 def test_an_abort_during_a_fault_and_one_that_was_asked_for_are_explained() -> None:
-    assert failed(explored=[explored(ending='aborted', message='why', faults=('bench frozen',))]) == []
+    assert failed(explored=[explored(ending='aborted', message='why', faults=('emulator frozen',))]) == []
     assert failed(explored=[explored(ending='aborted', message='why', wanted='aborted')]) == []
 
 
@@ -167,16 +171,21 @@ def test_vectors_that_a_killed_classifier_did_not_answer_are_explained() -> None
 
 
 def test_a_process_that_lived_for_minutes_only_is_not_judged_by_its_memory() -> None:
-    assert lives(uses(end_s=400)) == []
-    assert len(lives([*uses(end_s=400), *uses(pid=2)])) == 1
+    assert lives(usages(end_s=400)) == []
+    assert len(lives([*usages(end_s=400), *usages(pid=2)])) == 1
 
 
 def test_the_report_has_a_page_a_chart_and_figures(tmp_path) -> None:
-    struck = [Struck('bench frozen', 5.0, 6.0, 7.5, 'for 1 s'), Struck('sensor unplugged', 9.0, math.inf, math.inf, '')]
-    page, figures, events, chart = report.write(record(struck=struck, said=[('sensor', 'WARN', 'gone', 3)]), tmp_path)
+    fault_events = [
+        FaultEvent('emulator frozen', 5.0, 6.0, 7.5, 'for 1 s'),
+        FaultEvent('sensor unplugged', 9.0, math.inf, math.inf, ''),
+    ]
+    page, figures, events, chart = report.write(
+        record(fault_events=fault_events, said=[('sensor', 'WARN', 'gone', 3)]), tmp_path
+    )
     text = page.read_text()
-    assert '| bench frozen | 1 | 1.5 | 1.5 |' in text
+    assert '| emulator frozen | 1 | 1.5 | 1.5 |' in text
     assert '| sensor | WARN | gone | 3 |' in text
-    assert json.loads(figures.read_text())['recovery_s']['bench frozen']['times'] == 1
+    assert json.loads(figures.read_text())['recovery_s']['emulator frozen']['times'] == 1
     assert len(json.loads(events.read_text())['faults']) == 2
     assert chart.read_bytes().startswith(b'\x89PNG')

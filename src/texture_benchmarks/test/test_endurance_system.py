@@ -9,8 +9,8 @@ pytestmark = pytest.mark.ros
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_benchmarks.endurance import run  # noqa: E402
-from texture_benchmarks.endurance.faults import Strike  # noqa: E402
-from texture_benchmarks.endurance.record import LOST  # noqa: E402
+from texture_benchmarks.endurance.endurance_record import LOST  # noqa: E402
+from texture_benchmarks.endurance.faults import PlannedFault  # noqa: E402
 from texture_bringup.ros import operator as operators  # noqa: E402
 from texture_evaluation.train import train_from_bags  # noqa: E402
 from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
@@ -29,15 +29,17 @@ def model(tmp_path):
 
 
 def test_a_killed_explorer_comes_back_and_every_exploration_ends_with_a_reason(model, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(run, 'AFTERMATH_S', 0.0)
-    monkeypatch.setattr(operators, 'ASK_AGAIN_S', 1.0)
+    monkeypatch.setattr(run, 'RECOVERY_S', 0.0)
+    monkeypatch.setattr(operators, 'RETRY_PERIOD_S', 1.0)
     monkeypatch.setattr(operators, 'ACCEPT_S', 5.0)
-    faults = [Strike(name, 0.5, 0.5, 0.0) for name in FAULTS]
-    record = run.endure(run.Plan(DEADLINE_S, model=model, settle_s=1.0), tmp_path / 'nodes.log', lambda _: None, faults)
-    told = (tmp_path / 'nodes.log').read_text()
-    assert record.trouble == '', told
-    assert [item.name for item in record.struck] == list(FAULTS)
-    assert all(np.isfinite(item.back_s) for item in record.struck), told
+    faults = [PlannedFault(name, 0.5, 0.5, 0.0) for name in FAULTS]
+    record = run.endure(
+        run.EndurancePlan(DEADLINE_S, model=model, settle_s=1.0), tmp_path / 'nodes.log', lambda _: None, faults
+    )
+    reported = (tmp_path / 'nodes.log').read_text()
+    assert record.ended_early_by == '', reported
+    assert [item.name for item in record.fault_events] == list(FAULTS)
+    assert all(np.isfinite(item.back_s) for item in record.fault_events), reported
     assert record.ends == ['explorer was killed by SIGKILL']
     assert all(item.message for item in record.explored)
     assert all(item.faults for item in record.explored if item.ending == LOST)

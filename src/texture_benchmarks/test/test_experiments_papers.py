@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.papers import PROTOCOLS, Experiment, report, run_experiment
-from texture_benchmarks.papers.check import at_least, higher, lower_in, most_errors, seldom
-from texture_benchmarks.papers.gather import gather
+from texture_benchmarks.papers.claim_checks import at_least, higher, lower_in, most_errors, seldom
 from texture_benchmarks.papers.interval import apart, mean, share
-from texture_benchmarks.papers.outcome import Outcome
-from texture_benchmarks.papers.protocol import Protocol, drawn, folds, halves, learnt_in
-from texture_benchmarks.papers.trial import judge, outcomes, recipe_of, reduced
+from texture_benchmarks.papers.method_result import MethodResult
+from texture_benchmarks.papers.protocol import Protocol, drawn, folds, halves, training_in
+from texture_benchmarks.papers.simulated_trials import gather
+from texture_benchmarks.papers.trial import evaluate_method, outcomes, recipe_of, reduced
 from texture_core.errors import InvalidParameter, UnknownName
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search.fitness import UNDECIDED
@@ -21,9 +21,9 @@ CONDITIONS = np.where(np.arange(60) % 2 == 0, 'slow', 'fast')
 SURFACES = ('cork', 'felt', 'linen')
 
 
-def outcome(decided: list[int] | np.ndarray) -> Outcome:
-    none_learnt = np.zeros((1, 60), dtype=bool)
-    return Outcome(SURFACES, CODES, CONDITIONS, np.array(decided)[None], none_learnt, 0.0)
+def outcome(decided: list[int] | np.ndarray) -> MethodResult:
+    none_training = np.zeros((1, 60), dtype=bool)
+    return MethodResult(SURFACES, CODES, CONDITIONS, np.array(decided)[None], none_training, 0.0)
 
 
 @pytest.mark.parametrize('protocol', PROTOCOLS, ids=lambda protocol: protocol.name)
@@ -74,13 +74,13 @@ def test_two_directions_are_joined_into_one_vector_with_components_of_their_own(
     task = reduced(protocol.tasks[0], 4)
     slides = gather(load_scene(protocol.scene), task, 0, slow=False)
     both, x_only, y_only = (recipe_of(method) for method in task.methods[:3])
-    values, owner = slides.describe(both.feature_set, task.methods[0].views)
+    values, owner = slides.extract(both.feature_set, task.methods[0].views)
     assert values.shape == (20, 2 * 12_288)  # one vector a place
     assert len(np.unique(owner)) == 20
-    halves_of = [slides.describe(recipe.feature_set, task.methods[place].views)[0] for place, recipe in
+    halves_of = [slides.extract(recipe.feature_set, task.methods[place].views)[0] for place, recipe in
                  ((1, x_only), (2, y_only))]  # fmt: skip
     np.testing.assert_array_equal(values, np.concatenate(halves_of, axis=1))
-    kept = [recipe.learner.fit(own, slides.codes, owner).parts['components'].shape[1]
+    kept = [recipe.learner.fit(own, slides.codes, owner).parameters['components'].shape[1]
             for recipe, own in ((both, values), (x_only, halves_of[0]), (y_only, halves_of[1]))]  # fmt: skip
     assert kept[0] == kept[1] + kept[2]  # the paper: 39 and 39 make 78
 
@@ -90,8 +90,8 @@ def test_every_paper_figure_is_a_share_and_every_table_has_a_row_for_each_surfac
         for task in protocol.tasks:
             surfaces = task.surfaces or tuple(load_scene(protocol.scene).surfaces)
             for method in task.methods:
-                told = [method.paper.learning, method.paper.test, method.paper.unclassified]
-                assert all(0 <= value <= 1 for value in told if value is not None)
+                reported = [method.paper.learning, method.paper.test, method.paper.unclassified]
+                assert all(0 <= value <= 1 for value in reported if value is not None)
                 if method.confusion is not None:
                     assert len(method.confusion) == len(surfaces)
                     assert {len(row) - len(surfaces) for row in method.confusion} <= {0, 1}
@@ -104,7 +104,7 @@ def test_divisions_keep_to_the_papers_split() -> None:
     assert parts.shape == (20, 60)
     assert (~parts[:10]).sum(axis=0).tolist() == [1] * 60  # each slide is held out once a round
     assert drawn(2 / 3, 5)(CODES, CONDITIONS, rng, False).sum(axis=1).tolist() == [40] * 5
-    assert (learnt_in('slow')(CODES, CONDITIONS, rng, False)[0] == (CONDITIONS == 'slow')).all()
+    assert (training_in('slow')(CODES, CONDITIONS, rng, False)[0] == (CONDITIONS == 'slow')).all()
 
 
 def test_a_slide_is_the_same_whatever_else_a_task_holds() -> None:
@@ -156,7 +156,7 @@ def test_a_method_that_cannot_fail_recognises_all_it_learnt() -> None:
     protocol = next(protocol for protocol in PROTOCOLS if protocol.name == 'jamali')
     task = reduced(protocol.tasks[0], 6)
     slides = gather(load_scene(protocol.scene), task, 0, slow=False)
-    found = judge(recipe_of(task.methods[2]), slides, np.ones((1, len(slides.codes)), dtype=bool))
+    found = evaluate_method(recipe_of(task.methods[2]), slides, np.ones((1, len(slides.codes)), dtype=bool))
     assert found.learning is not None
     assert found.learning > 0.8
     assert (found.decided != UNDECIDED).all()

@@ -1,8 +1,8 @@
 import numpy as np
 
-from texture_benchmarks.robustness.retime import retimed
+from texture_benchmarks.robustness.speed_resampling import at_other_speed
 from texture_benchmarks.speed_force.held_out import Mask, one_out, recognised, run_chosen
-from texture_benchmarks.speed_force.turns import TurnFree
+from texture_benchmarks.speed_force.nuisance_projection import NuisanceProjection
 from texture_estimation.learners.svm_rbf import SvmRbf
 
 SPEEDS = np.repeat([20.0, 40.0, 60.0], 4)
@@ -43,8 +43,8 @@ def test_a_rehearsal_judges_in_the_training_and_the_candidate_is_tested() -> Non
     def right(train: Mask, test: Mask) -> Mask:
         return np.ones(test.sum(), dtype=bool)
 
-    rehearsals = {'first': wrong, 'second': right}
-    outcome = run_chosen({'first': right, 'second': wrong}, one_out(SPEEDS), [SPEEDS], rehearsals)
+    inner_trials = {'first': wrong, 'second': right}
+    outcome = run_chosen({'first': right, 'second': wrong}, one_out(SPEEDS), [SPEEDS], inner_trials)
     assert set(outcome.chosen.values()) == {'second'}
     assert outcome.pooled == 0.0
 
@@ -64,9 +64,9 @@ def test_a_slide_at_twice_the_speed_is_half_as_long_and_its_waves_twice_as_fast(
     seconds = np.arange(400) / RATE_HZ
     wave = np.sin(2 * np.pi * 5.0 * seconds)[:, None]
     np.testing.assert_allclose(
-        retimed(wave, 0.02, 0.04)[20:-20, 0], np.sin(2 * np.pi * 10.0 * seconds[:200])[20:-20], atol=0.01
+        at_other_speed(wave, 0.02, 0.04)[20:-20, 0], np.sin(2 * np.pi * 10.0 * seconds[:200])[20:-20], atol=0.01
     )
-    assert len(retimed(wave, 0.04, 0.02)) == 800
+    assert len(at_other_speed(wave, 0.04, 0.02)) == 800
 
 
 def test_what_a_turn_does_to_the_load_is_taken_out_and_the_rest_stays() -> None:
@@ -74,6 +74,6 @@ def test_what_a_turn_does_to_the_load_is_taken_out_and_the_rest_stays() -> None:
     turn, texture = np.eye(4)[0], np.eye(4)[1]
     starts = rng.normal(size=(30, 1)) * texture
     steady = starts + rng.uniform(0.5, 1.0, (30, 1)) * turn
-    free = TurnFree.learnt(starts, steady)
+    free = NuisanceProjection.fit(starts, steady)
     np.testing.assert_allclose(free(steady), starts, atol=1e-12)
-    np.testing.assert_array_equal(TurnFree.learnt(starts, steady, energy=0.0)(steady), steady)
+    np.testing.assert_array_equal(NuisanceProjection.fit(starts, steady, energy=0.0)(steady), steady)

@@ -15,8 +15,8 @@ from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.node_process import NodeProcess
 from texture_core.ros.conversions import to_msg
-from texture_estimation.model import Model, load_model
-from texture_evaluation.evaluate import judge
+from texture_estimation.model import TextureModel, load_model
+from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import cut_slides
 from texture_recordings.importers.biotac20 import import_biotac20
@@ -28,19 +28,19 @@ DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4
 Estimates = dict[str, list[TextureEstimate]]
 
 
-def offline(model: Model, bags: Path, slides: str) -> Estimates:
+def offline(model: TextureModel, bags: Path, slides: str) -> Estimates:
     cut = cut_slides(find_slides([bags], slides), model.recipe.feature_set)
-    return {slide.exploration_id: judge(model, pieces)[1] for slide, pieces in cut}
+    return {slide.exploration_id: run_model(model, events)[1] for slide, events in cut}
 
 
 def live(model: Path, bags: Path, slides: str, rate: float, domain_id: int) -> tuple[Estimates, dict[str, str]]:
     """Return the estimates of the running nodes and the last numbers of the feature extractor's diagnosis."""
-    heard: defaultdict[str, list[TextureEstimate]] = defaultdict(list)
+    received: defaultdict[str, list[TextureEstimate]] = defaultdict(list)
     health: dict[str, str] = {}
     wanted = {slide.exploration_id for slide in find_slides([bags], slides)}
 
     def on_estimate(estimate: TextureEstimate) -> None:
-        heard[estimate.exploration_id].append(estimate)
+        received[estimate.exploration_id].append(estimate)
 
     def node(package: str, name: str, **parameters: object) -> NodeProcess:
         return NodeProcess(package, name, parameters, domain_id=domain_id)
@@ -52,18 +52,18 @@ def live(model: Path, bags: Path, slides: str, rate: float, domain_id: int) -> t
     ):
         graph.listen('texture', on_estimate)
         graph.listen('diagnostics', reader_of(health))
-        call_through(graph, heard)
+        call_through(graph, received)
         with node(
             'texture_recordings', 'replay', bag=str(bags), slides=slides, rate=rate, start_delay_s=2.0, deadline_s=60.0
         ) as replay:
-            graph.wait_until(lambda: wanted <= ended(heard), 120.0, 'the final estimates')
+            graph.wait_until(lambda: wanted <= ended(received), 120.0, 'the final estimates')
             assert replay.wait(60.0) == 0, replay.output
         counted = health.copy()
         graph.wait_until(lambda: health != counted, 30.0, 'a diagnosis after the last window')
-    return {name: estimates for name, estimates in heard.items() if name in wanted}, health
+    return {name: estimates for name, estimates in received.items() if name in wanted}, health
 
 
-def call_through(graph: Graph, heard: Estimates) -> None:
+def call_through(graph: Graph, received: Estimates) -> None:
     """Wait until an empty slide is answered: only then has every node found the next one."""
     states = graph.publisher('exploration')
     calls = count()
@@ -72,15 +72,15 @@ def call_through(graph: Graph, heard: Estimates) -> None:
         name = f'call {next(calls)}'
         for phase in (Phase.SLIDE, Phase.DONE):
             states.publish(to_msg(ExplorationState(time.time_ns(), name, '', phase)))
-        return bool(heard)
+        return bool(received)
 
     graph.wait_until(answered, 60.0, 'the answer to an empty slide')
     graph.spin(0.5)
-    heard.clear()
+    received.clear()
 
 
-def ended(heard: Estimates) -> set[str]:
-    return {name for name, estimates in heard.items() if estimates[-1].final}
+def ended(received: Estimates) -> set[str]:
+    return {name for name, estimates in received.items() if estimates[-1].final}
 
 
 def reader_of(health: dict[str, str]) -> Callable[[object], None]:

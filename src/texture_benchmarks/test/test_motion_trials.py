@@ -61,8 +61,8 @@ def test_a_bump_of_two_millimetres_is_followed():
 # slope is not fed forward while the finger gains speed: the force rises higher then, but settles before the slide.
 @pytest.mark.parametrize(('share', 'most'), [(0.7, 0.2), (0.8, 0.2), (1.2, 0.2), (1.4, 0.35)])
 def test_a_stiffness_that_was_measured_wrongly_does_no_harm(share, most, monkeypatch):
-    felt = StiffnessEstimate._slope
-    monkeypatch.setattr(StiffnessEstimate, '_slope', lambda self: share * felt(self))
+    measured = StiffnessEstimate._slope
+    monkeypatch.setattr(StiffnessEstimate, '_slope', lambda self: share * measured(self))
     overshoot, rms, _ = slide(20000.0, tilt_rad=TILT)
     assert overshoot < most
     assert rms < 0.05

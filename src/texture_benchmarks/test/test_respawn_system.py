@@ -42,7 +42,7 @@ def model(tmp_path):
     return tmp_path / 'model.json'
 
 
-def as_shipped(file='bench'):
+def as_shipped(file='emulator'):
     """Return how the launch file has the classifier started again."""
     return re.search(r'exec="classifier".*?(respawn=".*?" respawn_delay=".*?")>', find_launch_file(file).read_text())[1]
 
@@ -54,24 +54,24 @@ def times_to_be_ready_again(model, folder, kills):
     known = load_model(model)
     vector = FeatureVector(0, 'a', 0.5, 0.1, known.names, np.zeros(len(known.names)), feature_set=known.feature_set)
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
-    heard = []
+    received = []
     with ChildLauncher(str(launch), {}, environment, folder / 'log', together=False), Graph(DOMAIN) as graph:
-        graph.listen('texture', heard.append)
+        graph.listen('texture', received.append)
         features = graph.publisher('features')
 
         def answered() -> bool:
             features.publish(to_msg(vector))
             graph.spin(PERIOD_S)
-            return bool(heard)
+            return bool(received)
 
         graph.wait_until(answered, DEADLINE_S, 'estimates')
-        assert heard[-1].model
+        assert received[-1].model
         times_s = []
         for _ in range(kills):
             graph.spin(1.0)  # what is under way
             os.kill(Processes(folder / 'log').update()['classifier'], signal.SIGKILL)
             began_s = time.monotonic()
-            heard.clear()
+            received.clear()
             graph.wait_until(answered, DEADLINE_S, 'estimates')
             times_s.append(time.monotonic() - began_s)
     return times_s

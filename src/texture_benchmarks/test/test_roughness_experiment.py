@@ -5,10 +5,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from texture_benchmarks.catalogue import run_bench
+from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.papers import Experiment, run_experiment
 from texture_benchmarks.papers.roughness_answers import Answers
-from texture_benchmarks.result import Bench
+from texture_benchmarks.result import BenchmarkOptions
 from texture_estimation.roughness.recipe import load_roughness_recipe
 
 
@@ -21,10 +21,10 @@ def outcome(tmp_path_factory):
 
 def test_ours_grades_textures_never_measured_better_than_the_papers_heads_and_than_always_three(outcome) -> None:
     numbers = outcome[0].numbers
-    errors = {name: parts['unseen']['error'] for name, parts in numbers['heads'].items()}
+    errors = {name: parts['unseen']['error'] for name, parts in numbers['regressors'].items()}
     assert min(errors, key=errors.get) == 'ours'
     assert errors['ours'] <= numbers['targets']['ours_unseen']
-    assert numbers['heads']['ours']['left_out']['error'] <= numbers['targets']['ours_left_out']
+    assert numbers['regressors']['ours']['left_out']['error'] <= numbers['targets']['ours_left_out']
     assert errors['ours'] < numbers['always_the_middle']['unseen']
     other = numbers['other_conditions_unseen']['ours']
     assert max(other[f'{speed} m/s, 2.5 N']['error'] for speed in ('0.10', '0.20')) <= 0.9
@@ -48,7 +48,7 @@ def test_the_search_writes_recipes_that_can_be_learnt_by(outcome) -> None:
     result, out = outcome
     assert set(result.numbers['tuning']) == {'ANN1', 'ANN5', 'SVM5'}
     recipe = load_roughness_recipe(str(out / 'ets-roughness-svm5.yaml'))
-    assert 0.01 <= recipe.head.c <= 10.0
+    assert 0.01 <= recipe.regressor.c <= 10.0
 
 
 def test_a_missing_grade_is_counted_apart_and_each_texture_is_one_opinion() -> None:
@@ -67,6 +67,6 @@ def test_a_missing_grade_is_counted_apart_and_each_texture_is_one_opinion() -> N
 
 
 def test_a_grade_takes_less_than_ten_times_what_is_asked_even_on_a_busy_machine(tmp_path: Path) -> None:
-    result, path = run_bench('roughness', Bench(tmp_path, quick=True))
+    result, path = run_benchmark('roughness', BenchmarkOptions(tmp_path, quick=True))
     assert path.is_file()
     assert 0.0 < result.numbers['ours']['median_us'] < 10 * result.numbers['target_us']

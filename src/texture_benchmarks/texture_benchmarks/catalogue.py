@@ -18,7 +18,7 @@ from texture_benchmarks.motion import run as motion
 from texture_benchmarks.next_motion import run as next_motion
 from texture_benchmarks.optimise import run as optimise
 from texture_benchmarks.recipes import run as recipes
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.robustness import run as robustness
 from texture_benchmarks.roughness import run as roughness
 from texture_benchmarks.scenes import run as scenes
@@ -28,20 +28,20 @@ from texture_benchmarks.speed_force import run as speed_force
 from texture_benchmarks.stick_slip import run as stick_slip
 from texture_core.catalogue import find
 
-BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
+BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
     'recipes_later': recipes.run_later,  # the same on the vibration of slides of a later time alone
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
-    'ablation': ablation.run,  # which features, numbers, units and channels are worth their time, recorded
+    'ablation': ablation.run,  # which features, numbers, units and channels contribute their time, recorded
     'decisions': decisions.run,  # early decisions, calibration, candidates and unknown surfaces, recorded
-    'speed_force': speed_force.run,  # speeds, forces and directions that were not taught, recorded
+    'speed_force': speed_force.run,  # speeds, forces and directions that were not in the training set, recorded
     'roughness': roughness.run,  # from window to grade
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
     'optimise': optimise.run,  # genetic searches of the papers' size, linear experiment: time, convergence
     'optimise_large': optimise.run_large,  # all of them, and the fronts of accuracy and computing; not in `all`
-    'learning': learning.run,  # taught slide by slide against trained anew on the same slides
+    'learning': learning.run,  # trained slide by slide against trained anew on the same slides
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates
@@ -49,12 +49,12 @@ BENCHES: Mapping[str, Callable[[Bench], BenchResult]] = {
     'segmentation': segmentation.run,  # start and end of sliding, found from the signals alone
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'next_motion': next_motion.run,  # slides needed with motions chosen for what they tell, simulated
-    'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene is worth
+    'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
     'stick_slip': stick_slip.run,  # cost, error and longest step of simulated friction
 }
 
 
-def run_bench(name: str, bench: Bench) -> tuple[BenchResult, Path]:
+def run_benchmark(name: str, options: BenchmarkOptions) -> tuple[BenchmarkResult, Path]:
     """Run one benchmark; return its result and the JSON file, beside which its charts lie.
 
     Raises
@@ -62,5 +62,5 @@ def run_bench(name: str, bench: Bench) -> tuple[BenchResult, Path]:
     TextureError
         If there is no such benchmark or its data is missing.
     """
-    result = find(BENCHES, name, 'benchmark')(bench)
-    return result, result.write(bench.out)
+    result = find(BENCHMARKS, name, 'benchmark')(options)
+    return result, result.write(options.out)

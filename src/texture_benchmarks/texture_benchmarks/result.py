@@ -16,7 +16,7 @@ CPU_INFO = Path('/proc/cpuinfo')
 
 
 @dataclass(frozen=True)
-class Bench:
+class BenchmarkOptions:
     """Where a benchmark writes, where recorded data lies, and whether to hurry.
 
     Parameters
@@ -60,7 +60,7 @@ class Bench:
 
 
 @dataclass(frozen=True)
-class BenchResult:
+class BenchmarkResult:
     """The numbers of one benchmark, and in one line each what was measured on what."""
 
     name: str

@@ -9,7 +9,7 @@ from contextlib import nullcontext
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 
-from texture_estimation.search.spread import one_thread_each
+from texture_estimation.search.parallel import single_blas_thread
 
 Act = Callable[[str], int]  # runs a benchmark by its name and returns the exit code of its process
 
@@ -66,5 +66,5 @@ def in_processes(names: Sequence[str], act: Act, at_once: int) -> dict[str, int]
 
 
 def _run(name: str, act: Act, at_once: int) -> None:
-    with one_thread_each() if at_once > 1 else nullcontext():
+    with single_blas_thread() if at_once > 1 else nullcontext():
         raise SystemExit(act(name))

@@ -81,16 +81,16 @@ def test_every_sub_command_explains_itself(name, capsys) -> None:
 
 
 def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
-    assert main(['launch', 'bench', '--show-args']) == 0
+    assert main(['launch', 'emulator', '--show-args']) == 0
     assert 'surface:=glass' in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
-        (['launch', 'bnech'], "no launch file 'bnech'; did you mean 'bench'?"),
-        (['launch', 'bench', 'surfcae:=glass'], "did you mean 'surface'?"),
-        (['launch', 'bench', 'surface'], 'write NAME:=VALUE'),
+        (['launch', 'emulatr'], "no launch file 'emulatr'; did you mean 'emulator'?"),
+        (['launch', 'emulator', 'surfcae:=glass'], "did you mean 'surface'?"),
+        (['launch', 'emulator', 'surface'], 'write NAME:=VALUE'),
         (['launch', 'replay'], 'give bag:=VALUE'),
         (['scene', 'ets_lnear'], "no scene 'ets_lnear'; did you mean 'ets_linear'?"),
         (['scene', 'hu', 'linen_9'], 'Known: linen_1, linen_2, linen_3, linen_4, linen_5'),

@@ -5,8 +5,8 @@ import pytest
 
 from texture_bringup.dashboard.feed import BINS, POINTS, Feed
 from texture_bringup.dashboard.history import MAX_EXPLORATIONS, MAX_FRAMES, History
-from texture_bringup.dashboard.lights import MAX_LIGHTS, SILENT_S, Lights
 from texture_bringup.dashboard.motions import DEFAULTS, offered
+from texture_bringup.dashboard.node_status import MAX_LIGHTS, SILENT_S, NodeStatuses
 from texture_bringup.dashboard.ring import Ring, envelope, spectrum_db
 from texture_bringup.dashboard.taxels import places_of
 from texture_core.errors import MotionRefused
@@ -129,14 +129,17 @@ def test_the_history_is_bounded_however_many_and_however_long_the_explorations_a
 
 
 def test_a_failing_node_and_a_silent_one_are_red() -> None:
-    lights = Lights()
-    lights.update('sensor', 'ERROR', 'unplugged', 0.0)
-    lights.update('explorer', 'OK', 'the arm answers', 0.0)
-    assert {light['name']: light['colour'] for light in lights.shown(1.0)} == {'sensor': 'red', 'explorer': 'green'}
-    assert {light['colour'] for light in lights.shown(SILENT_S + 1)} == {'red'}
+    node_statuses = NodeStatuses()
+    node_statuses.update('sensor', 'ERROR', 'unplugged', 0.0)
+    node_statuses.update('explorer', 'OK', 'the arm answers', 0.0)
+    assert {light['name']: light['colour'] for light in node_statuses.shown(1.0)} == {
+        'sensor': 'red',
+        'explorer': 'green',
+    }
+    assert {light['colour'] for light in node_statuses.shown(SILENT_S + 1)} == {'red'}
     for number in range(200):
-        lights.update(f'node{number}', 'OK', 'x' * 10_000, 2.0)
-    assert len(lights.shown(2.0)) == MAX_LIGHTS
+        node_statuses.update(f'node{number}', 'OK', 'x' * 10_000, 2.0)
+    assert len(node_statuses.shown(2.0)) == MAX_LIGHTS
 
 
 @pytest.mark.parametrize('motion', MOTIONS)

@@ -30,7 +30,7 @@ class Nodes:
         self.asked.append(asked)
         return {'success': True, 'message': 'nothing is moving'}
 
-    learn = record = stop
+    add = record = stop
 
     async def offered(self):
         return {'linear_slide': []}

@@ -29,7 +29,7 @@ from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa
 
 DOMAIN = 90
 DEADLINE_S = 90.0
-NODES = {'bench', 'sensor', 'explorer', 'feature_extractor', 'classifier', 'dashboard'}
+NODES = {'emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier', 'dashboard'}
 SURFACES = ('glass', 'ridge_2mm_deep')
 CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'google-chrome'))), None)
 # Slow enough that there is time to press stop on a busy machine.
@@ -152,7 +152,7 @@ def address(folder):
     }
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
     page = {'dashboard': 'true', 'dashboard_port': port}
-    with ChildLauncher('bench', {**given, **page}, environment, folder / 'nodes.log') as launcher:
+    with ChildLauncher('emulator', {**given, **page}, environment, folder / 'nodes.log') as launcher:
         wait_for_page(f'http://127.0.0.1:{port}/', launcher)
         yield f'http://127.0.0.1:{port}/'
 
@@ -182,7 +182,7 @@ def opened(address, **context):
             page.set_default_timeout(DEADLINE_S * 1000)
             errors = []
             page.on('pageerror', lambda error: errors.append(str(error)))
-            page.on('console', lambda told: errors.append(told.text) if told.type == 'error' else None)
+            page.on('console', lambda reported: errors.append(reported.text) if reported.type == 'error' else None)
             yield Browser(page, address)
             assert not errors, errors
         finally:

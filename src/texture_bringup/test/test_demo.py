@@ -14,14 +14,14 @@ import pytest
 
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_bringup.demo.plan import Plan
+from texture_bringup.demo.plan import DemoPlan
+from texture_bringup.demo.progress_log import ProgressLog
 from texture_bringup.demo.results import Row, table
 from texture_bringup.demo.run import demonstrate
-from texture_bringup.demo.story import Story
 from texture_core.estimates import TextureEstimate
 
 DEADLINE_S = 60.0
-SHORT = Plan(surfaces=('glass', 'ridge_2mm_deep'), learning_slides=2, recognition_slides=1)
+SHORT = DemoPlan(surfaces=('glass', 'ridge_2mm_deep'), learning_slides=2, recognition_slides=1)
 
 
 def started(log: Path) -> list[int]:
@@ -44,17 +44,17 @@ def test_the_table_shows_a_mistake() -> None:
 def test_each_chapter_of_the_story_begins_with_the_time() -> None:
     times = iter([100.0, 107.4])
     out = io.StringIO()
-    story = Story(lambda: next(times), out)
-    story.chapter('Learning')
-    story.part('glass', first=True)
-    story.part(' recorded', last=True)
+    progress = ProgressLog(lambda: next(times), out)
+    progress.section('Learning')
+    progress.part('glass', first=True)
+    progress.part(' recorded', last=True)
     assert out.getvalue() == '\n[  7 s]  Learning\n        glass recorded\n'
 
 
 def test_a_story_that_breaks_off_leaves_no_line_open() -> None:
     out = io.StringIO()
-    with pytest.raises(KeyboardInterrupt), Story(out=out) as story:
-        story.part('glass', first=True)
+    with pytest.raises(KeyboardInterrupt), ProgressLog(out=out) as progress:
+        progress.part('glass', first=True)
         raise KeyboardInterrupt
     assert out.getvalue().endswith('glass\n')
 
@@ -62,7 +62,7 @@ def test_a_story_that_breaks_off_leaves_no_line_open() -> None:
 @pytest.mark.ros
 def test_it_learns_recognises_and_leaves_recordings_model_figures_and_picture(tmp_path) -> None:
     out = io.StringIO()
-    assert demonstrate(tmp_path / 'demo', 'default', 0, SHORT, Story(out=out)), out.getvalue()
+    assert demonstrate(tmp_path / 'demo', 'default', 0, SHORT, ProgressLog(out=out)), out.getvalue()
     assert '2 of 2 slides over simulated surfaces recognised' in out.getvalue()
     assert json.loads((tmp_path / 'demo/evaluation.json').read_text())['labels'] == ['glass', 'ridge_2mm_deep']
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000

@@ -31,13 +31,13 @@ STARTED = re.compile(r'\[launch\] (\S+) started \(process (\d+)\)')
 
 @pytest.fixture(scope='module')
 def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp('bench')
+    return tmp_path_factory.mktemp('emulator')
 
 
 def launched(folder: Path, **arguments: object) -> ChildLauncher:
     environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(folder)}
     given = {'device': folder / 'tsf85', 'finger_port': free_port(), 'namespace': 'left', **arguments}
-    return ChildLauncher('bench', given, environment, folder / 'nodes.log')
+    return ChildLauncher('emulator', given, environment, folder / 'nodes.log')
 
 
 def processes(launcher: ChildLauncher) -> dict[str, int]:
@@ -122,10 +122,10 @@ def test_a_model_of_simulated_slides_recognises_the_surface_on_the_bench(operato
 
 
 def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator) -> None:
-    operator.set_parameters('bench', {'surface': 'glass'})
+    operator.set_parameters('emulator', {'surface': 'glass'})
     assert operator.explore(SLIDE).texture.label == 'glass'
     with pytest.raises(InvalidParameter, match="did you mean 'leather'"):
-        operator.set_parameters('bench', {'surface': 'lether'})
+        operator.set_parameters('emulator', {'surface': 'lether'})
 
 
 def test_a_model_of_another_recipe_is_not_used_and_the_estimate_says_so(operator, models) -> None:
@@ -153,7 +153,7 @@ def test_nothing_moves_when_stopped(operator) -> None:
 
 def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operator, bench) -> None:
     pids = processes(bench)
-    names = ('bench', 'sensor', 'explorer', 'feature_extractor', 'classifier')
+    names = ('emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier')
     assert set(pids) == {f'left/{name}' for name in (*names, 'roughness_features', 'roughness_estimator')}
     os.kill(pids['left/classifier'], signal.SIGKILL)
     with pytest.raises(LaunchFailed, match='node left/classifier was killed by SIGKILL'):

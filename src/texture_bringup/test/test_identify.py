@@ -48,7 +48,7 @@ def bench(tmp_path, monkeypatch):
     monkeypatch.setenv('ROS_DOMAIN_ID', str(DOMAIN))
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
     given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'scene': 'oriented', 'surface': 'ridges_x'}
-    with ChildLauncher('bench', {**given, 'recipe': 'fast'}, dict(os.environ), tmp_path / 'nodes.log') as launcher:
+    with ChildLauncher('emulator', {**given, 'recipe': 'fast'}, dict(os.environ), tmp_path / 'nodes.log') as launcher:
         with Operator('', DOMAIN, launcher.check) as operator:
             operator.wait_for_explorer(DEADLINE_S)
             operator.wait_for_signal(DEADLINE_S)

@@ -60,7 +60,7 @@ def test_an_explorer_that_is_there_and_says_nothing_is_not_waited_for_for_ever(m
 
 
 def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):
-    monkeypatch.setattr(operators, 'ASK_AGAIN_S', 0.3)
+    monkeypatch.setattr(operators, 'RETRY_PERIOD_S', 0.3)
     with silent_explorer(), ExitStack() as later, operators.Operator(domain_id=DOMAIN) as operator:
         operator.wait_for_explorer(30.0)
         second = threading.Timer(1.0, lambda: later.enter_context(silent_explorer()))

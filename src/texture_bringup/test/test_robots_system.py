@@ -30,10 +30,10 @@ LINEAR = ['linear_slide', '--speed', '0.05', '--distance', '0.05', '--direction'
 CIRCULAR = ['circular', '--speed', '0.05', '--radius', '0.02', '--turns', '0.5', '--direction', '0.8']
 IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 
-# What each motion feels like. A label other than the true one would tell that the signal is not that of the way the
+# What each motion measures like. A label other than the true one would tell that the signal is not that of the way the
 # finger went. The model knows neither circles nor strokes as slow as in the hand: there only the evidence counts.
 MOTIONS = ((LINEAR, SURFACE), (CIRCULAR, ''), (IN_HAND, ''))
-TOLD = (UrArmParams, SafetyLimits, SignalWatchParams)  # parameters in the example of a file
+REPORTED = (UrArmParams, SafetyLimits, SignalWatchParams)  # parameters in the example of a file
 ROBOTS = {'ur': 73, 'rails': 74, 'hand': 75}  # and the domain of its nodes
 
 
@@ -64,11 +64,13 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
             operator.wait_for_listeners(('exploration', 'features'), 1, launcher.check)  # who estimates
         for motion, label in MOTIONS:
             code = command.main(['explore', *motion])
-            told = capsys.readouterr().out
-            assert code == 0, told + launcher.log.read_text()
-            found = re.findall(r'the motion ended as asked\ntexture: +(\w+), confidence [\d.]+ after ([\d.]+) s', told)
-            assert len(found) == (2 if motion is LINEAR else 1), told
-            assert all(label in ('', felt) and float(evidence_s) > 0.5 for felt, evidence_s in found), told
+            reported = capsys.readouterr().out
+            assert code == 0, reported + launcher.log.read_text()
+            found = re.findall(
+                r'the motion ended as asked\ntexture: +(\w+), confidence [\d.]+ after ([\d.]+) s', reported
+            )
+            assert len(found) == (2 if motion is LINEAR else 1), reported
+            assert all(label in ('', measured) and float(evidence_s) > 0.5 for measured, evidence_s in found), reported
 
 
 @pytest.mark.parametrize('robot', ROBOTS)
@@ -91,7 +93,7 @@ def test_a_parameter_file_of_the_explorer_has_the_last_word(robot, tmp_path):
 def test_the_example_of_a_parameter_file_says_nothing_until_it_is_uncommented():
     text = (resources.folder('texture_bringup', 'config') / 'explorer.yaml').read_text()
     assert yaml.safe_load(text) is None
-    [told] = yaml.safe_load(re.sub(r'^#(?=/| {2}\S| {4}\S+: )', '', text, flags=re.MULTILINE)).values()
-    for name, value in told['ros__parameters'].items():
-        [parameter] = [item for cls in TOLD for item in parameters_of(cls) if item.name == name]
+    [reported] = yaml.safe_load(re.sub(r'^#(?=/| {2}\S| {4}\S+: )', '', text, flags=re.MULTILINE)).values()
+    for name, value in reported['ros__parameters'].items():
+        [parameter] = [item for cls in REPORTED for item in parameters_of(cls) if item.name == name]
         assert parameter.check(value) == value and type(value) is parameter.type

@@ -42,16 +42,16 @@ from texture_drivers.daq.sensor import load_daq
 from texture_drivers.file.recording import load_recording
 from texture_drivers.tsf85.recording import COLUMNS, FIRST_COLUMN, load_vendor_csv
 from texture_estimation.classification.training import train
-from texture_estimation.incremental.added_examples import Lesson, write_lesson
+from texture_estimation.incremental.added_slides import AddedSlide, write_added_slide
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import Grades, read_grades
 from texture_estimation.roughness.model import load_roughness_model
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
-from texture_estimation.search.memory import Memory
+from texture_estimation.search.racing import HalfScores
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.trial import Record
+from texture_estimation.search.score_cache import ScoreCache
 from texture_evaluation.ratings import read_ratings
 from texture_exploration.hands.profile import load_profile
 from texture_exploration.presets import load_preset
@@ -125,7 +125,7 @@ def shipped(package: str, file: str) -> Callable[[Path], None]:
 def make_model(folder: Path, recipe: str = 'default') -> None:
     model = train(load_recipe(recipe), examples(3))
     model.save(folder / 'model')
-    write_lesson(folder / 'model', 1, Lesson('new', 'e1', np.ones((4, 6))), model.feature_set)
+    write_added_slide(folder / 'model', 1, AddedSlide('new', 'e1', np.ones((4, 6))), model.feature_set)
 
 
 def make_roughness_model(folder: Path) -> None:
@@ -187,8 +187,8 @@ def make_vendor_csv(folder: Path) -> None:
 
 
 def make_checkpoint(folder: Path) -> None:
-    memory = Memory({'seed': 1})
-    memory.keep((1, 2), Record(np.array([0.5]), np.array([0.25])))
+    memory = ScoreCache({'seed': 1})
+    memory.store((1, 2), HalfScores(np.array([0.5]), np.array([0.25])))
     memory.save(folder / 'good.json')
 
 
@@ -266,7 +266,7 @@ def model_in(folder: Path) -> object:
     return load_model(folder / 'model')
 
 
-MODEL, CARD, LESSON = 'model.skops', 'model.json', 'model.lessons/00001.json'
+MODEL, CARD, LESSON = 'model.skops', 'model.json', 'model.added/00001.json'
 READERS = {
     'model': Reader(make_model, model_in, (MODEL, CARD, LESSON)),
     'model of support vectors': Reader(lambda folder: make_model(folder, 'ets-linear-svm'), model_in, (MODEL,)),
@@ -295,7 +295,7 @@ READERS = {
     'vendor recording': Reader(make_vendor_csv, lambda folder: load_vendor_csv(folder / 'good.csv'), ('good.csv',)),
     'recording wav': Reader(make_wav, lambda folder: load_recording(folder / 'good.wav'), ('good.wav',)),
     'checkpoint': Reader(
-        make_checkpoint, lambda folder: Memory({'seed': 1}).load(folder / 'good.json') or True, ('good.json',)
+        make_checkpoint, lambda folder: ScoreCache({'seed': 1}).load(folder / 'good.json') or True, ('good.json',)
     ),
     'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),
     'NTP data set': Reader(make_ntp, read_import(import_ntp21), ('slides.npz',)),
@@ -343,7 +343,7 @@ def turned(content: bytes, rng: np.random.Generator) -> bytes:
     return content[:first] + content[second:third] + content[first:second] + content[third:]
 
 
-def strange(content: bytes, rng: np.random.Generator, ending: str) -> bytes:
+def novel(content: bytes, rng: np.random.Generator, ending: str) -> bytes:
     """Return the text with one value in it, at any depth, replaced by a strange one or left out."""
     dump = json.dumps if ending == 'json' else yaml.safe_dump
     value = copy.deepcopy(json.loads(content) if ending == 'json' else yaml.safe_load(content))
@@ -374,7 +374,7 @@ def damaged(content: bytes, file: str, rng: np.random.Generator) -> Iterator[byt
     ending = file.rpartition('.')[2]
     if ending in ('json', 'yaml'):
         for _ in range(4 * TRIES):
-            yield strange(content, rng, ending)
+            yield novel(content, rng, ending)
 
 
 def sealed(folder: Path) -> None:
@@ -438,14 +438,14 @@ def peak_mb(work: Callable[[], None]) -> float:
     """Return how much the memory of this process has grown at most while `work` went on."""
     status = Path('/proc/self/status')
 
-    def told(name: str) -> float:
+    def reported(name: str) -> float:
         [line] = [line for line in status.read_text().split('\n') if line.startswith(name)]
         return float(line.split()[1]) / 1024
 
     Path('/proc/self/clear_refs').write_text('5')  # the peak begins anew
-    before = told('VmRSS')
+    before = reported('VmRSS')
     work()
-    return told('VmHWM') - before
+    return reported('VmHWM') - before
 
 
 def changed_card(**changes: Any) -> Callable[[Path], bytes]:
@@ -510,7 +510,7 @@ HARM: dict[str, tuple[str, str, str | Callable[[Path], bytes]]] = {
     'a deep card': ('model', CARD, '{"format": 1, "recipe": {"inputs": ' + '[' * 900 + ']' * 900 + '}}'),
     'a billion hidden units': ('model', CARD, changed_card(recipe=recipe(learner={'mlp': {'hidden': 10**9}}))),
     'a card that names a program': ('model', CARD, changed_card(recipe=recipe(learner='antigravity:fly'))),
-    'a lesson as deep as can be': ('model', LESSON, '{"values": ' + '[' * 100_000),
+    'an added slide as deep as can be': ('model', LESSON, '{"values": ' + '[' * 100_000),
     'a recipe that multiplies': ('recipe', 'good.yaml', LAUGHS + 'inputs: *j'),
     'a scene that multiplies': ('scene', 'good.yaml', LAUGHS + 'surfaces: {x: *j}'),
     'a scene that runs a program': ('scene', 'good.yaml', '!!python/object/apply:os.mkdir [trapped]'),
@@ -606,7 +606,7 @@ def mutant(content: bytes, file: str, rng: np.random.Generator) -> bytes:
     if ending in ('skops', 'npz') and rng.random() < 0.6:
         return inside(content, rng)
     if ending in ('json', 'yaml') and rng.random() < 0.3:
-        return strange(content, rng, ending)
+        return novel(content, rng, ending)
     return CHANGES[rng.integers(len(CHANGES))](content, rng)
 
 
@@ -759,7 +759,7 @@ def small_records(folder: Path) -> bytes:
 BOMBS: dict[str, tuple[str, str, Callable[[Path], bytes]]] = {
     'a card of empty lists': ('model', CARD, lambda _: b'{"recipe": [' + b'[],' * (MB5 // 3) + b'[]]}'),
     'a card of small objects': ('model', CARD, lambda _: b'{"recipe": [' + b'{"":0},' * (MB5 // 7) + b'0]}'),
-    'a lesson of short windows': (
+    'an added slide of short windows': (
         'model', LESSON,
         lambda _: b'{"format":1,"feature_set":"abcd1234 signal=1000Hz*1","label":"x","exploration_id":"","values":['
         + b'[0,0,0,0,0,0],' * (MB5 // 14) + b'[0,0,0,0,0,0]]}',

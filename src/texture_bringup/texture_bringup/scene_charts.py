@@ -86,7 +86,7 @@ def _relief(axes: Any, view: SceneView) -> Any:
 
 def _profile(axes: Any, view: SceneView) -> None:
     axes.plot(MM * view.along_m, UM * view.sharp_m, color=COLOURS[4], linewidth=0.8, label='as it is')
-    axes.plot(MM * view.along_m, UM * view.blurred_m, color=COLOURS[0], linewidth=1.2, label='as the skin feels it')
+    axes.plot(MM * view.along_m, UM * view.blurred_m, color=COLOURS[0], linewidth=1.2, label='as the skin measures it')
     axes.set(xlabel='way (mm)', ylabel='height (µm)')
     axes.set_xlim(0, MM * view.along_m[-1])
 

@@ -20,15 +20,15 @@ class UnseenLoss:
         Nominal rate of the stream.
     window_s
         All arrivals must have been late for so long.
-    least_s
+    min_duration_s
         Lateness below this is none; it is also what may be lost without being noticed.
     """
 
-    def __init__(self, rate_hz: float, *, window_s: float = 0.5, least_s: float = 0.01) -> None:
+    def __init__(self, rate_hz: float, *, window_s: float = 0.5, min_duration_s: float = 0.01) -> None:
         self._rate_hz = rate_hz
         self._window_ns = window_s * NANOSECONDS
         self._end_ns = 0.2 * self._window_ns
-        self._least_ns = least_s * NANOSECONDS
+        self._least_ns = min_duration_s * NANOSECONDS
         self.restart()
 
     def restart(self) -> None:

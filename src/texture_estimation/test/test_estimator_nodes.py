@@ -13,40 +13,43 @@ from texture_core.features import FeatureVector
 from texture_core.ros.conversions import from_msg, to_msg
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
-from texture_estimation.evidence import Evidence
+from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import load_model
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
-from texture_estimation.roughness.evidence import RoughnessEvidence
+from texture_estimation.roughness.evidence import RoughnessAccumulator
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.recipe import RoughnessRecipe
 from texture_estimation.roughness.training import train_grades
 from texture_features.labelled_features import LabelledFeatures
 
 pytestmark = pytest.mark.ros
-GRADE_NAMES = ('signal/integral/f', 'signal/bursts/f')
-GRADE_RECIPE = {'inputs': {'signal': {'features': ['integral', 'bursts']}}}
-NODES = {'classifier': (Classifier, 'model', 'felt'), 'roughness_estimator': (RoughnessEstimator, 'grader', 'grade_2')}
+GRADE_NAMES = ('signal/signal_energy/f', 'signal/peak_to_median_power/f')
+GRADE_RECIPE = {'inputs': {'signal': {'features': ['signal_energy', 'peak_to_median_power']}}}
+NODES = {
+    'classifier': (Classifier, 'model', 'felt_slide'),
+    'roughness_estimator': (RoughnessEstimator, 'roughness_model', 'grade_2'),
+}
 
 
-class Bench:
+class NodeUnderTest:
     """The node under test, a peer that plays the extractor, and the estimates that it hears."""
 
     def __init__(self, graph, kind, model=''):
         self.node = graph.add(kind, model=str(model))
         self._graph, peer = graph, graph.peer
         message, topic = kind.estimate
-        self._heard = graph.listen(message, topic, ESTIMATE_QOS)
+        self._received = graph.listen(message, topic, ESTIMATE_QOS)
         self.features = peer.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         graph.until(lambda: self.features.get_subscription_count() and peer.count_publishers(topic) == 1)
 
     def ask(self, vectors):
         """Publish vectors and return the estimates up to the final one."""
-        self._heard.clear()
+        self._received.clear()
         for vector in vectors:
             self.features.publish(to_msg(vector))
-        self._graph.until(lambda: self._heard and self._heard[-1].final)
-        return [from_msg(message) for message in self._heard]
+        self._graph.until(lambda: self._received and self._received[-1].final)
+        return [from_msg(message) for message in self._received]
 
     def report(self):
         return self.node._report()
@@ -79,12 +82,12 @@ def slide(rows, names, feature_set, identity='e1', **more):
 
 
 @pytest.fixture
-def felt(examples):
+def felt_slide(examples):
     return slide(examples.values[examples.groups == 'felt/0'], examples.names, examples.feature_set)
 
 
 @pytest.fixture(scope='module')
-def grader():
+def roughness_model():
     """Return a model of five textures whose first feature is their grade."""
     rng = np.random.default_rng(0)
     grades = {f't{grade}': float(grade) for grade in range(1, 6)}
@@ -94,13 +97,13 @@ def grader():
     return train_grades(RoughnessRecipe.from_mapping(GRADE_RECIPE, 'test'), examples, Grades(grades), 'felt')
 
 
-def slide_of_grade_2(grader, windows=2, force_n=2.0):
-    return slide([np.array([2.0, 0.5])] * windows, GRADE_NAMES, grader.feature_set, force_n=force_n)
+def slide_of_grade_2(roughness_model, windows=2, force_n=2.0):
+    return slide([np.array([2.0, 0.5])] * windows, GRADE_NAMES, roughness_model.feature_set, force_n=force_n)
 
 
 @pytest.fixture
-def grade_2(grader):
-    return slide_of_grade_2(grader)
+def grade_2(roughness_model):
+    return slide_of_grade_2(roughness_model)
 
 
 @pytest.fixture(params=NODES)
@@ -116,23 +119,23 @@ def recognised(estimate):
 
 def test_a_model_may_be_given_later_and_a_bad_one_changes_nothing(graph, case, tmp_path):
     kind, path, vectors = case
-    bench = Bench(graph, kind)
-    assert 'no model is loaded' in bench.ask(vectors)[-1].message
-    assert bench.report()[0] == 'WARN'
-    refused = bench.set_model(tmp_path / 'none.skops')
+    node = NodeUnderTest(graph, kind)
+    assert 'no model is loaded' in node.ask(vectors)[-1].message
+    assert node.report()[0] == 'WARN'
+    refused = node.set_model(tmp_path / 'none.skops')
     assert not refused.successful
     assert 'cannot be read' in refused.reason
-    assert bench.set_model(path).successful
-    assert recognised(bench.ask(vectors)[-1])
-    assert not bench.set_model(tmp_path / 'none.skops').successful
-    assert recognised(bench.ask(vectors)[-1])
-    assert bench.report()[0] == 'OK'
+    assert node.set_model(path).successful
+    assert recognised(node.ask(vectors)[-1])
+    assert not node.set_model(tmp_path / 'none.skops').successful
+    assert recognised(node.ask(vectors)[-1])
+    assert node.report()[0] == 'OK'
 
 
 def test_who_joins_late_still_gets_the_final_estimate(graph, case):
     kind, path, vectors = case
-    bench = Bench(graph, kind, path)
-    final = bench.ask(vectors)[-1]
+    node = NodeUnderTest(graph, kind, path)
+    final = node.ask(vectors)[-1]
     late = graph.listen(*kind.estimate, ESTIMATE_QOS)
     graph.until(lambda: late and late[-1].final)
     assert from_msg(late[-1]) == final
@@ -140,84 +143,86 @@ def test_who_joins_late_still_gets_the_final_estimate(graph, case):
 
 def test_broken_messages_are_counted_and_survived(graph, case):
     kind, path, vectors = case
-    bench = Bench(graph, kind, path)
-    bench.features.publish(msg.FeatureVector(names=['a'], values=[1.0, 2.0]))
-    assert recognised(bench.ask(vectors)[-1])
-    assert bench.report()[2]['broken_messages'] == 1
+    node = NodeUnderTest(graph, kind, path)
+    node.features.publish(msg.FeatureVector(names=['a'], values=[1.0, 2.0]))
+    assert recognised(node.ask(vectors)[-1])
+    assert node.report()[2]['invalid_messages'] == 1
 
 
 def test_vectors_that_do_not_come_are_counted_and_a_new_extractor_begins_again(graph, case):
     kind, path, vectors = case
-    bench = Bench(graph, kind, path)
+    node = NodeUnderTest(graph, kind, path)
     numbered = [dataclasses.replace(vector, sequence=7 + k) for k, vector in enumerate(vectors)]
-    bench.ask(numbered)
-    assert (bench.report()[0], bench.report()[2]['lost_vectors']) == ('OK', 0)
-    bench.ask([dataclasses.replace(vectors[-1], sequence=9 + len(vectors))])  # two of the same extractor are missing
-    assert (bench.report()[0], bench.report()[2]['lost_vectors']) == ('WARN', 2)
-    bench.ask([dataclasses.replace(vectors[-1], sequence=1)])  # and the first of another one
-    assert bench.report()[2]['lost_vectors'] == 3
+    node.ask(numbered)
+    assert (node.report()[0], node.report()[2]['lost_vectors']) == ('OK', 0)
+    node.ask([dataclasses.replace(vectors[-1], sequence=9 + len(vectors))])  # two of the same extractor are missing
+    assert (node.report()[0], node.report()[2]['lost_vectors']) == ('WARN', 2)
+    node.ask([dataclasses.replace(vectors[-1], sequence=1)])  # and the first of another one
+    assert node.report()[2]['lost_vectors'] == 3
 
 
 def test_a_wrong_model_at_the_start_is_an_error(graph, case, tmp_path):
     with pytest.raises(ModelMismatch, match='cannot be read'):
-        Bench(graph, case[0], tmp_path / 'none.skops')
+        NodeUnderTest(graph, case[0], tmp_path / 'none.skops')
 
 
-def test_the_classifier_says_what_the_same_vectors_give_offline(graph, model, felt, tmp_path):
-    heard = Bench(graph, Classifier, model.save(tmp_path / 'm')).ask(felt)
-    evidence = Evidence(model)
-    for came, expected in zip(heard, [evidence.update(vector) for vector in felt], strict=True):
+def test_the_classifier_says_what_the_same_vectors_give_offline(graph, model, felt_slide, tmp_path):
+    received = NodeUnderTest(graph, Classifier, model.save(tmp_path / 'm')).ask(felt_slide)
+    evidence = EvidenceAccumulator(model)
+    for came, expected in zip(received, [evidence.update(vector) for vector in felt_slide], strict=True):
         assert (came.label, came.windows, came.final) == (expected.label, expected.windows, expected.final)
         np.testing.assert_allclose(came.probabilities, expected.probabilities)
-    assert heard[-1].label == 'felt'
-    assert heard[-1].processing_s > 0.0
+    assert received[-1].label == 'felt'
+    assert received[-1].processing_s > 0.0
 
 
-def test_the_roughness_estimator_grades_as_the_same_vectors_do_offline(graph, grader, grade_2, tmp_path):
-    heard = Bench(graph, RoughnessEstimator, grader.save(tmp_path / 'm')).ask(grade_2)
-    evidence = RoughnessEvidence(grader)
-    for came, expected in zip(heard, [evidence.update(vector) for vector in grade_2], strict=True):
+def test_the_roughness_estimator_grades_as_the_same_vectors_do_offline(graph, roughness_model, grade_2, tmp_path):
+    received = NodeUnderTest(graph, RoughnessEstimator, roughness_model.save(tmp_path / 'm')).ask(grade_2)
+    evidence = RoughnessAccumulator(roughness_model)
+    for came, expected in zip(received, [evidence.update(vector) for vector in grade_2], strict=True):
         assert (came.valid, came.windows, came.final) == (True, expected.windows, expected.final)
         np.testing.assert_allclose((came.grade, came.grade_std), (expected.grade, expected.grade_std))
-    assert heard[-1].grade == pytest.approx(2.0, abs=0.3)
-    assert heard[-1].processing_s > 0.0
+    assert received[-1].grade == pytest.approx(2.0, abs=0.3)
+    assert received[-1].processing_s > 0.0
 
 
-def test_without_contact_there_is_no_grade_but_a_reason_and_it_is_counted(graph, grader, grade_2, tmp_path):
-    bench = Bench(graph, RoughnessEstimator, grader.save(tmp_path / 'm'))
-    last = bench.ask(slide_of_grade_2(grader, windows=3, force_n=0.01))[-1]
+def test_without_contact_there_is_no_grade_but_a_reason_and_it_is_counted(graph, roughness_model, grade_2, tmp_path):
+    node = NodeUnderTest(graph, RoughnessEstimator, roughness_model.save(tmp_path / 'm'))
+    last = node.ask(slide_of_grade_2(roughness_model, windows=3, force_n=0.01))[-1]
     assert (last.valid, last.final) == (False, True)
     assert np.isnan(last.grade)
     assert 'no contact' in last.message
-    numbers = bench.report()[2]
+    numbers = node.report()[2]
     assert (numbers['unusable_windows'], numbers['model']) == (3, 'felt')
-    assert bench.ask(grade_2)[-1].valid
+    assert node.ask(grade_2)[-1].valid
 
 
-def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, felt, tmp_path):
+def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, felt_slide, tmp_path):
     path = model.save(tmp_path / 'm')
-    bench = Bench(graph, Classifier, path)
-    moved = [dataclasses.replace(v, values=v.values + (0.0 if v.last else 9.0), exploration_id='e7') for v in felt]
-    assert bench.ask(moved)[-1].label != 'silk'
-    answer = bench.call(srv.AddTexture, 'add_texture', label='silk')
-    assert (answer.success, answer.examples) == (True, len(felt) - 1)
-    assert '5 textures known' in answer.message
-    assert bench.ask(moved)[-1].label == 'silk'
-    assert bench.ask(felt)[-1].label == 'felt'
+    node = NodeUnderTest(graph, Classifier, path)
+    moved = [
+        dataclasses.replace(v, values=v.values + (0.0 if v.last else 9.0), exploration_id='e7') for v in felt_slide
+    ]
+    assert node.ask(moved)[-1].label != 'silk'
+    answer = node.call(srv.AddTexture, 'add_texture', label='silk')
+    assert (answer.success, answer.examples) == (True, len(felt_slide) - 1)
+    assert '5 textures, 1 slide added' in answer.message
+    assert node.ask(moved)[-1].label == 'silk'
+    assert node.ask(felt_slide)[-1].label == 'felt'
     assert load_model(path).labels[-1] == 'silk'
-    assert bench.set_model(path).successful  # as after a restart
-    assert bench.ask(moved)[-1].label == 'silk'
-    assert bench.call(Trigger, 'undo_learning').success
-    assert bench.ask(moved)[-1].label != 'silk'
-    assert not bench.call(Trigger, 'undo_learning').success
+    assert node.set_model(path).successful  # as after a restart
+    assert node.ask(moved)[-1].label == 'silk'
+    assert node.call(Trigger, 'remove_last_added').success
+    assert node.ask(moved)[-1].label != 'silk'
+    assert not node.call(Trigger, 'remove_last_added').success
 
 
 def test_what_cannot_be_learnt_is_answered_with_a_sentence(graph, model, tmp_path):
-    bench = Bench(graph, Classifier)
-    assert 'no model is loaded' in bench.call(srv.AddTexture, 'add_texture', label='silk').message
-    bench.set_model(model.save(tmp_path / 'm'))
-    answer = bench.call(srv.AddTexture, 'add_texture', label='silk', exploration_id='e1')
+    node = NodeUnderTest(graph, Classifier)
+    assert 'no model is loaded' in node.call(srv.AddTexture, 'add_texture', label='silk').message
+    node.set_model(model.save(tmp_path / 'm'))
+    answer = node.call(srv.AddTexture, 'add_texture', label='silk', exploration_id='e1')
     assert not answer.success
     assert 'explore first' in answer.message
-    bench.set_model(dataclasses.replace(model, examples=None).save(tmp_path / 'old'))
-    assert 'train it again' in bench.call(Trigger, 'undo_learning').message
+    node.set_model(dataclasses.replace(model, examples=None).save(tmp_path / 'old'))
+    assert 'train it again' in node.call(Trigger, 'remove_last_added').message

@@ -5,8 +5,8 @@ import pytest
 
 from texture_core.features import FeatureVector
 from texture_estimation.classification.evidence_rules import MajorityVote
-from texture_estimation.evidence import Evidence
-from texture_estimation.fingerprint import difference
+from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.fingerprint import fingerprint_difference
 
 
 def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):
@@ -27,13 +27,13 @@ def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):
     return [*windows, FeatureVector(9_000_000_000, name, 0.0, hop_s, last=True)]
 
 
-def judge(model, stream):
-    evidence = Evidence(model)
+def predict(model, stream):
+    evidence = EvidenceAccumulator(model)
     return [evidence.update(vector) for vector in stream]
 
 
 def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, examples):
-    estimates = judge(model, vectors(examples))
+    estimates = predict(model, vectors(examples))
     assert [estimate.windows for estimate in estimates] == [1, 2, 3, 4, 5, 6, 7, 8, 8]
     assert [estimate.final for estimate in estimates] == [False] * 8 + [True]
     assert estimates[-1].label == 'felt'
@@ -45,41 +45,42 @@ def test_evidence_grows_with_every_window_and_ends_with_a_final_estimate(model, 
 
 def test_an_estimate_carries_the_frame_of_its_vectors(model, examples):
     stream = [dataclasses.replace(vector, frame_id='tip') for vector in vectors(examples)]
-    assert {estimate.frame_id for estimate in judge(model, stream)} == {'tip'}
+    assert {estimate.frame_id for estimate in predict(model, stream)} == {'tip'}
 
 
 def test_the_final_estimate_says_how_many_windows_are_missing_from_it(model, examples):
     *windows, last = vectors(examples)
-    final = judge(model, [*windows, dataclasses.replace(last, skipped=6)])[-1]
+    final = predict(model, [*windows, dataclasses.replace(last, skipped=6)])[-1]
     assert final.message == '6 of 14 windows were left out, as samples were lost or not finite'
-    assert judge(model, [*windows, last])[-1].message == ''
+    assert predict(model, [*windows, last])[-1].message == ''
 
 
 def test_overlapping_windows_count_the_sliding_time_once(model, examples):
-    estimates = judge(model, vectors(examples, hop_s=0.1))
+    estimates = predict(model, vectors(examples, hop_s=0.1))
     assert [round(estimate.evidence_s, 3) for estimate in estimates[:4]] == [0.5, 0.6, 0.7, 0.8]
     assert estimates[0].stamp_ns == 1_500_000_000
-    apart = judge(model, vectors(examples, hop_s=1.0))
+    apart = predict(model, vectors(examples, hop_s=1.0))
     assert apart[2].evidence_s == pytest.approx(1.5)
 
 
 def test_the_same_windows_further_apart_are_worth_more(model, make_examples):
     vague = make_examples(seed=8, spread=2.0)
     assert (
-        judge(model, vectors(vague, hop_s=0.5))[-1].confidence > judge(model, vectors(vague, hop_s=0.02))[-1].confidence
+        predict(model, vectors(vague, hop_s=0.5))[-1].confidence
+        > predict(model, vectors(vague, hop_s=0.02))[-1].confidence
     )
 
 
 def test_a_new_exploration_begins_again_even_without_an_end(model, examples):
     first = vectors(examples, 'felt')[:4]
     second = vectors(examples, 'wood', name='e2')
-    estimates = judge(model, first + second)
+    estimates = predict(model, first + second)
     assert estimates[4].windows == 1
     assert estimates[-1].label == 'wood'
 
 
 def test_after_the_end_the_same_id_begins_again(model, examples):
-    estimates = judge(model, vectors(examples) + vectors(examples))
+    estimates = predict(model, vectors(examples) + vectors(examples))
     assert estimates[len(vectors(examples))].windows == 1
 
 
@@ -88,7 +89,7 @@ def test_a_window_that_is_not_finite_is_left_out_with_a_message(model, examples)
     values = stream[1].values.copy()
     values[2] = np.nan
     stream[1] = dataclasses.replace(stream[1], values=values)
-    estimates = judge(model, stream)
+    estimates = predict(model, stream)
     assert estimates[1].windows == 1
     assert "'signal/f2' is not finite" in estimates[1].message
     assert estimates[-1].windows == 7
@@ -96,20 +97,20 @@ def test_a_window_that_is_not_finite_is_left_out_with_a_message(model, examples)
 
 def test_vectors_of_another_fingerprint_get_no_label_and_a_reason(model, examples):
     stream = [dataclasses.replace(v, feature_set='abcd1234 signal=2200Hz*1') for v in vectors(examples)[:-1]]
-    for estimate in judge(model, [*stream, vectors(examples)[-1]]):
+    for estimate in predict(model, [*stream, vectors(examples)[-1]]):
         assert (estimate.label, estimate.windows, estimate.probabilities) == ('', 0, ())
         assert "sampling rate of 'signal' is 2200 Hz, the model was trained at 1000 Hz" in estimate.message
 
 
 def test_a_slide_without_windows_ends_with_a_reason(model, examples):
-    [estimate] = judge(model, vectors(examples)[-1:])
+    [estimate] = predict(model, vectors(examples)[-1:])
     assert estimate.final
     assert estimate.label == ''
     assert 'no window could be used' in estimate.message
 
 
 def test_without_a_model_the_final_estimate_says_so(examples):
-    estimate = judge(None, vectors(examples))[-1]
+    estimate = predict(None, vectors(examples))[-1]
     assert estimate.final
     assert estimate.label == ''
     assert 'no model is loaded' in estimate.message
@@ -127,14 +128,14 @@ def test_without_a_model_the_final_estimate_says_so(examples):
     ],
 )
 def test_the_part_that_differs_is_named(came, trained, words):
-    assert words in difference(came, trained)
-    assert bool(difference(came, trained)) == bool(words)
+    assert words in fingerprint_difference(came, trained)
+    assert bool(fingerprint_difference(came, trained)) == bool(words)
 
 
 def test_a_slide_whose_windows_disagree_is_unclassified_until_enough_of_them_agree(model, examples):
     recipe = dataclasses.replace(model.recipe, evidence=MajorityVote())
     voting = dataclasses.replace(model, recipe=recipe)
-    estimates = judge(voting, vectors(examples, hop_s=0.5))
+    estimates = predict(voting, vectors(examples, hop_s=0.5))
     assert [(estimate.label, estimate.known) for estimate in estimates[:2]] == [('', False)] * 2
     assert [(estimate.label, estimate.known) for estimate in estimates[2:]] == [('felt', True)] * 7
     assert estimates[0].probabilities == pytest.approx([0.25] * 4)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, MajorityVote, SoftVote
-from texture_estimation.log_probabilities import log_softmax, undecided
+from texture_estimation.log_probabilities import is_tied, log_softmax
 
 
 def joined(rule, votes, n_labels=4):
@@ -10,12 +10,12 @@ def joined(rule, votes, n_labels=4):
     scores = np.array(
         [np.eye(n_labels)[vote] if vote is not None else [1.0, 1.0, *[0.0] * (n_labels - 2)] for vote in votes]
     )
-    return rule.log_posterior(rule.voice(log_softmax(scores)).mean(axis=0), float(len(votes)), 0.5)
+    return rule.log_posterior(rule.window_evidence(log_softmax(scores)).mean(axis=0), float(len(votes)), 0.5)
 
 
 def winner(rule, votes):
     posterior = joined(rule, votes)
-    return None if undecided(posterior) else int(posterior.argmax())
+    return None if is_tied(posterior) else int(posterior.argmax())
 
 
 @pytest.mark.parametrize(
@@ -54,11 +54,11 @@ def test_windows_that_speak_for_two_labels_alike_are_unclassified_by_the_soft_vo
 def test_many_slides_at_once_are_joined_as_one_by_one(name):
     rule = EVIDENCE_RULES[name]()
     log_p = log_softmax(np.random.default_rng(0).normal(size=(6, 5, 4)))
-    means = rule.voice(log_p).mean(axis=1)
-    worth = np.arange(1.0, 7.0)[:, None]
-    together = rule.log_posterior(means, worth, 0.7)
+    means = rule.window_evidence(log_p).mean(axis=1)
+    effective_windows = np.arange(1.0, 7.0)[:, None]
+    together = rule.log_posterior(means, effective_windows, 0.7)
     assert np.isfinite(together).all()
     np.testing.assert_allclose(np.exp(together).sum(axis=1), 1.0)
-    for mean, windows, expected in zip(means, worth[:, 0], together, strict=True):
+    for mean, windows, expected in zip(means, effective_windows[:, 0], together, strict=True):
         alone = rule.log_posterior(mean, windows, 0.7)
         np.testing.assert_allclose(alone, expected, rtol=1e-12)  # sums may be ordered otherwise

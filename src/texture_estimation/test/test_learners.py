@@ -17,11 +17,11 @@ from texture_estimation.learners.em_mixture import EmMixture
 from texture_estimation.learners.levenberg_marquardt import Network, _by_examples, _by_weights, fit_network
 from texture_estimation.learners.naive_bayes import NaiveBayes, bins_of
 from texture_estimation.learners.pair_votes import PairVotes
-from texture_estimation.learners.passive_aggressive import OnlinePlanes, PassiveAggressive
+from texture_estimation.learners.passive_aggressive import OnlineLinearClassifier, PassiveAggressive
 from texture_estimation.learners.svm_linear import SvmLinear
 from texture_estimation.learners.svm_max_wins import SvmMaxWins, principal_components
 from texture_estimation.learners.svm_pairs import SvmPairs
-from texture_estimation.log_probabilities import undecided
+from texture_estimation.log_probabilities import is_tied
 from texture_estimation.model import load_model
 from texture_estimation.recipe import Recipe
 
@@ -48,42 +48,44 @@ def name(request):
 
 
 @pytest.fixture(scope='module')
-def learnt(name, examples):
+def training(name, examples):
     return learn(name, examples)
 
 
-def test_distinct_surfaces_are_recognised(learnt, make_examples):
-    assert accuracy(learnt, make_examples(seed=1)) > 0.85
+def test_distinct_surfaces_are_recognised(training, make_examples):
+    assert accuracy(training, make_examples(seed=1)) > 0.85
 
 
-def test_answers_are_log_probabilities_of_finite_size_even_far_from_all_examples(learnt, examples):
+def test_answers_are_log_probabilities_of_finite_size_even_far_from_all_examples(training, examples):
     for values in (examples.values, np.full((1, 6), 1e6), np.zeros((1, 6)), -examples.values):
-        answers = learnt.predict_log_proba(values)
+        answers = training.predict_log_proba(values)
         assert np.isfinite(answers).all()
         np.testing.assert_allclose(np.exp(answers).sum(axis=1), 1.0)
 
 
-def test_a_window_alone_gets_the_same_decision_as_in_a_batch(learnt, examples):
-    together = learnt.predict_log_proba(examples.values)
-    alone = np.stack([learnt.predict_log_proba(values) for values in examples.values])
+def test_a_window_alone_gets_the_same_decision_as_in_a_batch(training, examples):
+    together = training.predict_log_proba(examples.values)
+    alone = np.stack([training.predict_log_proba(values) for values in examples.values])
     np.testing.assert_allclose(alone, together, atol=1e-9)
-    assert [learnt.decide(values[None])[0] for values in examples.values] == learnt.decide(examples.values)
+    assert [training.decide(values[None])[0] for values in examples.values] == training.decide(examples.values)
 
 
-def test_the_same_examples_make_the_same_model(learnt, name, examples):
+def test_the_same_examples_make_the_same_model(training, name, examples):
     again = learn(name, examples)
-    np.testing.assert_array_equal(again.predict_log_proba(examples.values), learnt.predict_log_proba(examples.values))
+    np.testing.assert_array_equal(again.predict_log_proba(examples.values), training.predict_log_proba(examples.values))
 
 
-def test_a_model_judges_the_same_after_it_was_saved(learnt, examples, tmp_path):
-    loaded = load_model(learnt.save(tmp_path / 'm'))
-    np.testing.assert_array_equal(loaded.predict_log_proba(examples.values), learnt.predict_log_proba(examples.values))
+def test_a_model_judges_the_same_after_it_was_saved(training, examples, tmp_path):
+    loaded = load_model(training.save(tmp_path / 'm'))
+    np.testing.assert_array_equal(
+        loaded.predict_log_proba(examples.values), training.predict_log_proba(examples.values)
+    )
 
 
 @pytest.mark.parametrize('factor', [1e-6, 1e6])
-def test_the_unit_of_the_features_does_not_matter(learnt, name, examples, factor):
+def test_the_unit_of_the_features_does_not_matter(training, name, examples, factor):
     scaled = dataclasses.replace(examples, values=examples.values * factor)
-    agree = np.array(learn(name, scaled).decide(scaled.values)) == np.array(learnt.decide(examples.values))
+    agree = np.array(learn(name, scaled).decide(scaled.values)) == np.array(training.decide(examples.values))
     assert agree.mean() > 0.97  # what is iterated may stop a hair elsewhere
 
 
@@ -140,7 +142,7 @@ def test_a_single_label_is_refused_with_a_sentence(name, make_examples):
         learn(name, make_examples(labels=('cork',)))
 
 
-# Each against scikit-learn, on other examples than those learnt from
+# Each against scikit-learn, on other examples than those trained on
 
 
 @pytest.fixture(scope='module', params=[2, 5])
@@ -150,37 +152,37 @@ def task(request, make_examples):
     return examples, *codes_of(examples), make_examples(seed=5, labels=labels, spread=3.0).values
 
 
-def judged(learner, examples, codes, groups, fresh):
-    parts = learner.fit(examples.values, codes, groups).parts
-    return learner.array_form(parts), learner.array_form(parts)(fresh)
+def evaluated(learner, examples, codes, groups, fresh):
+    parameters = learner.fit(examples.values, codes, groups).parameters
+    return learner.predictor(parameters), learner.predictor(parameters)(fresh)
 
 
 def test_pairwise_machines_decide_as_scikit_learn_with_the_kernel_of_matlab(task):
     examples, codes, _, fresh = task
-    _, answers = judged(SvmPairs(box_constraint=2.0, kernel_scale=4.0), *task)
+    _, answers = evaluated(SvmPairs(box_constraint=2.0, kernel_scale=4.0), *task)
     scaler = StandardScaler().fit(examples.values)
     svc = SVC(C=2.0, gamma=1.0 / 16.0).fit(scaler.transform(examples.values), codes)
-    clear = ~undecided(answers)
+    clear = ~is_tied(answers)
     assert clear.mean() > 0.9
     np.testing.assert_array_equal(answers.argmax(axis=1)[clear], svc.predict(scaler.transform(fresh))[clear])
 
 
 def test_pairwise_machines_without_standardising_use_the_values_as_they_are(task):
     examples, codes, _, fresh = task
-    _, answers = judged(SvmPairs(standardise=False), *task)
+    _, answers = evaluated(SvmPairs(standardise=False), *task)
     svc = SVC(C=10.0, gamma=1.0 / 9.0).fit(examples.values, codes)
-    clear = ~undecided(answers)
+    clear = ~is_tied(answers)
     np.testing.assert_array_equal(answers.argmax(axis=1)[clear], svc.predict(fresh)[clear])
 
 
 @pytest.mark.parametrize('learner', [SvmPairs(kernel_scale=1e-5), SvmPairs(kernel_scale=1e5, box_constraint=0.01)])
 def test_the_ends_of_the_kernel_scale_give_finite_answers(task, learner):
-    assert np.isfinite(judged(learner, *task)[1]).all()
+    assert np.isfinite(evaluated(learner, *task)[1]).all()
 
 
 def test_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
     examples, codes, _, fresh = task
-    _, answers = judged(NaiveBayes(), *task)
+    _, answers = evaluated(NaiveBayes(), *task)
     scaler = StandardScaler().fit(examples.values)
     expected = GaussianNB(var_smoothing=1e-9).fit(scaler.transform(examples.values), codes)
     np.testing.assert_allclose(answers, expected.predict_log_proba(scaler.transform(fresh)), atol=1e-6)
@@ -190,35 +192,35 @@ def test_counted_naive_bayes_reports_labels_of_one_mean_and_width_apart_that_nor
     rng = np.random.default_rng(0)
     flat, forked = rng.uniform(-1.0, 1.0, (300, 1)), rng.choice([-0.577, 0.577], (300, 1))  # variance 1/3 both
     values, codes = np.concatenate((flat, forked)), np.repeat([0, 1], 300)
-    parts = NaiveBayes(bins=9).fit(values, codes, np.arange(600)).parts
-    judge = NaiveBayes.array_form(parts)
-    assert judge(np.array([[0.577], [0.0]])).argmax(axis=1).tolist() == [1, 0]
-    np.testing.assert_allclose(np.exp(parts['log_shares']).sum(axis=1), 1.0)
-    np.testing.assert_array_equal(judge(values[:5]), [judge(row) for row in values[:5]])
-    assert np.isfinite(judge(np.array([1e9, -1e9])[:, None])).all()
+    parameters = NaiveBayes(bins=9).fit(values, codes, np.arange(600)).parameters
+    predict = NaiveBayes.predictor(parameters)
+    assert predict(np.array([[0.577], [0.0]])).argmax(axis=1).tolist() == [1, 0]
+    np.testing.assert_allclose(np.exp(parameters['log_shares']).sum(axis=1), 1.0)
+    np.testing.assert_array_equal(predict(values[:5]), [predict(row) for row in values[:5]])
+    assert np.isfinite(predict(np.array([1e9, -1e9])[:, None])).all()
 
 
 def test_counted_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
     examples, codes, _, fresh = task
-    parts = NaiveBayes(bins=4).fit(examples.values, codes, np.arange(len(codes))).parts
-    known = [bins_of(values, parts['edges']) for values in (examples.values, fresh)]
+    parameters = NaiveBayes(bins=4).fit(examples.values, codes, np.arange(len(codes))).parameters
+    known = [bins_of(values, parameters['edges']) for values in (examples.values, fresh)]
     expected = CategoricalNB(min_categories=4).fit(known[0], codes)
-    np.testing.assert_allclose(NaiveBayes.array_form(parts)(fresh), expected.predict_log_proba(known[1]), atol=1e-9)
+    np.testing.assert_allclose(NaiveBayes.predictor(parameters)(fresh), expected.predict_log_proba(known[1]), atol=1e-9)
 
 
 @pytest.mark.parametrize('learner', [SvmPairs(ties='nearest'), AnnPairs(ties='nearest', iterations=3)])
 def test_pairwise_learners_give_ties_to_the_clearer_label_if_asked_and_change_nothing_else(task, learner):
-    strict = judged(dataclasses.replace(learner, ties='unclassified'), *task)[1]
-    nearest = judged(learner, *task)[1]
-    clear = ~undecided(strict)
+    strict = evaluated(dataclasses.replace(learner, ties='unclassified'), *task)[1]
+    nearest = evaluated(learner, *task)[1]
+    clear = ~is_tied(strict)
     np.testing.assert_array_equal(nearest.argmax(axis=1)[clear], strict.argmax(axis=1)[clear])
-    assert not undecided(nearest).any()
+    assert not is_tied(nearest).any()
 
 
 def test_linear_machines_decide_every_window_as_scikit_learn(task):
     examples, codes, _, fresh = task
     learner = SvmLinear(least_c=0.5, most_c=0.5, candidates=1, repeats=1)
-    _, answers = judged(learner, *task)
+    _, answers = evaluated(learner, *task)
     scaler = StandardScaler().fit(examples.values)
     svc = SVC(C=0.5, kernel='linear', break_ties=True).fit(scaler.transform(examples.values), codes)
     np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(scaler.transform(fresh)))
@@ -232,27 +234,29 @@ def test_the_penalty_is_the_smallest_of_those_that_do_best(examples):
 
 def test_max_wins_on_principal_components_decides_every_window_as_scikit_learn(task):
     examples, codes, _, fresh = task
-    judge, answers = judged(SvmMaxWins(variance=0.9, gamma=1.0, c=3.0), *task)
-    project = lambda values: (values - examples.values.mean(axis=0)) @ judge.components  # noqa: E731
+    predict, answers = evaluated(SvmMaxWins(variance=0.9, gamma=1.0, c=3.0), *task)
+    project = lambda values: (values - examples.values.mean(axis=0)) @ predict.components  # noqa: E731
     svc = SVC(C=3.0, gamma='scale', break_ties=True).fit(project(examples.values), codes)
     np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(project(fresh)))
 
 
 def test_the_mixture_finds_the_clusters_of_scikit_learn(task):
     examples, codes, _, fresh = task
-    judge, _ = judged(EmMixture(starts=1), *task)
+    predict, _ = evaluated(EmMixture(starts=1), *task)
     scaler = StandardScaler().fit(examples.values)
     mixture = GaussianMixture(len(np.unique(codes)), reg_covar=1e-3, random_state=0).fit(
         scaler.transform(examples.values)
     )
-    np.testing.assert_array_equal(judge.cluster_scores(fresh).argmax(axis=1), mixture.predict(scaler.transform(fresh)))
+    np.testing.assert_array_equal(
+        predict.cluster_scores(fresh).argmax(axis=1), mixture.predict(scaler.transform(fresh))
+    )
 
 
 def test_a_label_without_a_cluster_is_never_recognised():
     values = np.concatenate((np.zeros((8, 1)), np.ones((8, 1)))) + 0.01 * np.arange(16)[:, None]
     codes = np.array([0] * 8 + [1] * 7 + [2])
-    parts = EmMixture(seed=1).fit(np.repeat(values, 2, axis=1), codes, np.arange(16)).parts
-    assert set(EmMixture.array_form(parts)(np.repeat(values, 2, axis=1)).argmax(axis=1)) == {0, 1}
+    parameters = EmMixture(seed=1).fit(np.repeat(values, 2, axis=1), codes, np.arange(16)).parameters
+    assert set(EmMixture.predictor(parameters)(np.repeat(values, 2, axis=1)).argmax(axis=1)) == {0, 1}
 
 
 # The parts that learners are made of
@@ -262,7 +266,7 @@ def test_votes_are_counted_and_a_tie_of_three_is_undecided():
     votes = PairVotes(3)
     first_wins = np.array([[True, True, True], [True, False, True], [False, True, False]])
     assert votes.won(first_wins).tolist() == [[2, 1, 0], [1, 1, 1], [1, 1, 1]]
-    assert undecided(votes.won(first_wins)).tolist() == [False, True, True]
+    assert is_tied(votes.won(first_wins)).tolist() == [False, True, True]
     assert votes.won_clearly(np.array([3.0, -1.0, 1.0])).argmax() == 0
 
 
@@ -306,16 +310,18 @@ def test_a_network_with_noise_stops_before_it_learns_the_noise():
 
 def test_outputs_of_all_networks_together_are_those_of_each(task):
     examples, codes, groups, fresh = task
-    parts = AnnPairs().fit(examples.values, codes, groups).parts
-    outputs = AnnPairs.array_form(parts).outputs(fresh)
-    standard = (fresh - parts['mean']) / parts['scale']
-    for pair in range(len(parts['out_bias'])):
-        network = Network(*(parts[part][pair] for part in ('hidden', 'hidden_bias', 'out')), parts['out_bias'][pair])
+    parameters = AnnPairs().fit(examples.values, codes, groups).parameters
+    outputs = AnnPairs.predictor(parameters).outputs(fresh)
+    standard = (fresh - parameters['mean']) / parameters['scale']
+    for pair in range(len(parameters['out_bias'])):
+        network = Network(
+            *(parameters[part][pair] for part in ('hidden', 'hidden_bias', 'out')), parameters['out_bias'][pair]
+        )
         np.testing.assert_allclose(outputs[:, pair], network(standard), atol=1e-9)
 
 
 def test_an_example_that_is_far_enough_moves_no_plane_and_another_just_so_far_as_needed():
-    online = OnlinePlanes(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]))
+    online = OnlineLinearClassifier(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]))
     online.update(np.array([2.0, 0.0]), 0)
     assert online.planes.tolist() == [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
     online.update(np.array([0.0, 1.0]), 0)
@@ -323,7 +329,7 @@ def test_an_example_that_is_far_enough_moves_no_plane_and_another_just_so_far_as
 
 
 def test_no_example_moves_a_plane_further_than_c():
-    online = OnlinePlanes(np.zeros((2, 2)), c=0.1)
+    online = OnlineLinearClassifier(np.zeros((2, 2)), c=0.1)
     online.update(np.array([0.1]), 0)
     np.testing.assert_allclose(online.planes, [[0.01, 0.1], [-0.01, -0.1]])
 
@@ -331,11 +337,11 @@ def test_no_example_moves_a_plane_further_than_c():
 def test_online_learning_may_stop_after_some_examples_of_each_label(make_examples):
     examples = make_examples(spread=0.5)
     codes, groups = codes_of(examples)
-    after_three = PassiveAggressive(rounds=3).fit(examples.values, codes, groups).parts
+    after_three = PassiveAggressive(rounds=3).fit(examples.values, codes, groups).parameters
     first = np.sort(np.concatenate([np.flatnonzero(codes == code)[:3] for code in range(4)]))
-    alone = PassiveAggressive().fit(examples.values[first], codes[first], groups[first]).parts
+    alone = PassiveAggressive().fit(examples.values[first], codes[first], groups[first]).parameters
     np.testing.assert_allclose(after_three['planes'], alone['planes'], atol=1e-9)
-    assert np.mean(PassiveAggressive.array_form(after_three)(examples.values).argmax(axis=1) == codes) > 0.9
+    assert np.mean(PassiveAggressive.predictor(after_three)(examples.values).argmax(axis=1) == codes) > 0.9
 
 
 @pytest.mark.parametrize('shape', [(50, 6), (5, 40)])
@@ -350,7 +356,7 @@ def test_principal_components_are_orthonormal_and_explain_what_they_should(shape
 
 def test_two_directions_have_components_of_their_own_and_odd_features_are_refused(examples):
     codes, groups = codes_of(examples)
-    components = SvmMaxWins(blocks=2).fit(examples.values, codes, groups).parts['components']
+    components = SvmMaxWins(blocks=2).fit(examples.values, codes, groups).parameters['components']
     assert not ((components[:3] != 0).any(axis=0) & (components[3:] != 0).any(axis=0)).any()
     with pytest.raises(InvalidParameter, match="'blocks' of svm_max_wins is 4"):
         SvmMaxWins(blocks=4).fit(examples.values, codes, groups)

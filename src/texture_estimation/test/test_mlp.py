@@ -41,15 +41,15 @@ def test_two_overlapping_clouds_are_reported_apart_as_well_as_can_be_and_no_bett
 def test_a_feature_that_was_constant_is_ignored_and_units_do_not_matter(examples):
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
     values = np.column_stack([examples.values, np.full(len(codes), 7.0)])
-    judge = Mlp.array_form(Mlp(epochs=5).fit(values, codes, groups).parts)
-    assert judge(values + np.eye(values.shape[1])[-1] * 1e9) == pytest.approx(judge(values), abs=1e-6)
-    in_micro = Mlp.array_form(Mlp(epochs=5).fit(values * 1e6, codes, groups).parts)
-    assert log_softmax(in_micro(values * 1e6)) == pytest.approx(log_softmax(judge(values)), abs=1e-3)
+    predict = Mlp.predictor(Mlp(epochs=5).fit(values, codes, groups).parameters)
+    assert predict(values + np.eye(values.shape[1])[-1] * 1e9) == pytest.approx(predict(values), abs=1e-6)
+    in_micro = Mlp.predictor(Mlp(epochs=5).fit(values * 1e6, codes, groups).parameters)
+    assert log_softmax(in_micro(values * 1e6)) == pytest.approx(log_softmax(predict(values)), abs=1e-3)
 
 
 def test_the_same_seed_learns_the_same(examples):
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
-    first, again = (Mlp(epochs=2).fit(examples.values, codes, groups).parts for _ in range(2))
+    first, again = (Mlp(epochs=2).fit(examples.values, codes, groups).parameters for _ in range(2))
     assert all(np.array_equal(first[name], again[name]) for name in first)
 
 
@@ -57,10 +57,10 @@ def test_the_same_seed_learns_the_same(examples):
 def test_the_array_form_decides_every_window_as_scikit_learn_with_the_same_weights(make_examples):
     examples, fresh = make_examples(spread=2.0), make_examples(seed=5, spread=3.0).values
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
-    parts = Mlp(hidden=16, epochs=5).fit(examples.values, codes, groups).parts
+    parameters = Mlp(hidden=16, epochs=5).fit(examples.values, codes, groups).parameters
     network = MLPClassifier((16,), max_iter=1, random_state=0).fit(examples.values, codes)
-    network.coefs_ = [parts['hidden'], parts['output']]
-    network.intercepts_ = [parts['hidden_offset'], parts['output_offset']]
-    answers = Mlp.array_form(parts)(fresh)
+    network.coefs_ = [parameters['hidden'], parameters['output']]
+    network.intercepts_ = [parameters['hidden_offset'], parameters['output_offset']]
+    answers = Mlp.predictor(parameters)(fresh)
     np.testing.assert_array_equal(answers.argmax(axis=1), network.predict(fresh))
     np.testing.assert_allclose(log_softmax(answers), network.predict_log_proba(fresh), atol=1e-9)

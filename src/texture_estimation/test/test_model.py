@@ -7,10 +7,10 @@ import pytest
 import skops.io
 
 from texture_core.errors import ModelMismatch
-from texture_core.motion import Motion
+from texture_core.slide_motion import SlideMotion
 from texture_estimation.classification.training import train
 from texture_estimation.model import load_model
-from texture_estimation.next_motion.choice import Explorations
+from texture_estimation.next_motion.next_touch_model import NextTouchModel
 from texture_estimation.recipe import load_recipe
 
 
@@ -75,7 +75,7 @@ def rewrite(saved, content, **changes):
 
 
 def test_a_file_with_types_no_model_holds_is_refused_before_it_is_built(saved, model):
-    rewrite(saved, skops.io.dumps({**model.parts, 'extra': np.ufunc}))
+    rewrite(saved, skops.io.dumps({**model.parameters, 'extra': np.ufunc}))
     refused(saved, 'which no model of this suite holds')
 
 
@@ -96,25 +96,28 @@ def test_parts_that_do_not_fit_the_card_are_refused(saved, model):
 
 
 def test_a_model_of_slides_of_several_kinds_knows_them_after_it_was_saved(examples, tmp_path):
-    motions = [Motion('linear_slide', 0.0, 0.1, 2.0, 1.0), Motion('linear_slide', 1.5, 0.1, 2.0, 1.0)]
+    motions = [SlideMotion('linear_slide', 0.0, 0.1, 2.0, 1.0), SlideMotion('linear_slide', 1.5, 0.1, 2.0, 1.0)]
     made = {slide: motions[int(slide[-1]) % 2] for slide in examples.groups.tolist()}
     model = train(load_recipe('default'), dataclasses.replace(examples, motions=made))
     loaded = load_model(model.save(tmp_path / 'choosing'))
-    assert list(loaded.explorations.felt) == motions
+    assert list(loaded.next_touch_model.gaussians) == motions
     assert [motion['direction_rad'] for motion in loaded.card['motions']] == [0.0, 1.5]
     slide = examples.values[examples.groups == 'felt/1'].mean(axis=0)
-    known = model.explorations
-    belief = known.update(known.ignorance, motions[1], slide)
-    np.testing.assert_array_equal(loaded.explorations.update(known.ignorance, motions[1], slide), belief)
+    known = model.next_touch_model
+    belief = known.update(known.uniform_log_prior, motions[1], slide)
+    np.testing.assert_array_equal(loaded.next_touch_model.update(known.uniform_log_prior, motions[1], slide), belief)
     assert known.textures[belief.argmax()] == 'felt'
 
 
 @pytest.mark.parametrize('part', ['means', 'projection'])
 def test_a_model_whose_motions_are_no_numbers_is_refused(part, model, tmp_path):
-    parts = {'textures': ['a', 'b'], 'motions': [dataclasses.asdict(Motion('linear_slide', 0.0, 0.1, 2.0, 1.0))]}
+    parameters = {
+        'textures': ['a', 'b'],
+        'motions': [dataclasses.asdict(SlideMotion('linear_slide', 0.0, 0.1, 2.0, 1.0))],
+    }
     numbers = {'means': np.zeros((1, 2, 3)), 'projection': np.zeros((len(model.names), 3))}
-    whole = Explorations.from_parts({**parts, **numbers})
+    whole = NextTouchModel.from_arrays({**parameters, **numbers})
     numbers[part] = numbers[part] * np.nan
-    broken = Explorations.from_parts({**parts, **numbers})
-    assert load_model(dataclasses.replace(model, explorations=whole).save(tmp_path / 'whole')).explorations
-    refused(dataclasses.replace(model, explorations=broken).save(tmp_path / 'broken'), 'not finite')
+    broken = NextTouchModel.from_arrays({**parameters, **numbers})
+    assert load_model(dataclasses.replace(model, next_touch_model=whole).save(tmp_path / 'whole')).next_touch_model
+    refused(dataclasses.replace(model, next_touch_model=broken).save(tmp_path / 'broken'), 'not finite')

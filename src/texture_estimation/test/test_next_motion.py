@@ -1,4 +1,4 @@
-"""The motion that tells most is chosen, by information that has known values."""
+"""The motion that gives the largest information gain is chosen, by information that has known values."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.features import FeatureVector
-from texture_core.motion import Motion
-from texture_estimation.next_motion.choice import Explorations, Felt, slide_values
+from texture_core.slide_motion import SlideMotion
+from texture_estimation.next_motion.next_touch_model import ClassConditionalGaussian, NextTouchModel, slide_values
 
-ACROSS = Motion('linear_slide', 0.0, 0.1, 2.0, 1.0)
+ACROSS = SlideMotion('linear_slide', 0.0, 0.1, 2.0, 1.0)
 ALONG = replace(ACROSS, direction_rad=np.pi / 2)
 SHORT = replace(ALONG, duration_s=0.5)
 N = 200
 
 
-def slides(means: dict[Motion, dict[str, float]], n_features: int = 2, count: int = N) -> Explorations:
+def slides(means: dict[SlideMotion, dict[str, float]], n_features: int = 2, count: int = N) -> NextTouchModel:
     """Learn from slides whose first feature has a mean by motion and texture; all features have a variance of 1."""
     rng = np.random.default_rng(0)
     cases = [(motion, texture, mean) for motion, by in means.items() for texture, mean in by.items()]
@@ -27,7 +27,7 @@ def slides(means: dict[Motion, dict[str, float]], n_features: int = 2, count: in
     values[..., 0] += np.array([mean for *_, mean in cases])[:, None]
     textures = [texture for _, texture, _ in cases for _ in range(count)]
     motions = [motion for motion, *_ in cases for _ in range(count)]
-    return Explorations.learnt(values.reshape(-1, n_features), textures, motions)
+    return NextTouchModel.fit(values.reshape(-1, n_features), textures, motions)
 
 
 LIKE = {'a': 0.0, 'b': 0.0}
@@ -36,77 +36,77 @@ UNLIKE = {'a': -2.0, 'b': 2.0}
 
 @pytest.mark.parametrize('seed', [None, 1])
 def test_the_only_direction_in_which_two_textures_differ_is_chosen_though_it_is_longer(seed: int | None) -> None:
-    learnt = slides({SHORT: LIKE, ACROSS: UNLIKE})
+    training = slides({SHORT: LIKE, ACROSS: UNLIKE})
     rng = None if seed is None else np.random.default_rng(seed)
-    assert learnt.best(learnt.ignorance, [SHORT, ACROSS], rng).motion == ACROSS
+    assert training.best_motion(training.uniform_log_prior, [SHORT, ACROSS], rng).motion == ACROSS
 
 
 @pytest.mark.parametrize('seed', [None, 1])
 def test_equal_textures_report_nothing_and_the_shortest_motion_is_chosen(seed: int | None) -> None:
-    learnt = slides({ACROSS: LIKE, SHORT: LIKE, ALONG: LIKE})
+    training = slides({ACROSS: LIKE, SHORT: LIKE, ALONG: LIKE})
     rng = None if seed is None else np.random.default_rng(seed)
-    motion, information = learnt.best(learnt.ignorance, [ACROSS, SHORT, ALONG], rng)
+    motion, information = training.best_motion(training.uniform_log_prior, [ACROSS, SHORT, ALONG], rng)
     assert motion == SHORT
     assert information == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_choice_depends_on_the_candidates_that_remain() -> None:
-    learnt = slides({ACROSS: {'a': -9.0, 'b': 9.0, 'c': 9.0}, ALONG: {'a': 0.0, 'b': 0.0, 'c': 3.0}})
-    assert learnt.best(learnt.ignorance, [ACROSS, ALONG]).motion == ACROSS
-    after = learnt.update(learnt.ignorance, ACROSS, np.array([9.0, 0.0]))
+    training = slides({ACROSS: {'a': -9.0, 'b': 9.0, 'c': 9.0}, ALONG: {'a': 0.0, 'b': 0.0, 'c': 3.0}})
+    assert training.best_motion(training.uniform_log_prior, [ACROSS, ALONG]).motion == ACROSS
+    after = training.update(training.uniform_log_prior, ACROSS, np.array([9.0, 0.0]))
     assert np.exp(after) == pytest.approx([0.0, 0.5, 0.5], abs=1e-3)
-    assert learnt.best(after, [ACROSS, ALONG]).motion == ALONG
+    assert training.best_motion(after, [ACROSS, ALONG]).motion == ALONG
 
 
 def test_one_texture_is_known_before_the_first_slide() -> None:
-    learnt = slides({ACROSS: {'a': 0.0}, SHORT: {'a': 1.0}})
-    assert learnt.best(learnt.ignorance, [ACROSS, SHORT]) == (SHORT, 0.0)
-    assert learnt.update(learnt.ignorance, ACROSS, np.array([5.0, 5.0])) == pytest.approx([0.0])
+    training = slides({ACROSS: {'a': 0.0}, SHORT: {'a': 1.0}})
+    assert training.best_motion(training.uniform_log_prior, [ACROSS, SHORT]) == (SHORT, 0.0)
+    assert training.update(training.uniform_log_prior, ACROSS, np.array([5.0, 5.0])) == pytest.approx([0.0])
 
 
 def test_probabilities_add_up_to_one_after_any_slide_however_strange() -> None:
-    learnt = slides({ACROSS: UNLIKE})
+    training = slides({ACROSS: UNLIKE})
     for value in (0.0, 2.0, -1e6, 1e6):
-        after = learnt.update(learnt.ignorance, ACROSS, np.array([value, 0.0]))
+        after = training.update(training.uniform_log_prior, ACROSS, np.array([value, 0.0]))
         assert np.exp(after).sum() == pytest.approx(1.0)
 
 
 def test_a_slide_moves_the_odds_by_the_ratio_of_the_gaussians() -> None:
-    felt = Felt(np.array([[-1.0], [1.0]]))
-    learnt = Explorations(('a', 'b'), np.eye(1), {ACROSS: felt})
-    odds = np.subtract(*learnt.update(learnt.ignorance, ACROSS, np.array([0.3]))[::-1])
+    gaussians = ClassConditionalGaussian(np.array([[-1.0], [1.0]]))
+    training = NextTouchModel(('a', 'b'), np.eye(1), {ACROSS: gaussians})
+    odds = np.subtract(*training.update(training.uniform_log_prior, ACROSS, np.array([0.3]))[::-1])
     assert odds == pytest.approx(2.0 * 0.3)
 
 
 @pytest.mark.parametrize(('apart', 'nats'), [(0.0, 0.0), (2.0, 0.3368), (4.0, 0.6327), (100.0, np.log(2))])
 def test_information_of_two_gaussians_is_that_of_a_channel_with_two_signals(apart: float, nats: float) -> None:
     """Capacity of the binary-input Gaussian channel, by numerical integration."""
-    felt = Felt(np.array([[-apart / 2], [apart / 2]]))
+    gaussians = ClassConditionalGaussian(np.array([[-apart / 2], [apart / 2]]))
     prior = np.log([0.5, 0.5])
     draws = np.random.default_rng(0).standard_normal((40_000, 1))
-    assert felt.sampled_information(prior, draws) == pytest.approx(nats, abs=5e-3)
+    assert gaussians.sampled_information(prior, draws) == pytest.approx(nats, abs=5e-3)
     bound = np.log(2) - np.log1p(np.exp(-(apart**2) / 8))
-    assert felt.least_information(prior) == pytest.approx(bound)
+    assert gaussians.least_information(prior) == pytest.approx(bound)
     assert bound <= nats + 1e-9
 
 
 def test_impossible_textures_count_for_nothing() -> None:
-    learnt = slides({ACROSS: {'a': -9.0, 'b': 9.0, 'c': 0.0}})
+    training = slides({ACROSS: {'a': -9.0, 'b': 9.0, 'c': 0.0}})
     only = np.array([-np.inf, 0.0, -np.inf])
-    assert learnt.information(only, ACROSS) == 0.0
-    assert learnt.information(only, ACROSS, np.random.default_rng(0)) == 0.0
+    assert training.information(only, ACROSS) == 0.0
+    assert training.information(only, ACROSS, np.random.default_rng(0)) == 0.0
 
 
 def test_scaled_doubled_and_constant_features_change_nothing_that_matters() -> None:
     rng = np.random.default_rng(3)
     values = rng.standard_normal((40, 1)) + np.repeat([[0.0], [3.0]], 20, axis=0)
     textures, motions = ['a'] * 20 + ['b'] * 20, [ACROSS] * 40
-    plain = Explorations.learnt(values, textures, motions)
+    plain = NextTouchModel.fit(values, textures, motions)
     for scale in (1e-6, 1.0, 1e6):
-        odd = Explorations.learnt(np.hstack([values * scale, values, np.full((40, 1), 7.0)]), textures, motions)
-        after = odd.update(odd.ignorance, ACROSS, np.array([3.0 * scale, 3.0, 7.0]))
+        odd = NextTouchModel.fit(np.hstack([values * scale, values, np.full((40, 1), 7.0)]), textures, motions)
+        after = odd.update(odd.uniform_log_prior, ACROSS, np.array([3.0 * scale, 3.0, 7.0]))
         assert np.isfinite(after).all()
-        assert after.argmax() == plain.update(plain.ignorance, ACROSS, np.array([3.0])).argmax() == 1
+        assert after.argmax() == plain.update(plain.uniform_log_prior, ACROSS, np.array([3.0])).argmax() == 1
 
 
 @pytest.mark.parametrize(
@@ -120,10 +120,10 @@ def test_scaled_doubled_and_constant_features_change_nothing_that_matters() -> N
     ],
 )
 def test_slides_that_cannot_be_learnt_from_are_refused(
-    values: np.ndarray, textures: list[str], motions: list[Motion], said: str
+    values: np.ndarray, textures: list[str], motions: list[SlideMotion], said: str
 ) -> None:
     with pytest.raises(InvalidData, match=said):
-        Explorations.learnt(values, textures, motions)
+        NextTouchModel.fit(values, textures, motions)
 
 
 @pytest.mark.parametrize('seed', range(3))
@@ -131,9 +131,9 @@ def test_what_lies_apart_by_chance_reports_nothing(seed: int) -> None:
     """Three slides of each texture on 40 features: their means are far apart, their distributions the same."""
     rng = np.random.default_rng(seed)
     values = rng.standard_normal((60, 40))
-    learnt = Explorations.learnt(values, ['a', 'b'] * 30, [ACROSS] * 6 + [ALONG] * 54)
-    assert learnt.information(learnt.ignorance, ACROSS) < 0.35
-    after = [learnt.update(learnt.ignorance, ACROSS, slide) for slide in rng.standard_normal((200, 40))]
+    training = NextTouchModel.fit(values, ['a', 'b'] * 30, [ACROSS] * 6 + [ALONG] * 54)
+    assert training.information(training.uniform_log_prior, ACROSS) < 0.35
+    after = [training.update(training.uniform_log_prior, ACROSS, slide) for slide in rng.standard_normal((200, 40))]
     assert np.exp(np.max(after, axis=1)).mean() < 0.85
 
 
@@ -142,25 +142,27 @@ def test_slides_of_an_arm_are_gathered_by_the_motion_that_was_meant() -> None:
     textures = ['a', 'b'] * 12
     motions = [replace(ACROSS, speed_m_s=0.1 + 0.001 * k, direction_rad=3.0 * (k % 4 < 2)) for k in range(12)] * 2
     values = rng.standard_normal((25, 3))
-    learnt = Explorations.of_slides(values, [*textures, 'a'], [*motions, None])
-    assert learnt is not None
-    assert {motion.direction_rad for motion in learnt.felt} == {0.0, 3.0}
+    training = NextTouchModel.of_slides(values, [*textures, 'a'], [*motions, None])
+    assert training is not None
+    assert {motion.direction_rad for motion in training.gaussians} == {0.0, 3.0}
     alone = [replace(ACROSS, speed_m_s=0.3)]
-    more = Explorations.of_slides(values, [*textures, 'a'], [*motions, *alone])
+    more = NextTouchModel.of_slides(values, [*textures, 'a'], [*motions, *alone])
     assert more is not None
-    assert more.felt.keys() == learnt.felt.keys()
-    assert Explorations.of_slides(values[:24], textures, [ACROSS] * 24) is None
-    assert Explorations.of_slides(values[:0], [], []) is None
+    assert more.gaussians.keys() == training.gaussians.keys()
+    assert NextTouchModel.of_slides(values[:24], textures, [ACROSS] * 24) is None
+    assert NextTouchModel.of_slides(values[:0], [], []) is None
 
 
 def test_its_parts_say_all() -> None:
-    learnt = slides({ACROSS: UNLIKE, ALONG: LIKE})
-    again = Explorations.from_parts(learnt.as_parts())
-    assert again.textures == learnt.textures
-    assert again.best(again.ignorance, [ALONG, ACROSS]) == learnt.best(learnt.ignorance, [ALONG, ACROSS])
+    training = slides({ACROSS: UNLIKE, ALONG: LIKE})
+    again = NextTouchModel.from_arrays(training.as_arrays())
+    assert again.textures == training.textures
+    assert again.best_motion(again.uniform_log_prior, [ALONG, ACROSS]) == training.best_motion(
+        training.uniform_log_prior, [ALONG, ACROSS]
+    )
     values = np.array([0.3, 0.1])
-    assert again.update(again.ignorance, ACROSS, values) == pytest.approx(
-        learnt.update(learnt.ignorance, ACROSS, values)
+    assert again.update(again.uniform_log_prior, ACROSS, values) == pytest.approx(
+        training.update(training.uniform_log_prior, ACROSS, values)
     )
 
 
@@ -177,12 +179,12 @@ def test_a_slide_is_the_mean_of_its_usable_windows() -> None:
 
 
 def test_motions_and_values_that_were_not_learnt_are_refused() -> None:
-    learnt = slides({ACROSS: UNLIKE})
+    training = slides({ACROSS: UNLIKE})
     with pytest.raises(InvalidParameter, match='was not learnt'):
-        learnt.best(learnt.ignorance, [ALONG])
+        training.best_motion(training.uniform_log_prior, [ALONG])
     with pytest.raises(InvalidParameter, match='no motion to choose from'):
-        learnt.best(learnt.ignorance, [])
+        training.best_motion(training.uniform_log_prior, [])
     with pytest.raises(InvalidData, match='2 finite values'):
-        learnt.update(learnt.ignorance, ACROSS, np.zeros(3))
+        training.update(training.uniform_log_prior, ACROSS, np.zeros(3))
     with pytest.raises(InvalidData, match='one for each of the 2 textures'):
-        learnt.update(np.zeros(3), ACROSS, np.zeros(2))
+        training.update(np.zeros(3), ACROSS, np.zeros(2))

@@ -9,19 +9,19 @@ from scipy.signal import lfilter
 from texture_core.resources import folder
 from texture_core.window import Window
 from texture_estimation.classification.training import train
-from texture_estimation.incremental.ridge_classifier import TaughtHead
+from texture_estimation.incremental.ridge_classifier import RidgeClassifier
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.open_set.novelty import Familiarity
+from texture_estimation.open_set.novelty import NoveltyDetector
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_estimation.roughness.catalogue import HEADS
-from texture_estimation.roughness.head import ROUGH, SMOOTH
+from texture_estimation.roughness.catalogue import REGRESSORS
+from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 from texture_features.labelled_features import LabelledFeatures
 from texture_features.windowing.windows import CutWindow
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 SHIPPED.remove('kaboli-svm')  # it takes its time; its features are those of the others, its learner is tried above
-# Where nothing tells surfaces apart, these find all equally probable; votes between pairs go to one of them.
+# Where nothing distinguishs surfaces, these find all equally probable; votes between pairs go to one of them.
 EVEN = frozenset({'mlp', 'svm_rbf', 'naive_bayes'})
 FLOORED = frozenset({'any-speed'})
 RATES_HZ = {'signal': 1000.0, 'signal_static': 100.0}
@@ -85,10 +85,10 @@ def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, m
     examples = make_examples(slides=6)
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
     values = change(examples.values)
-    familiarity = Familiarity.learnt(values, codes, groups, 1.0, 0.05)
+    novelty_detector = NoveltyDetector.fit(values, codes, groups, 1.0, 0.05)
     means = np.stack([values[groups == group].mean(axis=0) for group in np.unique(groups)])
-    assert np.mean([familiarity.knows(mean, 5.0) for mean in means]) > 0.9
-    assert not familiarity.knows(means[0] + 100.0 * np.ptp(values, axis=0), 5.0)
+    assert np.mean([novelty_detector.is_known(mean, 5.0) for mean in means]) > 0.9
+    assert not novelty_detector.is_known(means[0] + 100.0 * np.ptp(values, axis=0), 5.0)
 
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')
@@ -96,22 +96,22 @@ def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, m
 def test_what_was_taught_live_is_judged_with_finite_log_probabilities(change, make_examples):
     examples = make_examples(slides=2, windows=4)
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
-    head = TaughtHead(change(examples.values), codes, groups, trained=lambda rows: np.zeros((len(rows), 4)))
+    regressor = RidgeClassifier(change(examples.values), codes, groups, trained=lambda rows: np.zeros((len(rows), 4)))
     for values in (change(make_examples(seed=1).values), np.zeros((1, change(examples.values).shape[1]))):
-        assert np.isfinite(log_softmax(head.judge(values))).all()
+        assert np.isfinite(log_softmax(regressor.predictor(values))).all()
 
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')
-@pytest.mark.parametrize('head', HEADS)
+@pytest.mark.parametrize('regressor', REGRESSORS)
 @pytest.mark.parametrize('change', DIFFICULT.values(), ids=DIFFICULT)
-def test_grades_are_near_the_scale_or_none_at_all(head, change):
+def test_grades_are_near_the_scale_or_none_at_all(regressor, change):
     rng = np.random.default_rng(0)
     textures = np.repeat(np.arange(10), 6)
     grades = 1.0 + textures % 5.0
     values = change(grades[:, None] * [3.0, 0.0, 1.0] + 0.3 * rng.normal(size=(60, 3)))
-    grader = HEADS[head]().array_form(HEADS[head]().fit(values, grades, textures))
+    predictor = REGRESSORS[regressor]().predictor(REGRESSORS[regressor]().fit(values, grades, textures))
     for asked in (values, np.zeros((1, values.shape[1]))):
-        found, std = grader(asked)
+        found, std = predictor(asked)
         assert (((found > SMOOTH - 0.5) & (found < ROUGH + 0.5)) | np.isnan(found)).all()
         assert np.isfinite(std).all()
 
@@ -120,7 +120,7 @@ def windows_of(recipe, factor=1.0, seed=0, slides=3, constant=False):
     """Return the features of slides over three surfaces that differ in strength and colour, times a factor."""
     rng = np.random.default_rng(seed)
     length_s = recipe.feature_set.windows.length_s
-    pieces, surfaces = [], {}
+    events, surfaces = [], {}
     for number, surface in enumerate(('cork', 'felt', 'slate')):
         for slide in range(slides):
             surfaces[f'{surface}/{slide}'] = surface
@@ -128,11 +128,11 @@ def windows_of(recipe, factor=1.0, seed=0, slides=3, constant=False):
                 windows = {}
                 for topic, rate_hz in RATES_HZ.items():
                     noise = rng.normal(size=(round(length_s * rate_hz), 2))
-                    felt = 10.0**number * lfilter([1.0], [1.0, -0.45 * number], noise, axis=0)
-                    samples = (factor * (np.full_like(noise, 0.1) if constant else felt)).astype(np.float32)
+                    measured = 10.0**number * lfilter([1.0], [1.0, -0.45 * number], noise, axis=0)
+                    samples = (factor * (np.full_like(noise, 0.1) if constant else measured)).astype(np.float32)
                     windows[topic] = Window(samples.astype(np.float64), rate_hz, ('a', 'b'), 0, 0.1, 2.0)
-                pieces.append(CutWindow(place, f'{surface}/{slide}', length_s, length_s, windows, 0.1, 2.0))
-    return LabelledFeatures.from_vectors(recipe.feature_set.describe_many(pieces), surfaces)
+                events.append(CutWindow(place, f'{surface}/{slide}', length_s, length_s, windows, 0.1, 2.0))
+    return LabelledFeatures.from_vectors(recipe.feature_set.extract_many(events), surfaces)
 
 
 @pytest.fixture(scope='module', params=SHIPPED)
@@ -141,23 +141,23 @@ def recipe(request):
 
 
 @pytest.fixture(scope='module')
-def learnt(recipe):
+def training(recipe):
     return train(recipe, windows_of(recipe))
 
 
 @pytest.mark.parametrize('factor', [1e6, 1e-6])
-def test_in_other_units_a_recipe_learns_to_report_as_much(recipe, learnt, factor):
-    strange = train(recipe, windows_of(recipe, factor))
-    told = accuracy(strange, windows_of(recipe, factor, seed=1))
-    as_much = told > accuracy(learnt, windows_of(recipe, seed=1)) - 0.1
+def test_in_other_units_a_recipe_learns_to_report_as_much(recipe, training, factor):
+    novel = train(recipe, windows_of(recipe, factor))
+    reported = accuracy(novel, windows_of(recipe, factor, seed=1))
+    as_much = reported > accuracy(training, windows_of(recipe, seed=1)) - 0.1
     assert as_much != (factor < 1.0 and recipe.name in FLOORED)
 
 
 @pytest.mark.parametrize('changed', [{'factor': 1e6}, {'factor': 1e-6}, {'constant': True}], ids=str)
-def test_a_signal_as_none_that_was_learnt_gets_an_answer_in_finite_numbers(recipe, learnt, changed):
+def test_a_signal_as_none_that_was_learnt_gets_an_answer_in_finite_numbers(recipe, training, changed):
     values = windows_of(recipe, seed=1, **changed).values
     assert np.isfinite(values).all()
-    assert np.isfinite(learnt.predict_log_proba(values)).all()
+    assert np.isfinite(training.predict_log_proba(values)).all()
 
 
 def test_from_signals_that_stand_still_nothing_is_learnt(recipe):

@@ -2,24 +2,24 @@ import numpy as np
 import pytest
 
 from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.open_set.prediction_sets import PredictionSets, learnt
+from texture_estimation.open_set.prediction_sets import PredictionSets, fit_prediction_sets
 
-WORTHS = np.array([1.0, 2.0, 4.0])
+EFFECTIVE_WINDOWS = np.array([1.0, 2.0, 4.0])
 
 
 def slides(rng, count, labels=6):
     truths = rng.integers(labels, size=count)
     scores = rng.normal(size=(count, 3, labels)) + 2.0 * np.eye(labels)[truths][:, None]
-    return list(log_softmax(scores * np.sqrt(WORTHS)[:, None])), truths.tolist(), [WORTHS] * count
+    return list(log_softmax(scores * np.sqrt(EFFECTIVE_WINDOWS)[:, None])), truths.tolist(), [EFFECTIVE_WINDOWS] * count
 
 
 @pytest.mark.parametrize('coverage', [0.8, 0.95])
 def test_the_true_texture_is_in_the_set_as_often_as_asked(coverage):
     rng = np.random.default_rng(0)
-    sets = learnt(*slides(rng, 2000), coverage)
+    prediction_sets = fit_prediction_sets(*slides(rng, 2000), coverage)
     posteriors, truths, _ = slides(rng, 2000)
     found = [
-        truth in sets.members(np.exp(posterior[place]), WORTHS[place])
+        truth in prediction_sets.members(np.exp(posterior[place]), EFFECTIVE_WINDOWS[place])
         for posterior, truth in zip(posteriors, truths, strict=True)
         for place in range(3)
     ]
@@ -27,8 +27,8 @@ def test_the_true_texture_is_in_the_set_as_often_as_asked(coverage):
 
 
 def test_with_too_few_slides_for_the_coverage_all_textures_are_in_the_set():
-    sets = learnt(*slides(np.random.default_rng(0), 9), 0.95)
-    assert sets.members(np.array([0.7, 0.0, 0.3]), 1.0) == [0, 2, 1]
+    prediction_sets = fit_prediction_sets(*slides(np.random.default_rng(0), 9), 0.95)
+    assert prediction_sets.members(np.array([0.7, 0.0, 0.3]), 1.0) == [0, 2, 1]
 
 
 def test_the_most_probable_texture_is_always_in_the_set():

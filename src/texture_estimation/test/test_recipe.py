@@ -47,5 +47,5 @@ def test_a_wrong_recipe_gets_one_sentence_that_says_where(more, sentence):
 
 def test_what_rules_decisions_about_textures_is_no_parameter_of_a_roughness_recipe():
     assert RoughnessRecipe.from_mapping({**INPUTS, 'training': {'folds': 5}}, 'mine').training.folds == 5
-    with pytest.raises(InvalidParameter, match='false_rejections'):
-        RoughnessRecipe.from_mapping({**INPUTS, 'training': {'false_rejections': 0.1}}, 'mine')
+    with pytest.raises(InvalidParameter, match='false_rejection_rate'):
+        RoughnessRecipe.from_mapping({**INPUTS, 'training': {'false_rejection_rate': 0.1}}, 'mine')

@@ -9,7 +9,7 @@ from texture_core.features import FeatureVector
 from texture_estimation.classification.training import train
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
-from texture_estimation.roughness.evidence import NO_MODEL, NO_WINDOW, SILENT, RoughnessEvidence
+from texture_estimation.roughness.evidence import NO_MODEL, NO_WINDOW, SILENT, RoughnessAccumulator
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.model import NORMAL_90, load_roughness_model
 from texture_estimation.roughness.recipe import RoughnessRecipe
@@ -17,8 +17,8 @@ from texture_estimation.roughness.training import hold_out, train_grades
 from texture_features.labelled_features import LabelledFeatures
 
 FINGERPRINT = 'abcd1234 signal=1000Hz*1'
-NAMES = ('signal/integral/f', 'signal/arc_length/f', 'signal/bursts/f', 'signal/log_variance/f')
-INPUTS = {'inputs': {'signal': {'features': ['integral', 'arc_length', 'bursts', 'log_variance']}}}
+NAMES = ('signal/signal_energy/f', 'signal/arc_length/f', 'signal/peak_to_median_power/f', 'signal/log_variance/f')
+INPUTS = {'inputs': {'signal': {'features': ['signal_energy', 'arc_length', 'peak_to_median_power', 'log_variance']}}}
 SPREAD = 0.4  # of people's opinions, in grades
 
 
@@ -31,9 +31,9 @@ def graded(seed=0, n_textures=15, windows=12, first=0):
     rng = np.random.default_rng(seed)
     values, labels, grades = [], [], {}
     for number in range(first, first + n_textures):
-        felt = 1.0 + 4.0 * rng.uniform()
-        grades[f't{number}'] = float(np.clip(felt + SPREAD * rng.normal(), 1.0, 5.0))
-        rows = rng.normal(size=(windows, 4)) * [0.2, 0.2, 0.1, 0.1] + [felt, 0.0, 0.5, 8.0]
+        measured = 1.0 + 4.0 * rng.uniform()
+        grades[f't{number}'] = float(np.clip(measured + SPREAD * rng.normal(), 1.0, 5.0))
+        rows = rng.normal(size=(windows, 4)) * [0.2, 0.2, 0.1, 0.1] + [measured, 0.0, 0.5, 8.0]
         values.append(rows)
         labels += [f't{number}'] * windows
     examples = LabelledFeatures(
@@ -57,12 +57,12 @@ def last(identity='e1'):
 
 
 def never_early(model):
-    evidence = dataclasses.replace(model.recipe.evidence, narrow_grades=0.0)
+    evidence = dataclasses.replace(model.recipe.evidence, min_narrowing_grades=0.0)
     return dataclasses.replace(model, recipe=dataclasses.replace(model.recipe, evidence=evidence))
 
 
 def test_the_grade_of_a_slide_is_that_of_its_windows_with_an_interval(model) -> None:
-    evidence = RoughnessEvidence(never_early(model))
+    evidence = RoughnessAccumulator(never_early(model))
     first, *_, before_last = [evidence.update(vector(sequence=k)) for k in range(6)]
     final = evidence.update(last())
     assert final.valid
@@ -72,20 +72,20 @@ def test_the_grade_of_a_slide_is_that_of_its_windows_with_an_interval(model) -> 
 
 
 def test_a_grade_carries_the_frame_of_its_vectors(model) -> None:
-    assert RoughnessEvidence(model).update(vector(frame_id='tip')).frame_id == 'tip'
+    assert RoughnessAccumulator(model).update(vector(frame_id='tip')).frame_id == 'tip'
 
 
 def test_more_sliding_never_makes_surer_than_people_agree(model) -> None:
-    evidence = RoughnessEvidence(never_early(model))
+    evidence = RoughnessAccumulator(never_early(model))
     for number in range(500):
         estimate = evidence.update(vector(sequence=number))
     assert estimate.grade_std > 0.7 * SPREAD
 
 
 def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(model) -> None:
-    evidence = RoughnessEvidence(model)
-    heard = [evidence.update(vector(sequence=5 * k)) for k in range(50)] + [evidence.update(last())]
-    said = [estimate for estimate in heard if estimate]
+    evidence = RoughnessAccumulator(model)
+    received = [evidence.update(vector(sequence=5 * k)) for k in range(50)] + [evidence.update(last())]
+    said = [estimate for estimate in received if estimate]
     assert 3 <= len(said) < 50
     assert [estimate.final for estimate in said] == [False] * (len(said) - 1) + [True]
     assert evidence.update(vector(identity='e2')).windows == 1
@@ -97,13 +97,13 @@ def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(mod
         (vector(force_n=0.01), 'no contact: the force is 0.01 N'),
         (vector((3.0, 0.0, 0.5, 2.0)), 'weaker than on the smoothest surface'),
         (vector((3.0, 0.0, 4.0, 8.0)), 'skids'),
-        (vector((np.nan, 0.0, 0.5, 8.0)), "'signal/integral/f' is not finite"),
+        (vector((np.nan, 0.0, 0.5, 8.0)), "'signal/signal_energy/f' is not finite"),
         (vector((3.0, 0.0, 0.5, np.inf)), "'signal/log_variance/f' is not finite"),
         (vector(feature_set='abcd1234 signal=2000Hz*1'), 'the sampling rate'),
     ],
 )
 def test_unusable_input_gives_no_grade_and_says_why(model, window, sentence) -> None:
-    evidence = RoughnessEvidence(model)
+    evidence = RoughnessAccumulator(model)
     for estimate in (evidence.update(window), evidence.update(last())):
         assert not estimate.valid
         assert np.isnan(estimate.grade)
@@ -113,13 +113,13 @@ def test_unusable_input_gives_no_grade_and_says_why(model, window, sentence) -> 
 
 
 def test_a_slide_too_short_and_a_missing_model_are_reported() -> None:
-    assert RoughnessEvidence(None).update(last()).message == NO_MODEL
+    assert RoughnessAccumulator(None).update(last()).message == NO_MODEL
     model = train_grades(recipe(), *graded())
-    assert RoughnessEvidence(model).update(last()).message == NO_WINDOW
+    assert RoughnessAccumulator(model).update(last()).message == NO_WINDOW
 
 
 def test_a_bad_window_among_good_ones_is_left_out(model) -> None:
-    evidence = RoughnessEvidence(never_early(model))
+    evidence = RoughnessAccumulator(never_early(model))
     evidence.update(vector())
     estimate = evidence.update(vector((3.0, 0.0, 9.0, 8.0), sequence=1))
     assert estimate.valid
@@ -128,8 +128,8 @@ def test_a_bad_window_among_good_ones_is_left_out(model) -> None:
 
 
 def test_where_no_head_fires_there_is_no_grade() -> None:
-    model = train_grades(recipe(head={'svm5': {'kernel_scale': 0.3}}), *graded())
-    evidence = RoughnessEvidence(model)
+    model = train_grades(recipe(regressor={'svm5': {'kernel_scale': 0.3}}), *graded())
+    evidence = RoughnessAccumulator(model)
     evidence.update(vector((300.0, 0.0, 0.5, 8.0)))
     estimate = evidence.update(last())
     assert (estimate.valid, estimate.message, evidence.silent) == (False, SILENT, 1)
@@ -149,21 +149,21 @@ def test_intervals_hold_as_often_as_they_claim_on_textures_never_measured() -> N
 def test_held_out_textures_are_not_learnt_from() -> None:
     class Spy:
         def __init__(self):
-            self.learnt = []
+            self.training_sets = []
 
         def fit(self, values, grades, textures):
-            self.learnt.append(set(textures.tolist()))
+            self.training_sets.append(set(textures.tolist()))
             return {}
 
         @staticmethod
-        def array_form(parts):
+        def predictor(parameters):
             return lambda values: (np.full(len(values), 3.0), np.zeros(len(values)))
 
     spy = Spy()
     textures = np.repeat(np.arange(7), 3)
     hold_out(spy, np.zeros((21, 1)), textures % 5 + 1.0, textures, folds=3)
-    assert len(spy.learnt) == 3
-    held = [set(range(7)) - learnt for learnt in spy.learnt]
+    assert len(spy.training_sets) == 3
+    held = [set(range(7)) - training_sets for training_sets in spy.training_sets]
     assert set().union(*held) == set(range(7))
     assert sum(map(len, held)) == 7
 
@@ -182,9 +182,9 @@ def test_a_saved_model_grades_alike_and_holds_no_code(model, tmp_path) -> None:
 def test_models_of_the_other_kind_are_reported_apart(model, examples, tmp_path) -> None:
     model.save(tmp_path / 'rough')
     train(load_recipe('default'), examples).save(tmp_path / 'names')
-    with pytest.raises(ModelMismatch, match='roughness_estimator takes it'):
+    with pytest.raises(ModelMismatch, match='load it in the roughness_estimator'):
         load_model(tmp_path / 'rough')
-    with pytest.raises(ModelMismatch, match='classifier takes it'):
+    with pytest.raises(ModelMismatch, match='load it in the classifier'):
         load_roughness_model(tmp_path / 'names')
 
 

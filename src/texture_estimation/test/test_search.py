@@ -12,29 +12,29 @@ from texture_estimation.classification.evidence_rules import MajorityVote
 from texture_estimation.learners.ann_pairs import AnnPairs
 from texture_estimation.learners.svm_pairs import SvmPairs
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search.division import Division
+from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.fitness import UNDECIDED, decided_by_slide, decisions, fitness
 from texture_estimation.search.genetic_search import SearchParams, search
 from texture_estimation.search.halves import random_halves
-from texture_estimation.search.judges.ann_pairs import ann_pairs
-from texture_estimation.search.judges.exact import exact
-from texture_estimation.search.judges.svm_pairs import kernel_of, svm_pairs
-from texture_estimation.search.memory import Memory
 from texture_estimation.search.optimise import optimise
 from texture_estimation.search.pairs import optimise_pairs
+from texture_estimation.search.parallel import dask_map, serial_map, threaded_map
+from texture_estimation.search.racing import HalfScores, is_clearly_worse, raced_fitness
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.scans import Scans, Stream
-from texture_estimation.search.spread import in_turn, over_cores, over_dask
-from texture_estimation.search.telling_apart import TellingApart
-from texture_estimation.search.trial import Record, has_lost, verdict
+from texture_estimation.search.score_cache import ScoreCache
+from texture_estimation.search.search_slides import SearchSlides
+from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
+from texture_estimation.search.surrogates.ann_pairs import ann_pairs
+from texture_estimation.search.surrogates.exact import exact
+from texture_estimation.search.surrogates.svm_pairs import kernel_of, svm_pairs
 from texture_estimation.search.variables import Integer, LogReal, SearchSpace
 from texture_features.windowing.windows import CutWindow
 
 SMALL = SearchParams(population=6, generations=3, halves=4)
 
 
-def tones(labels: int = 3, count: int = 8, noise: float = 1.0) -> Scans:
+def tones(labels: int = 3, count: int = 8, noise: float = 1.0) -> SlideArrays:
     """Return scans of 0.5 s at 1 kHz: each surface another tone, which shifts with the speed, and noise."""
     rng = np.random.default_rng(1)
     speed = np.tile([0.1, 0.15, 0.2, 0.15], labels * count // 4)
@@ -42,7 +42,7 @@ def tones(labels: int = 3, count: int = 8, noise: float = 1.0) -> Scans:
     phase = 2 * np.pi * (pitch[:, None] * np.arange(500) / 1000.0 + rng.random((len(speed), 1)))
     samples = np.sin(phase) + noise * rng.normal(size=phase.shape)
     names = np.repeat([f'surface_{number}' for number in range(labels)], count)
-    return Scans({'signal': Stream(samples[..., None], 1000.0)}, names, speed, np.ones_like(speed))
+    return SlideArrays({'signal': ArrayStream(samples[..., None], 1000.0)}, names, speed, np.ones_like(speed))
 
 
 def points(count: int = 60, labels: int = 4) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -66,7 +66,7 @@ def test_the_variables_and_their_ranges_are_those_of_the_papers() -> None:
         'ranking': ('choice', 'frequency, intensity'),
         'speed': ('choice', 'unused, input, stretch'),
         'force': ('choice', 'no, yes'),
-        'integral': ('choice', 'no, yes'),
+        'signal_energy': ('choice', 'no, yes'),
         'arc_length': ('choice', 'no, yes'),
         'box_constraint': ('logarithmic', '0.01 to 10'),
         'kernel_scale': ('logarithmic', '1e-05 to 100000'),
@@ -121,7 +121,7 @@ def test_a_search_space_that_is_wrong_is_refused_with_one_sentence(text, sentenc
     assert '\n' not in str(caught.value)
 
 
-# -- how it is judged
+# -- how it is evaluated
 
 
 def test_half_of_the_slides_of_each_surface_are_learnt_and_no_slide_is_on_both_sides() -> None:
@@ -160,20 +160,20 @@ def test_the_kernel_is_the_one_of_scikit_learn() -> None:
 )
 def test_a_quick_judge_decides_as_the_learner_does(learner, quick, least, labels) -> None:
     values, codes, slides = points(labels=labels)
-    learnt = random_halves(codes, slides, 1, np.random.default_rng(0))[0]
-    decided = [decisions(judge(learner, values, codes, slides)(learnt)) for judge in (quick, exact)]
+    training = random_halves(codes, slides, 1, np.random.default_rng(0))[0]
+    decided = [decisions(surrogate(learner, values, codes, slides)(training)) for surrogate in (quick, exact)]
     assert (decided[0] == decided[1]).mean() >= least
 
 
 def test_whoever_is_clearly_worse_is_given_up_and_ranked_by_what_it_lacks() -> None:
     rng = np.random.default_rng(0)
-    rival = 0.9 + 0.01 * rng.normal(size=20)
-    assert has_lost(rival[:4] - 0.1 + 0.001 * rng.normal(size=4), rival[:4])
-    assert not has_lost(rival[:4] + 0.01, rival[:4])
-    assert not has_lost(rival[:2], rival[:2])
-    worse = Record(rival[:2] - 0.1, rival[:2] - 0.1)
-    assert verdict(worse, rival, 20) == (pytest.approx(rival.mean() - 0.1), 2)
-    assert verdict(Record(rival, rival), None, 20) == (pytest.approx(rival.mean()), 20)
+    incumbent = 0.9 + 0.01 * rng.normal(size=20)
+    assert is_clearly_worse(incumbent[:4] - 0.1 + 0.001 * rng.normal(size=4), incumbent[:4])
+    assert not is_clearly_worse(incumbent[:4] + 0.01, incumbent[:4])
+    assert not is_clearly_worse(incumbent[:2], incumbent[:2])
+    worse = HalfScores(incumbent[:2] - 0.1, incumbent[:2] - 0.1)
+    assert raced_fitness(worse, incumbent, 20) == (pytest.approx(incumbent.mean() - 0.1), 2)
+    assert raced_fitness(HalfScores(incumbent, incumbent), None, 20) == (pytest.approx(incumbent.mean()), 20)
 
 
 # -- the search
@@ -200,18 +200,18 @@ def known(individuals):
 
 @pytest.mark.parametrize('race', [True, False])
 def test_the_search_finds_the_best_of_a_known_landscape(race) -> None:
-    found = search(SPACE, known, SearchParams(race=race), Memory({}))
+    found = search(SPACE, known, SearchParams(race=race), ScoreCache({}))
     best = found.ranked[0].individual
     assert abs(best[0] - 30) <= 1
     assert abs(np.log10(best[1])) <= 0.15
     assert len(found.history) == 30
     halves = found.history[-1].halves
-    assert halves == 20 * found.history[-1].judged if not race else halves < 10 * found.history[-1].judged
-    assert found.history[-1].remembered > 0
+    assert halves == 20 * found.history[-1].evaluated if not race else halves < 10 * found.history[-1].evaluated
+    assert found.history[-1].cache_hits > 0
 
 
 def test_two_objectives_give_a_front_from_cheap_to_good() -> None:
-    found = search(SPACE, known, SearchParams(objective='front'), Memory({}), cost=lambda one: float(one[0]))
+    found = search(SPACE, known, SearchParams(objective='front'), ScoreCache({}), cost=lambda one: float(one[0]))
     costs = [one.cost for one in found.front]
     assert len(costs) > 5
     assert costs == sorted(costs)
@@ -221,32 +221,32 @@ def test_two_objectives_give_a_front_from_cheap_to_good() -> None:
 
 
 def test_the_same_seed_gives_the_same_search_and_another_seed_another() -> None:
-    first, again, other = (search(SPACE, known, SearchParams(seed=seed), Memory({})) for seed in (3, 3, 4))
+    first, again, other = (search(SPACE, known, SearchParams(seed=seed), ScoreCache({})) for seed in (3, 3, 4))
     assert first == again
     assert first.ranked != other.ranked
 
 
 def test_a_search_cut_off_and_resumed_ends_as_one_in_one_go(tmp_path) -> None:
     path = tmp_path / 'checkpoint.json'
-    whole = search(SPACE, known, SearchParams(seed=1), Memory({'data': 'x'}))
-    cut = Memory({'data': 'x'})
+    whole = search(SPACE, known, SearchParams(seed=1), ScoreCache({'data': 'x'}))
+    cut = ScoreCache({'data': 'x'})
     search(SPACE, known, SearchParams(seed=1, generations=12), cut)
     cut.save(path)
-    resumed = Memory({'data': 'x'})
+    resumed = ScoreCache({'data': 'x'})
     resumed.load(path)
     tried: list[object] = []
     ended = search(SPACE, lambda new: known(tried.extend(new) or new), SearchParams(seed=1), resumed)
     assert ended.ranked == whole.ranked
     assert not set(tried) & set(cut.records)
     with pytest.raises(InvalidData, match='another search'):
-        Memory({'data': 'y'}).load(path)
+        ScoreCache({'data': 'y'}).load(path)
 
 
 def test_a_checkpoint_that_is_none_is_refused(tmp_path) -> None:
     (tmp_path / 'x.json').write_text('{"format": 1}')
     for name in ('x.json', 'none.json'):
         with pytest.raises(InvalidData, match='cannot be read'):
-            Memory({}).load(tmp_path / name)
+            ScoreCache({}).load(tmp_path / name)
 
 
 # -- on slides
@@ -258,29 +258,29 @@ def test_cached_features_are_those_of_the_feature_set() -> None:
     cache = FeatureCache(scans)
     rng = np.random.default_rng(0)
     recipes = [space.recipe(space.variables.decode(rng.random(len(space.axes)))) for _ in range(12)]
-    sets = [TellingApart().described(recipe) for recipe in recipes]
-    for plan, values in zip(sets, cache.many(sets), strict=True):
+    prediction_sets = [ClassificationTask().feature_set_of(recipe) for recipe in recipes]
+    for plan, values in zip(prediction_sets, cache.many(prediction_sets), strict=True):
         windows = scans(plan.windows).inputs['signal']
-        pieces = [
+        events = [
             CutWindow(
                 0, 'e', 0.5, 0.1,
                 {'signal': Window(samples, 1000.0, ('a',), 0, speed, force)}, speed, force,
             )
             for samples, speed, force in zip(windows.samples, windows.speed_m_s, windows.force_n, strict=True)
         ]  # fmt: skip
-        np.testing.assert_allclose(values, [vector.values for vector in plan.describe_many(pieces)], rtol=1e-9)
+        np.testing.assert_allclose(values, [vector.values for vector in plan.extract_many(events)], rtol=1e-9)
     missed = cache.misses
-    cache.many(sets)
-    assert cache.misses == missed < sum(len(plan.inputs[0].features) for plan in sets)
+    cache.many(prediction_sets)
+    assert cache.misses == missed < sum(len(plan.inputs[0].features) for plan in prediction_sets)
 
 
 def test_scans_are_cut_into_parts_that_share_a_slide() -> None:
     scans = tones()
-    parts = scans(replace(load_recipe('ets-linear-svm-vote').training_windows))
-    assert parts.inputs['signal'].samples.shape == (24 * 5, 100, 1)
-    assert (np.bincount(parts.slides) == 5).all()
+    parameters = scans(replace(load_recipe('ets-linear-svm-vote').training_windows))
+    assert parameters.inputs['signal'].samples.shape == (24 * 5, 100, 1)
+    assert (np.bincount(parameters.slides) == 5).all()
     np.testing.assert_array_equal(
-        parts.inputs['signal'].samples[:5].reshape(-1), scans.streams['signal'].samples[0].ravel()
+        parameters.inputs['signal'].samples[:5].reshape(-1), scans.streams['signal'].samples[0].ravel()
     )
     with pytest.raises(InvalidData, match=r'no window of 0\.8 s'):
         scans(load_recipe('ets-fine-svm').training_windows)
@@ -292,15 +292,17 @@ def test_scans_are_cut_into_parts_that_share_a_slide() -> None:
 )
 def test_what_is_found_is_judged_by_the_learner_itself_and_no_worse_than_where_it_began(recipe, search_space) -> None:
     space = RecipeSpace.load(search_space, load_recipe(recipe))
-    division = Division(tones(), SMALL.halves, SMALL.seed)
-    found = optimise(space, division, SMALL, TellingApart())
-    began = found.memory.records[space.of_base()]
+    search_slides = SearchSlides(tones(), SMALL.halves, SMALL.seed)
+    found = optimise(space, search_slides, SMALL, ClassificationTask())
+    began = found.score_cache.records[space.of_base()]
     assert found.best.searched.fitness >= began.means.mean()
     assert found.best.record.halves == SMALL.halves
-    task, chosen = TellingApart(), found.best.recipe
-    values = FeatureCache(division.cut).values(task.described(chosen))
+    task, chosen = ClassificationTask(), found.best.recipe
+    values = FeatureCache(search_slides.cut).values(task.feature_set_of(chosen))
     windows = chosen.training_windows
-    again = task.trial(chosen, values, division.examples(windows), division.halves(windows), quick=False).start()
+    again = task.fitness_function(
+        chosen, values, search_slides.examples(windows), search_slides.halves(windows), quick=False
+    ).start()
     assert [again(number) for number in range(4)] == list(
         zip(found.best.record.learning, found.best.record.test, strict=True)
     )
@@ -308,25 +310,25 @@ def test_what_is_found_is_judged_by_the_learner_itself_and_no_worse_than_where_i
 
 def test_slides_divided_otherwise_than_the_search_asks_are_refused() -> None:
     space = RecipeSpace.load('svm-pairs', load_recipe('ets-linear-svm'))
-    with pytest.raises(InvalidParameter, match='20 halves with seed 0, the search asks for 4 with seed 0'):
-        optimise(space, Division(tones()), SMALL, TellingApart())
+    with pytest.raises(InvalidParameter, match='20 half splits with seed 0, the search asks for 4 with seed 0'):
+        optimise(space, SearchSlides(tones()), SMALL, ClassificationTask())
 
 
 def test_cores_and_a_dask_cluster_find_what_one_core_finds(tmp_path) -> None:
     space = RecipeSpace.load('svm-pairs', load_recipe('ets-linear-svm'))
-    division = Division(tones(), SMALL.halves)
+    search_slides = SearchSlides(tones(), SMALL.halves)
 
-    def found(spread):
-        return optimise(space, division, SMALL, TellingApart(), spread=spread)
+    def found(parallel_map):
+        return optimise(space, search_slides, SMALL, ClassificationTask(), parallel_map=parallel_map)
 
-    alone = found(in_turn)
-    with over_cores(2) as spread:
-        on_cores = found(spread)
+    alone = found(serial_map)
+    with threaded_map(2) as parallel_map:
+        on_cores = found(parallel_map)
     cluster = distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None, local_directory=str(tmp_path)
     )
-    with cluster, over_dask(cluster.scheduler_address) as spread:
-        on_cluster = found(spread)
+    with cluster, dask_map(cluster.scheduler_address) as parallel_map:
+        on_cluster = found(parallel_map)
     assert alone.found == on_cores.found == on_cluster.found
     assert alone.best.recipe == on_cluster.best.recipe
 
@@ -336,12 +338,12 @@ def test_cores_and_a_dask_cluster_find_what_one_core_finds(tmp_path) -> None:
 def test_a_trial_travels_to_another_machine_and_judges_the_same_there(name, quick) -> None:
     recipe = load_recipe(name)
     scans = tones(count=4)
-    division, task = Division(scans, 2), TellingApart()
-    examples, halves = division.examples(recipe.training_windows), division.halves(recipe.training_windows)
-    values = FeatureCache(scans).values(task.described(recipe))
-    trial = task.trial(recipe, values, examples, halves, quick=quick)
-    there = distributed.protocol.deserialize(*distributed.protocol.serialize(trial, on_error='raise'))
-    assert there.start()(1) == trial.start()(1)
+    search_slides, task = SearchSlides(scans, 2), ClassificationTask()
+    examples, halves = search_slides.examples(recipe.training_windows), search_slides.halves(recipe.training_windows)
+    values = FeatureCache(scans).values(task.feature_set_of(recipe))
+    fitness_function = task.fitness_function(recipe, values, examples, halves, quick=quick)
+    there = distributed.protocol.deserialize(*distributed.protocol.serialize(fitness_function, on_error='raise'))
+    assert there.start()(1) == fitness_function.start()(1)
 
 
 def test_a_cluster_that_is_not_there_is_named(monkeypatch) -> None:
@@ -351,21 +353,21 @@ def test_a_cluster_that_is_not_there_is_named(monkeypatch) -> None:
     monkeypatch.setattr(distributed, 'Client', refuse)
     with (
         pytest.raises(InvalidParameter, match="no Dask scheduler answers at 'tcp://nowhere:1'"),
-        over_dask('tcp://nowhere:1'),
+        dask_map('tcp://nowhere:1'),
     ):
         pass
 
 
 def test_each_pair_has_a_search_and_a_checkpoint_of_its_own(tmp_path: Path) -> None:
     space = RecipeSpace.load('ets-svm', load_recipe('ets-linear-svm'))
-    division = Division(tones(), SMALL.halves)
-    found = optimise_pairs(space, division, SMALL, checkpoint=tmp_path / 'best.json')
+    search_slides = SearchSlides(tones(), SMALL.halves)
+    found = optimise_pairs(space, search_slides, SMALL, checkpoint=tmp_path / 'best.json')
     assert set(found.by_pair) == {
         ('surface_0', 'surface_1'), ('surface_0', 'surface_2'), ('surface_1', 'surface_2'),
     }  # fmt: skip
     assert len(list(tmp_path.glob('best-surface_?-vs-surface_?.json'))) == 3
     assert found.record.halves == SMALL.halves
     assert found.fitness > 0.6
-    again = optimise_pairs(space, division, SMALL, resume=tmp_path / 'best.json')
+    again = optimise_pairs(space, search_slides, SMALL, resume=tmp_path / 'best.json')
     assert again.record.test.tolist() == found.record.test.tolist()
     assert all(one.found.history[-1].halves == 0 for one in again.by_pair.values())

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from texture_estimation.learners.array_svm import export
 from texture_estimation.learners.pair_coupling import uncalibrated
+from texture_estimation.learners.svm_predictor import export
 from texture_estimation.learners.svm_rbf import SvmRbf
 
 
@@ -35,10 +35,10 @@ def test_probabilities_of_the_array_form_are_those_of_scikit_learns_decisions(ma
     examples = make_examples(labels=tuple(f'm{number:02d}' for number in range(n_labels)), spread=2.0)
     codes = np.unique(examples.labels, return_inverse=True)[1]
     groups = np.unique(examples.groups, return_inverse=True)[1]
-    parts = SvmRbf().fit(examples.values, codes, groups).parts
-    svm = SvmRbf.array_form(parts)
-    parts['svc'].set_params(decision_function_shape='ovo')
-    decisions = parts['svc'].decision_function(parts['scaler'].transform(examples.values))
+    parameters = SvmRbf().fit(examples.values, codes, groups).parameters
+    svm = SvmRbf.predictor(parameters)
+    parameters['svc'].set_params(decision_function_shape='ovo')
+    decisions = parameters['svc'].decision_function(parameters['scaler'].transform(examples.values))
     decisions = -decisions[:, None] if n_labels == 2 else decisions
     np.testing.assert_allclose(svm(examples.values), svm.coupling(decisions), atol=1e-9)
 

@@ -29,7 +29,7 @@ def test_probabilities_add_up_to_one(model, examples):
 def test_the_same_examples_make_the_same_model(model, examples):
     again = train(RECIPE, examples)
     np.testing.assert_array_equal(again.predict_log_proba(examples.values), model.predict_log_proba(examples.values))
-    assert again.growth == model.growth
+    assert again.tempering_exponent == model.tempering_exponent
 
 
 def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
@@ -41,7 +41,7 @@ def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
 
 def test_windows_of_a_slide_are_worth_less_than_independent_ones(make_examples):
     model = train(RECIPE, make_examples(spread=2.5, slides=8))
-    assert 0.0 <= model.growth < 1.0
+    assert 0.0 <= model.tempering_exponent < 1.0
 
 
 @pytest.mark.parametrize('column', [np.full, lambda n, value: np.full(n, value) + 1e-17])
@@ -75,7 +75,7 @@ def pick(examples, rows):
 
 
 def test_examples_that_cannot_be_learnt_from_get_a_sentence(examples):
-    with pytest.raises(InvalidData, match='no windows to learn from'):
+    with pytest.raises(InvalidData, match='no windows for training'):
         train(RECIPE, pick(examples, slice(0, 0)))
     with pytest.raises(InvalidData, match="all windows are of 'cork'"):
         train(RECIPE, pick(examples, examples.labels == 'cork'))
@@ -113,10 +113,10 @@ def test_the_start_of_a_slide_counts_as_often_as_asked_and_is_judged_once(exampl
 def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
     examples = make_examples()
     trusting, strict = (
-        dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejections=share))
+        dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejection_rate=share))
         for share in (0.0, 0.1)
     )
-    assert train(trusting, examples).familiarity is None
-    familiarity = train(strict, examples).familiarity
-    assert familiarity is not None
-    assert not familiarity.knows(examples.values.mean(axis=0) + 50.0, 3.0)
+    assert train(trusting, examples).novelty_detector is None
+    novelty_detector = train(strict, examples).novelty_detector
+    assert novelty_detector is not None
+    assert not novelty_detector.is_known(examples.values.mean(axis=0) + 50.0, 3.0)

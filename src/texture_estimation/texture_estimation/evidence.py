@@ -1,4 +1,4 @@
-"""Evidence about a surface, growing window by window while the finger slides."""
+"""Accumulation of evidence about a surface over the windows of a slide."""
 
 from __future__ import annotations
 
@@ -10,28 +10,27 @@ from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
-from texture_estimation.fingerprint import difference
-from texture_estimation.model import Model
-from texture_estimation.open_set.novelty import WORTHS
+from texture_estimation.fingerprint import fingerprint_difference
+from texture_estimation.model import TextureModel
+from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
 NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
 
 
-class Evidence:
-    """Join the judgements of the windows of one slide; the same code on the robot and on recordings.
+class EvidenceAccumulator:
+    """Accumulate the window predictions of one slide; the same code runs live and offline.
 
-    A new exploration id, or a vector after the `last` one, begins anew. Whether the surface is a known one is looked at
-    once the label is certain, and at the end; until then a label counts as known. Where several labels are equally
-    probable there is none: unclassified.
+    A new exploration id, or a vector after the `last` one, starts a new slide. Novelty detection runs once the label is
+    certain, and at the end; until then a label counts as known. Equally probable labels give no label: unclassified.
 
     Parameters
     ----------
     model
-        What judges each window; None answers the end of every slide with a sentence that no model is loaded.
+        Trained model; with None each final estimate says that no model is loaded.
     """
 
-    def __init__(self, model: Model | None) -> None:
+    def __init__(self, model: TextureModel | None) -> None:
         self.model = model
         self.refused = 0
         self.not_finite = 0
@@ -47,7 +46,7 @@ class Evidence:
             self._note_skipped(vector.skipped)
             return self._estimate(vector, final=True)
         if self.model is not None:
-            self._judge(vector, self.model)
+            self._predict(vector, self.model)
         return self._estimate(vector, final=False)
 
     def _start(self, exploration_id: str) -> None:
@@ -61,7 +60,7 @@ class Evidence:
         self._sum = np.zeros(len(self.model.labels) if self.model else 0)
         self._zeros = np.zeros(len(self.model.names) if self.model else 0)
         self._values = self._zeros.copy()
-        self._familiar_windows = 0
+        self._novelty_windows = 0
         self._known: bool | None = None  # not looked at yet
 
     def _note_skipped(self, skipped: int) -> None:
@@ -71,25 +70,27 @@ class Evidence:
                 f'{skipped} of {skipped + self._windows} windows were left out, as samples were lost or not finite'
             )
 
-    def _judge(self, vector: FeatureVector, model: Model) -> None:
+    def _predict(self, vector: FeatureVector, model: TextureModel) -> None:
         if vector.feature_set != model.feature_set:
             self.refused += 1
-            self._message = f"model '{model.name}' does not fit: {difference(vector.feature_set, model.feature_set)}"
+            self._message = (
+                f"model '{model.name}' does not fit: {fingerprint_difference(vector.feature_set, model.feature_set)}"
+            )
             return
         if math.isnan(vector.values @ self._zeros):  # faster than isfinite().all(): inf · 0 is NaN
             self.not_finite += 1
             bad = vector.names[int((~np.isfinite(vector.values)).argmax())]
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
-        self._sum += model.recipe.evidence.voice(model.judge(vector.values))
+        self._sum += model.recipe.evidence.window_evidence(model.predictor(vector.values))
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns
         self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
         self._end_ns = max(end, self._end_ns)
-        if self._evidence_ns <= WORTHS[-1] * self._window_ns:
+        if self._evidence_ns <= EFFECTIVE_WINDOWS[-1] * self._window_ns:
             self._values += vector.values
-            self._familiar_windows += 1
+            self._novelty_windows += 1
 
     def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
         model = self.model
@@ -102,16 +103,18 @@ class Evidence:
                 model=model.name if model else '',
                 message=self._message or (NO_WINDOW if final else ''),
             )
-        # Windows count alike, as the first of a slide is the least typical; together they are worth their sliding time.
-        worth = self._evidence_ns / self._window_ns
+        # All windows have the same weight; their effective number follows from the sliding time that they cover.
+        effective_windows = self._evidence_ns / self._window_ns
         mean = self._sum / self._windows
-        probabilities = model.recipe.evidence.posterior(mean, worth, model.growth)
+        probabilities = model.recipe.evidence.posterior(mean, effective_windows, model.tempering_exponent)
         listed = probabilities.tolist()
         confidence = max(listed)
         best, decided = listed.index(confidence), listed.count(confidence) == 1
-        certain = decided and model.stopping.certain(confidence, worth)
+        certain = decided and model.stopping_rule.certain(confidence, effective_windows)
         if (certain and not self._known) or final:
-            self._known = model.familiar is None or model.familiar.knows(self._values / self._familiar_windows, worth)
+            self._known = model.active_novelty_detector is None or model.active_novelty_detector.is_known(
+                self._values / self._novelty_windows, effective_windows
+            )
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -122,7 +125,7 @@ class Evidence:
             labels=model.labels,
             probabilities=tuple(listed),
             decided=certain,
-            prediction_set=self._candidates(model, probabilities, worth) if final else (),
+            prediction_set=self._candidates(model, probabilities, effective_windows) if final else (),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
@@ -131,5 +134,5 @@ class Evidence:
         )
 
     @staticmethod
-    def _candidates(model: Model, probabilities: Array, worth: float) -> tuple[str, ...]:
-        return tuple(model.labels[number] for number in model.sets.members(probabilities, worth))
+    def _candidates(model: TextureModel, probabilities: Array, effective_windows: float) -> tuple[str, ...]:
+        return tuple(model.labels[number] for number in model.prediction_sets.members(probabilities, effective_windows))

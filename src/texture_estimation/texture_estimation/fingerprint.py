@@ -7,7 +7,7 @@ import re
 PART = re.compile(r'(?P<topic>[^=\s]+)=(?P<rate>[^=*\s]+)Hz\*(?P<channels>\d+)')
 
 
-def difference(came: str, trained: str) -> str:
+def fingerprint_difference(came: str, trained: str) -> str:
     """Return what differs, in words; '' if nothing does.
 
     Parameters

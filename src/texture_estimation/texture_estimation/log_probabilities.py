@@ -22,7 +22,7 @@ def softmax(scores: Array) -> Array:
     return shares
 
 
-def undecided(log_probabilities: Array) -> NDArray[np.bool_]:
+def is_tied(log_probabilities: Array) -> NDArray[np.bool_]:
     """Return whether several textures share the highest log-probability to the last bit, (...): nothing is decided."""
     best = np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)
     shared: NDArray[np.bool_] = np.count_nonzero(log_probabilities == best, axis=-1) > 1

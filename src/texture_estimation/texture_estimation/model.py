@@ -1,6 +1,6 @@
-"""A trained model, and the files that hold it: NAME.skops, the card NAME.json, and what it was taught since.
+"""A trained model and its files: NAME.skops, the card NAME.json, and the slides added since in the folder NAME.added.
 
-What a model is taught after its training stands in the folder NAME.lessons; the two files stay as they are.
+Adding slides does not change the two files.
 """
 
 from __future__ import annotations
@@ -16,57 +16,57 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch
 from texture_estimation import model_files
-from texture_estimation.incremental.added_examples import Lesson, read_lessons
-from texture_estimation.incremental.examples import Examples
-from texture_estimation.incremental.ridge_classifier import TaughtHead
-from texture_estimation.learners.learner import LogProbabilities
-from texture_estimation.log_probabilities import log_softmax, undecided
-from texture_estimation.next_motion.choice import Explorations
-from texture_estimation.open_set.novelty import Familiarity
+from texture_estimation.incremental.added_slides import AddedSlide, read_added_slides
+from texture_estimation.incremental.ridge_classifier import RidgeClassifier
+from texture_estimation.incremental.training_examples import TrainingExamples
+from texture_estimation.learners.learner import Predictor
+from texture_estimation.log_probabilities import is_tied, log_softmax
+from texture_estimation.next_motion.next_touch_model import NextTouchModel
+from texture_estimation.open_set.novelty import NoveltyDetector
 from texture_estimation.open_set.prediction_sets import PredictionSets
-from texture_estimation.open_set.stopping import Stopping
+from texture_estimation.open_set.stopping_rule import StoppingRule
 from texture_estimation.recipe import Recipe
 
 # Names of their parts in the file.
-EXAMPLES, FAMILIARITY, EXPLORATIONS = 'examples', 'familiarity', 'explorations'
+EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL = 'examples', 'novelty_detector', 'next_touch_model'
 # What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
 TRUSTED = ('sklearn.preprocessing._data.StandardScaler', 'sklearn.svm._classes.SVC')
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
-    """What was learnt, with all that is needed to judge a feature vector and to refuse a foreign one.
+class TextureModel:
+    """Fitted parameters, and what is needed to classify a feature vector and to refuse an incompatible one.
 
     Parameters
     ----------
     name
         Of the model.
     labels
-        Textures it knows, in the order of the probabilities; those it was taught last.
+        Textures in the training set, in the order of the probabilities; added ones last.
     names, feature_set
         Features it expects, and their fingerprint.
     recipe
         By which it was made.
-    parts
-        What the learner has learnt, as the file stores it.
-    growth
-        Exponent with which the evidence of a slide grows, 0 to 1.
+    parameters
+        Fitted parameters of the learner, as the file stores them.
+    tempering_exponent
+        Exponent of the effective window count in the evidence, 0 to 1.
     training
         Facts about the training, for the card.
-    stopping
-        When a slide may end.
-    sets
-        Which textures are candidates.
-    familiarity
-        Tells unknown surfaces; None takes all for known.
-    explorations
-        What textures feel like under each motion, to choose the next one; None if the slides were all of one kind.
+    stopping_rule
+        Early stopping rule.
+    prediction_sets
+        Conformal prediction sets.
+    novelty_detector
+        Rejects unknown surfaces; with None no surface is rejected.
+    next_touch_model
+        Class-conditional Gaussians of each motion, to choose the next touch; None if all slides were alike.
     examples
-        Windows it was trained on, to learn more beside them; None if it holds none.
-    lessons
-        What it was taught after the training.
-    taught
-        What judges since then; None if nothing was taught.
+        Training windows that are kept for incremental training; None if it holds none.
+    added_slides
+        Slides added after the training.
+    incremental_predictor
+        Predictor since slides were added; None if none were.
     """
 
     name: str
@@ -74,48 +74,50 @@ class Model:
     names: tuple[str, ...]
     feature_set: str
     recipe: Recipe
-    parts: Mapping[str, Any]
-    growth: float
+    parameters: Mapping[str, Any]
+    tempering_exponent: float
     training: Mapping[str, Any] = field(default_factory=dict)
-    stopping: Stopping = field(default_factory=Stopping)
-    sets: PredictionSets = field(default_factory=PredictionSets)
-    familiarity: Familiarity | None = None
-    explorations: Explorations | None = None
-    examples: Examples | None = None
-    lessons: tuple[Lesson, ...] = ()
-    taught: LogProbabilities | None = None
+    stopping_rule: StoppingRule = field(default_factory=StoppingRule)
+    prediction_sets: PredictionSets = field(default_factory=PredictionSets)
+    novelty_detector: NoveltyDetector | None = None
+    next_touch_model: NextTouchModel | None = None
+    examples: TrainingExamples | None = None
+    added_slides: tuple[AddedSlide, ...] = ()
+    incremental_predictor: Predictor | None = None
 
     @cached_property
-    def judge(self) -> LogProbabilities:
-        """The learner as plain arrays, or what judges since the model was taught."""
-        if self.taught is not None:
-            return self.taught
-        return self.recipe.learner.array_form(self.parts)
+    def predictor(self) -> Predictor:
+        """Predictor of the learner, or the incremental one since slides were added."""
+        if self.incremental_predictor is not None:
+            return self.incremental_predictor
+        return self.recipe.learner.predictor(self.parameters)
 
     @cached_property
-    def familiar(self) -> Familiarity | None:
-        """What tells unknown surfaces, knowing the slides of the lessons, too."""
-        if self.familiarity is None or not self.lessons:
-            return self.familiarity
+    def active_novelty_detector(self) -> NoveltyDetector | None:
+        """Novelty detector that includes the added slides."""
+        if self.novelty_detector is None or not self.added_slides:
+            return self.novelty_detector
         windows = self.recipe.feature_set.windows
         overlap = min(windows.hop_s / windows.length_s, 1.0)
-        return self.familiarity.with_slides([lesson.values for lesson in self.lessons], overlap)
+        return self.novelty_detector.with_slides([added_slide.values for added_slide in self.added_slides], overlap)
 
     def predict_log_proba(self, values: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self.judge(values))
+        return log_softmax(self.predictor(values))
 
     def decide(self, values: Array) -> list[str]:
         """Return the label of each window alone, (n,) of (n, n_features); '' where several labels are equally good."""
         log_probabilities = self.predict_log_proba(values)
         best = log_probabilities.argmax(axis=-1).tolist()
-        none = undecided(log_probabilities).tolist()
+        none = is_tied(log_probabilities).tolist()
         return ['' if tied else self.labels[index] for index, tied in zip(best, none, strict=True)]
 
-    def with_lessons(self, lessons: tuple[Lesson, ...]) -> Model:
-        """Return the model with these lessons instead of its own; it judges as before until `taught` is set anew."""
-        new = dict.fromkeys(lesson.label for lesson in lessons if lesson.label not in self.trained_labels)
-        return replace(self, labels=(*self.trained_labels, *new), lessons=lessons)
+    def with_added_slides(self, added_slides: tuple[AddedSlide, ...]) -> TextureModel:
+        """Return the model with these added slides; `incremental_predictor` is unchanged."""
+        new = dict.fromkeys(
+            added_slide.label for added_slide in added_slides if added_slide.label not in self.trained_labels
+        )
+        return replace(self, labels=(*self.trained_labels, *new), added_slides=added_slides)
 
     @property
     def trained_labels(self) -> tuple[str, ...]:
@@ -123,49 +125,49 @@ class Model:
         return self.labels[: int(self.examples.codes.max()) + 1] if self.examples else self.labels
 
     def examples_of(self, label: str) -> Array:
-        """Return what is known of a label from training and lessons, (n, n_features)."""
+        """Return the examples of a label from training and added slides, (n, n_features)."""
         known = self.examples.of_label(self.labels.index(label)) if self.examples and label in self.labels else None
-        own = [lesson.values for lesson in self.lessons if lesson.label == label]
+        own = [added_slide.values for added_slide in self.added_slides if added_slide.label == label]
         return np.concatenate([np.empty((0, len(self.names))) if known is None else known, *own])
 
-    def taught_head(self) -> TaughtHead:
-        """Return what can be taught more, knowing what the model was trained on and taught.
+    def ridge_classifier(self) -> RidgeClassifier:
+        """Return the incremental classifier of the training examples and the added slides.
 
         Raises
         ------
         ModelMismatch
-            If the model holds no examples to learn beside.
+            If the model holds no training examples.
         """
         if self.examples is None:
-            raise ModelMismatch(f"model '{self.name}' holds no examples to learn beside; train it again")
+            raise ModelMismatch(f"model '{self.name}' holds no training examples, so none can be added; train it again")
         known = self.examples
-        head = TaughtHead(
+        ridge_classifier = RidgeClassifier(
             known.values.astype(np.float64),
             known.codes,
             known.slides,
-            parts=self.parts if self.recipe.learner_name == 'mlp' else None,
-            trained=self.recipe.learner.array_form(self.parts),
+            parameters=self.parameters if self.recipe.learner_name == 'mlp' else None,
+            trained=self.recipe.learner.predictor(self.parameters),
         )
-        for label in dict.fromkeys(lesson.label for lesson in self.lessons):
-            head.set_examples(self.labels.index(label), self.examples_of(label))
-        return head
+        for label in dict.fromkeys(added_slide.label for added_slide in self.added_slides):
+            ridge_classifier.set_examples(self.labels.index(label), self.examples_of(label))
+        return ridge_classifier
 
-    def try_out(self) -> None:
+    def validate(self) -> None:
         """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now."""
         nothing = np.zeros(len(self.names))
         answer = self.predict_log_proba(nothing)
         if answer.shape != (len(self.labels),) or np.isnan(answer).any():
             raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
-        self.sets.members(np.exp(answer), 1.0)
-        self.stopping.certain(0.5, 1.0)
-        if self.familiarity is not None:
-            self.familiarity.knows(nothing, 1.0)
-        if self.explorations is not None:
-            self.explorations.check(nothing)
+        self.prediction_sets.members(np.exp(answer), 1.0)
+        self.stopping_rule.certain(0.5, 1.0)
+        if self.novelty_detector is not None:
+            self.novelty_detector.is_known(nothing, 1.0)
+        if self.next_touch_model is not None:
+            self.next_touch_model.check(nothing)
         if self.examples is not None:
             self.examples.check(len(self.names), len(self.labels))
-        if not 0.0 <= self.growth <= 1.0:
-            raise ModelMismatch(f'the exponent of its evidence is {self.growth}; allowed is 0 to 1')
+        if not 0.0 <= self.tempering_exponent <= 1.0:
+            raise ModelMismatch(f'the exponent of its evidence is {self.tempering_exponent}; allowed is 0 to 1')
 
     @property
     def card(self) -> dict[str, Any]:
@@ -176,10 +178,10 @@ class Model:
             'labels': list(self.trained_labels),
             'feature_set': self.feature_set,
             'features': list(self.names),
-            'growth': self.growth,
-            'stopping': asdict(self.stopping),
-            'sets': asdict(self.sets),
-            'motions': [asdict(motion) for motion in self.explorations.felt] if self.explorations else [],
+            'tempering_exponent': self.tempering_exponent,
+            'stopping_rule': asdict(self.stopping_rule),
+            'prediction_sets': asdict(self.prediction_sets),
+            'motions': [asdict(motion) for motion in self.next_touch_model.gaussians] if self.next_touch_model else [],
             'training': dict(self.training),
             'recipe': self.recipe.as_mapping(),
             'recipe_name': self.recipe.name,
@@ -188,15 +190,19 @@ class Model:
     def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
         """Write NAME.skops and NAME.json; `facts`, such as accuracies, are added to the card. Return NAME.skops.
 
-        Lessons are not written: they stand beside the model that was taught.
+        Added slides are not written: they lie beside the model to which they were added.
         """
-        more = {EXAMPLES: self.examples, FAMILIARITY: self.familiarity, EXPLORATIONS: self.explorations}
-        kept = {name: part.as_parts() for name, part in more.items() if part}
-        return model_files.write(path, {**self.parts, **kept}, {**self.card, **(facts or {})})
+        more = {
+            EXAMPLES: self.examples,
+            NOVELTY_DETECTOR: self.novelty_detector,
+            NEXT_TOUCH_MODEL: self.next_touch_model,
+        }
+        kept = {name: part.as_arrays() for name, part in more.items() if part}
+        return model_files.write(path, {**self.parameters, **kept}, {**self.card, **(facts or {})})
 
 
-def load_model(path: str | Path) -> Model:
-    """Read a model with what it was taught. No code in the files is run.
+def load_model(path: str | Path) -> TextureModel:
+    """Read a model with its added slides. No code in the files is run.
 
     Parameters
     ----------
@@ -210,40 +216,42 @@ def load_model(path: str | Path) -> Model:
     """
     target = model_files.stem(path)
     card, content = model_files.read(target)
-    if 'head' in card.get('recipe', {}):
-        raise ModelMismatch(f"model '{target}' gives grades of roughness; the roughness_estimator takes it")
+    if 'regressor' in card.get('recipe', {}):
+        raise ModelMismatch(f"model '{target}' estimates roughness; load it in the roughness_estimator")
     try:
         recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
-        parts = model_files.parts_of(content, TRUSTED)
-        examples, familiarity, felt = (parts.pop(name, None) for name in (EXAMPLES, FAMILIARITY, EXPLORATIONS))
-        model = Model(
+        parameters = model_files.load_parameters(content, TRUSTED)
+        examples, novelty_detector, gaussians = (
+            parameters.pop(name, None) for name in (EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL)
+        )
+        model = TextureModel(
             name=str(card['name']),
             labels=tuple(map(str, card['labels'])),
             names=tuple(map(str, card['features'])),
             feature_set=str(card['feature_set']),
             recipe=recipe,
-            parts=parts,
-            growth=float(card['growth']),
+            parameters=parameters,
+            tempering_exponent=float(card['tempering_exponent']),
             training=dict(card['training']),
-            stopping=Stopping(**card['stopping']),
-            sets=PredictionSets(**{name: _tuples(value) for name, value in card['sets'].items()}),
-            familiarity=Familiarity.from_parts(familiarity) if familiarity else None,
-            explorations=Explorations.from_parts(felt) if felt else None,
-            examples=Examples.from_parts(examples) if examples else None,
+            stopping_rule=StoppingRule(**card['stopping_rule']),
+            prediction_sets=PredictionSets(**{name: _tuples(value) for name, value in card['prediction_sets'].items()}),
+            novelty_detector=NoveltyDetector.from_arrays(novelty_detector) if novelty_detector else None,
+            next_touch_model=NextTouchModel.from_arrays(gaussians) if gaussians else None,
+            examples=TrainingExamples.from_arrays(examples) if examples else None,
         )
-        model.try_out()
+        model.validate()
     except model_files.BROKEN as error:
         raise ModelMismatch(
             f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
         ) from error
-    lessons = read_lessons(target, model.feature_set, model.names)
-    if not lessons:
+    added_slides = read_added_slides(target, model.feature_set, model.names)
+    if not added_slides:
         return model
-    taught = model.with_lessons(lessons)
+    incremental_predictor = model.with_added_slides(added_slides)
     try:
-        return replace(taught, taught=taught.taught_head().judge)
+        return replace(incremental_predictor, incremental_predictor=incremental_predictor.ridge_classifier().predictor)
     except model_files.BROKEN as error:
-        raise ModelMismatch(f"the lessons of model '{target}' cannot be used: {error}; move them away") from error
+        raise ModelMismatch(f"the added slides of model '{target}' cannot be used: {error}; move them away") from error
 
 
 def _tuples(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The two files that hold a model, whatever it judges: NAME.skops with what was learnt, and the card NAME.json."""
+"""The two files that hold a model, whatever it classifies: NAME.skops with what was trained, and the card NAME.json."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any
 from texture_core.errors import ModelMismatch, TextureError
 from texture_core.files import MB, Archive, FileRefused, read_bounded
 from texture_core.plain_data import MAX_CARD_BYTES, load_json, parse_json
-from texture_estimation.plain_parts import SCHEMA, plain_parts
+from texture_estimation.plain_skops import SCHEMA, read_plain_skops
 
 FORMAT = 1
 MAX_BYTES = 200 * MB  # of a file of parts; ensembles of networks over many features come to 20 MB
@@ -34,7 +34,7 @@ def stem(path: str | Path) -> Path:
     return path.with_suffix('') if path.suffix in ('.skops', '.json') else path
 
 
-def write(path: str | Path, parts: Mapping[str, Any], card: Mapping[str, Any]) -> Path:
+def write(path: str | Path, parameters: Mapping[str, Any], card: Mapping[str, Any]) -> Path:
     """Write NAME.skops and NAME.json, and return NAME.skops.
 
     A reader never sees half a file: both are written beside their places and then moved.
@@ -43,7 +43,7 @@ def write(path: str | Path, parts: Mapping[str, Any], card: Mapping[str, Any]) -
 
     target = stem(path)
     target.parent.mkdir(parents=True, exist_ok=True)
-    content = dumps(dict(parts), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
+    content = dumps(dict(parameters), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
     card = {**card, 'sha256': hashlib.sha256(content).hexdigest()}
     replace(target.with_name(f'{target.name}.skops'), content)
     replace(target.with_name(f'{target.name}.json'), (json.dumps(card, indent=1) + '\n').encode())
@@ -60,13 +60,13 @@ def read(path: str | Path) -> tuple[dict[str, Any], bytes]:
     """
     target = stem(path)
     card = _read_card(target.with_name(f'{target.name}.json'))
-    return card, _read_parts(target.with_name(f'{target.name}.skops'), str(card.get('sha256')))
+    return card, _read_parameters(target.with_name(f'{target.name}.skops'), str(card.get('sha256')))
 
 
-def parts_of(content: bytes, trusted: Sequence[str]) -> dict[str, Any]:
-    """Return what was learnt; nothing is built of types that are not `trusted`, and no code of the file is run."""
+def load_parameters(content: bytes, trusted: Sequence[str]) -> dict[str, Any]:
+    """Return what was trained; nothing is built of types that are not `trusted`, and no code of the file is run."""
     with Archive(io.BytesIO(content)) as file:
-        plain = plain_parts(file)
+        plain = read_plain_skops(file)
     if plain is not None:
         return plain
     with Archive(io.BytesIO(content)) as file:
@@ -98,8 +98,8 @@ def _nodes(value: Any) -> Iterator[Mapping[str, Any]]:
     """Yield the nodes of a schema."""
     if isinstance(value, Mapping) and '__loader__' in value:
         yield value
-    parts = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
-    for part in parts:
+    parameters = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+    for part in parameters:
         yield from _nodes(part)
 
 
@@ -123,7 +123,7 @@ def _read_card(path: Path) -> dict[str, Any]:
     return card
 
 
-def _read_parts(path: Path, digest: str) -> bytes:
+def _read_parameters(path: Path, digest: str) -> bytes:
     try:
         content = read_bounded(path, MAX_BYTES)
     except (OSError, FileRefused) as error:

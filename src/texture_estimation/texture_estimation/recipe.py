@@ -13,8 +13,8 @@ from texture_core.parameters import from_mapping, param
 from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
-from texture_features.choice import choose
 from texture_features.feature_set import FeatureSet
+from texture_features.recipe_entry import choose
 from texture_features.recipe_file import read_recipe
 from texture_features.windowing.windows import WindowParams
 
@@ -27,7 +27,7 @@ class TrainingParams:
 
     hop_s: float = param(
         0.25,
-        'Distance between the windows learnt from: closer ones add time, hardly knowledge.',
+        'Time between the starts of two training windows; a smaller one costs time and adds little.',
         unit='s',
         low=0.001,
         high=60.0,
@@ -39,17 +39,17 @@ class DecisionParams(TrainingParams):
     """How the examples for training are cut, how they count, and how rarely decisions made with them may err."""
 
     start_weight: int = param(
-        1, 'How often the windows at the start of a slide count: friction and sensor settle there.', low=1, high=100
+        1, 'Weight of the first windows of a slide in training, while friction and sensor settle.', low=1, high=100
     )
-    wrong_stops: float = param(
-        0.02, 'Share of the slides that may be decided wrongly by ending them as soon as certain.', low=0.0, high=1.0
+    max_error_rate: float = param(
+        0.02, 'Largest fraction of wrong decisions when slides are stopped early.', low=0.0, high=1.0
     )
     coverage: float = param(
-        0.95, 'Share of the slides whose texture is to be among the candidates.', low=0.5, high=0.999
+        0.95, 'Coverage of the prediction set: fraction of slides whose texture it contains.', low=0.5, high=0.999
     )
-    false_rejections: float = param(
+    false_rejection_rate: float = param(
         0.0,
-        'Share of the slides over known textures that may be taken for unknown; 0: all are known.',
+        'Fraction of slides over known textures that may be rejected as unknown; 0: no rejection.',
         low=0.0,
         high=0.5,
     )
@@ -70,7 +70,7 @@ class Recipe:
 
     @property
     def training_windows(self) -> WindowParams:
-        """How to cut the windows that `train` learns from."""
+        """How to cut the windows that `train` is trained on."""
         return dataclasses.replace(self.feature_set.windows, hop_s=self.training.hop_s)
 
     @classmethod

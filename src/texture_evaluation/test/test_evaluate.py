@@ -7,7 +7,7 @@ import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
 from texture_core.signal import TactileSignal
-from texture_estimation.model import Model, load_model
+from texture_estimation.model import TextureModel, load_model
 from texture_evaluation.evaluate import evaluate, evaluate_bags
 from texture_evaluation.train import train_from_bags
 from texture_recordings.bag_writer import BagWriter
@@ -15,11 +15,13 @@ from texture_recordings.bags import read_bag
 
 
 @pytest.fixture(scope='module')
-def model(simulated: Path) -> Model:
+def model(simulated: Path) -> TextureModel:
     return train_from_bags('default', [simulated], '1-4')
 
 
-def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(model: Model, simulated: Path) -> None:
+def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
+    model: TextureModel, simulated: Path
+) -> None:
     figures = evaluate(model, [simulated], '5-6').as_json()
     assert list(figures) == [
         'window_accuracy', 'accuracy_at_s', 'early', 'calibration_error', 'candidates', 'falsely_rejected',
@@ -35,7 +37,7 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     assert 0 < figures['latency_us']['median'] <= figures['latency_us']['p99']
 
 
-def test_the_figures_are_written_as_json(model: Model, simulated: Path, tmp_path: Path) -> None:
+def test_the_figures_are_written_as_json(model: TextureModel, simulated: Path, tmp_path: Path) -> None:
     report = evaluate(model, [simulated / 'glass'], '5')
     report.write(tmp_path / 'report.json')
     assert json.loads((tmp_path / 'report.json').read_text()) == report.as_json()
@@ -65,7 +67,7 @@ def test_fast_channels_leave_the_slow_input_out(simulated: Path) -> None:
     assert fast.feature_set.endswith('signal=1000Hz*1')
 
 
-def test_another_rate_is_refused_and_nothing_is_scored(model: Model, simulated: Path, tmp_path: Path) -> None:
+def test_another_rate_is_refused_and_nothing_is_scored(model: TextureModel, simulated: Path, tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'slow') as bag:
         for topic, log_ns, value in read_bag(simulated / 'glass'):
             bag.write(topic, halved(value) if topic == 'signal' else value, log_ns)
@@ -73,7 +75,7 @@ def test_another_rate_is_refused_and_nothing_is_scored(model: Model, simulated: 
         evaluate(model, [tmp_path / 'slow'])
 
 
-def test_of_two_fingers_in_a_bag_one_is_named(model: Model, simulated: Path, tmp_path: Path) -> None:
+def test_of_two_fingers_in_a_bag_one_is_named(model: TextureModel, simulated: Path, tmp_path: Path) -> None:
     with BagWriter(tmp_path / 'two') as bag:
         for topic, log_ns, value in read_bag(simulated / 'glass'):
             bag.write(f'/left/{topic}', value, log_ns)

@@ -40,9 +40,9 @@ def test_slides_that_are_too_short_are_left_out_and_without_any_there_is_no_accu
 
 def test_a_decision_is_early_when_it_is_certain_of_a_known_surface() -> None:
     sure = slide('a', 'bbaa', certain_from=2)
-    strange = slide('a', 'aab', certain_from=0, known=False)
+    novel = slide('a', 'aab', certain_from=0, known=False)
     never_sure = slide('a', 'aaab')
-    assert metrics.early_decision([strange]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.7)}
+    assert metrics.early_decision([novel]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.7)}
     assert metrics.early_decision([sure]) == {'accuracy': 1.0, 'mean_s': pytest.approx(0.7)}
     assert metrics.early_decision([never_sure]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.8)}
 

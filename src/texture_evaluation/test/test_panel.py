@@ -15,7 +15,7 @@ DATA = (
     Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
     / 'roughness_ratings'
 )
-# Shrout & Fleiss 1979, table 2: six targets, four judges; the ICCs of table 4.
+# Shrout & Fleiss 1979, table 2: six targets, four classifies; the ICCs of table 4.
 SHROUT_FLEISS = np.array(
     [[9, 2, 5, 8], [6, 1, 3, 2], [8, 4, 6, 8], [7, 1, 2, 6], [10, 5, 6, 9], [6, 2, 4, 7]], dtype=float
 )
@@ -34,8 +34,8 @@ def panel(grades: np.ndarray) -> Ratings:
 def even_panel(seed: int = 0, raters: int = 8) -> Ratings:
     """Return people who spread 25 textures evenly and mostly agree."""
     rng = np.random.default_rng(seed)
-    felt = np.linspace(0.0, 4.0, 25) + 0.6 * rng.normal(size=(raters, 25))
-    return panel(1 + felt.argsort(axis=1).argsort(axis=1) // 5)
+    measured = np.linspace(0.0, 4.0, 25) + 0.6 * rng.normal(size=(raters, 25))
+    return panel(1 + measured.argsort(axis=1).argsort(axis=1) // 5)
 
 
 def test_the_intraclass_correlations_are_those_of_shrout_and_fleiss() -> None:

@@ -3,7 +3,7 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_core.exploration import Phase
-from texture_features.segmentation.segments import SegmentParams
+from texture_features.segmentation.segments import SegmentationParams
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import read_bag
 from texture_recordings.segment import segment_bags
@@ -27,13 +27,13 @@ def slides_of(path):
 
 
 def test_the_slides_found_are_those_that_the_explorer_reported(bag, tmp_path):
-    [(path, count)] = segment_bags([bag], tmp_path / 'found', SegmentParams()).items()
-    (told, _), (found, _) = slides_of(bag), slides_of(path)
-    assert count == len(found) == len(told) == 3
-    for true, felt in zip(told, found, strict=True):
-        assert felt.stamp_ns == pytest.approx(true.stamp_ns, abs=40e6)
-        assert felt.steady_s == pytest.approx(1.0, abs=0.045)
-        assert (felt.surface, felt.speed_m_s) == (SURFACE, 0.1)
+    [(path, count)] = segment_bags([bag], tmp_path / 'found', SegmentationParams()).items()
+    (reported, _), (found, _) = slides_of(bag), slides_of(path)
+    assert count == len(found) == len(reported) == 3
+    for true, measured in zip(reported, found, strict=True):
+        assert measured.stamp_ns == pytest.approx(true.stamp_ns, abs=40e6)
+        assert measured.steady_s == pytest.approx(1.0, abs=0.045)
+        assert (measured.surface, measured.speed_m_s) == (SURFACE, 0.1)
     assert [slide.number for slide in find_slides([path])] == [1, 2, 3]
 
 
@@ -42,7 +42,7 @@ def test_a_bag_without_states_gets_labelled_slides(bag, tmp_path):
     with BagWriter(bare, namespace='left') as writer:
         for topic, log_ns, value in read_bag(bag, ('signal', 'signal_static')):
             writer.write(topic, value, log_ns)
-    [path] = segment_bags([bare], tmp_path / 'found', SegmentParams(), surface='oak')
+    [path] = segment_bags([bare], tmp_path / 'found', SegmentationParams(), surface='oak')
     assert [slide.name for slide in find_slides([path])] == ['oak/1', 'oak/2', 'oak/3']
 
 
@@ -52,4 +52,4 @@ def test_a_bag_without_vibration_gets_one_sentence(bag, tmp_path):
         for topic, log_ns, value in read_bag(bag, ('signal_static',)):
             writer.write(topic, value, log_ns)
     with pytest.raises(InvalidData, match='record the vibration'):
-        segment_bags([bare], tmp_path / 'found', SegmentParams())
+        segment_bags([bare], tmp_path / 'found', SegmentationParams())

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from texture_core.arrays import AnyArray, Array
 
-# Okabe & Ito 2008: told apart by all kinds of colour vision.
+# Okabe & Ito 2008: distinguished by all kinds of colour vision.
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000')
 STYLE: Any = {
     'font.size': 9,
@@ -191,7 +191,7 @@ def _front(axes: Any, points: Mapping[str, tuple[float, float]], names: Sequence
 
 
 def line_styles() -> Iterator[dict[str, Any]]:
-    """Yield styles of lines that are told apart."""
+    """Yield styles of lines that are distinguished."""
     for dashes in ('-', '--', ':'):
         for colour in COLOURS:
             yield {'color': colour, 'linestyle': dashes}

@@ -1,4 +1,4 @@
-"""Test a model on labelled bags, slide by slide, as if each were felt now."""
+"""Evaluate a model on labelled bags, slide by slide, as in live operation."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
-from texture_estimation.evidence import Evidence
-from texture_estimation.fingerprint import difference
-from texture_estimation.model import Model, load_model
+from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.fingerprint import fingerprint_difference
+from texture_estimation.model import TextureModel, load_model
 from texture_evaluation import metrics
 from texture_evaluation.metrics import SlideResult
-from texture_features.windowing.windows import Piece
+from texture_features.windowing.windows import WindowEvent
 from texture_recordings.dataset import cut_slides, no_window
-from texture_recordings.slides import Slide, find_slides
+from texture_recordings.slides import LabelledSlide, find_slides
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class EvaluationReport:
     """How well a model recognises the surfaces in bags.
 
     Parameters
@@ -83,12 +83,14 @@ class Report:
 
 def evaluate_bags(
     model: str | Path, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None
-) -> Report:
+) -> EvaluationReport:
     """Load a model and `evaluate` it."""
     return evaluate(load_model(model), bags, slides, namespace)
 
 
-def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None) -> Report:
+def evaluate(
+    model: TextureModel, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None
+) -> EvaluationReport:
     """Return how a model does on the labelled slides of bags.
 
     Parameters
@@ -98,7 +100,8 @@ def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '', namespa
     bags
         Bags, or folders of bags.
     slides
-        Which slides of each surface, such as '31-40'; '' for all. Surfaces the model was not taught are unknown ones.
+        Which slides of each surface, such as '31-40'; '' for all. Surfaces the model was not in the training set are
+        unknown ones.
     namespace
         Of the finger, if bags hold several.
 
@@ -110,11 +113,11 @@ def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '', namespa
         If a bag cannot be read or no slide is usable.
     """
     chosen = find_slides(bags, slides, namespace)
-    tested = {slide: _test(model, slide, pieces) for slide, pieces in cut_slides(chosen, model.recipe.feature_set)}
+    tested = {slide: _test(model, slide, events) for slide, events in cut_slides(chosen, model.recipe.feature_set)}
     results = {slide: result for slide, (result, _) in tested.items() if result.estimates}
     if not results:
         raise no_window(chosen, model.recipe.feature_set)
-    return Report(
+    return EvaluationReport(
         labels=model.labels,
         known=[result for slide, result in results.items() if slide.surface in model.labels],
         unknown=[result for slide, result in results.items() if slide.surface not in model.labels],
@@ -123,15 +126,15 @@ def evaluate(model: Model, bags: Iterable[str | Path], slides: str = '', namespa
     )
 
 
-def judge(
-    model: Model, pieces: Iterable[Piece], clock: Callable[[], float] = time.perf_counter
+def run_model(
+    model: TextureModel, events: Iterable[WindowEvent], clock: Callable[[], float] = time.perf_counter
 ) -> tuple[list[FeatureVector], list[TextureEstimate], Array]:
     """Return vector, estimate and time (µs, by the clock) of each window and of the end of one slide, one by one."""
-    evidence = Evidence(model)
+    evidence = EvidenceAccumulator(model)
     vectors, estimates, taken_us = [], [], []
-    for piece in pieces:
+    for event in events:
         start = clock()
-        vector = model.recipe.feature_set.describe(piece)
+        vector = model.recipe.feature_set.extract(event)
         estimate = evidence.update(vector)
         taken_us.append(1e6 * (clock() - start))
         vectors.append(vector)
@@ -139,20 +142,20 @@ def judge(
     return vectors, estimates, np.array(taken_us)
 
 
-def _test(model: Model, slide: Slide, pieces: Sequence[Piece]) -> tuple[SlideResult, Array]:
+def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEvent]) -> tuple[SlideResult, Array]:
     """Return what the model says of each usable window of a slide, and the computing times of all."""
-    vectors, estimates, taken_us = judge(model, pieces)
-    used, heard, before = [], [], 0
+    vectors, estimates, taken_us = run_model(model, events)
+    used, received, before = [], [], 0
     for vector, estimate in zip(vectors, estimates, strict=True):
         if not vector.last and vector.feature_set != model.feature_set:
             raise ModelMismatch(
                 f"model '{model.name}' does not fit slide '{slide.name}' in '{slide.bag}': "
-                f'{difference(vector.feature_set, model.feature_set)}'
+                f'{fingerprint_difference(vector.feature_set, model.feature_set)}'
             )
         if estimate.windows > before and not vector.last:
             used.append(vector.values)
-            heard.append(estimate)
+            received.append(estimate)
         before = estimate.windows
     alone = model.decide(np.stack(used)) if used else []
     final = next((estimate for estimate in reversed(estimates) if estimate.final), None)
-    return SlideResult(slide.surface, alone, heard, final), taken_us
+    return SlideResult(slide.surface, alone, received, final), taken_us

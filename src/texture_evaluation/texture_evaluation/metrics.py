@@ -45,8 +45,8 @@ class SlideResult:
         """Return the estimate after so much sliding; None if the slide has less or the first window is longer."""
         if not self.estimates or self.estimates[-1].evidence_s < seconds - TOLERANCE_S:
             return None
-        heard = [estimate for estimate in self.estimates if estimate.evidence_s <= seconds + TOLERANCE_S]
-        return heard[-1] if heard else None
+        received = [estimate for estimate in self.estimates if estimate.evidence_s <= seconds + TOLERANCE_S]
+        return received[-1] if received else None
 
     def early(self) -> TextureEstimate:
         """Return the first estimate that is certain of a known texture, else the last one."""
@@ -116,10 +116,10 @@ def calibration_error(results: Sequence[SlideResult]) -> float:
 
     Source: Guo et al. 2017, equation 3.
     """
-    told = [(e.confidence, e.label == result.surface) for result in results for e in result.estimates if e.label]
-    if not told:
+    reported = [(e.confidence, e.label == result.surface) for result in results for e in result.estimates if e.label]
+    if not reported:
         return 0.0
-    confidence, right = np.array(told, dtype=np.float64).T
+    confidence, right = np.array(reported, dtype=np.float64).T
     bins = np.minimum((confidence * CALIBRATION_BINS).astype(int), CALIBRATION_BINS - 1)
     gaps = np.bincount(bins, confidence - right)
     return float(np.abs(gaps).sum() / len(right))
@@ -143,7 +143,7 @@ def falsely_rejected(results: Sequence[SlideResult]) -> float | None:
 
 
 def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
-    """Return the share of slides over surfaces the model was never taught that it took for known; None without any."""
+    """Return the fraction of slides over unknown surfaces that were accepted as known; None without any."""
     return float(np.mean([result.end.known for result in results])) if results else None
 
 

@@ -14,15 +14,15 @@ from texture_core.errors import InvalidData, InvalidParameter
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
-from texture_estimation.search.division import Division
-from texture_estimation.search.examples import Examples
+from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.genetic_search import Generation, SearchParams
-from texture_estimation.search.grading import Grading
-from texture_estimation.search.optimise import Finalist, Optimised, optimise
-from texture_estimation.search.pairs import OptimisedPairs, beside, optimise_pairs
+from texture_estimation.search.labelled_windows import LabelledWindows
+from texture_estimation.search.optimise import Finalist, SearchResult, optimise
+from texture_estimation.search.pairs import PairSearchResult, beside, optimise_pairs
+from texture_estimation.search.parallel import ParallelMap, dask_map, threaded_map
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.spread import Spread, over_cores, over_dask
-from texture_estimation.search.telling_apart import TellingApart
+from texture_estimation.search.roughness_task import RoughnessTask
+from texture_estimation.search.search_slides import SearchSlides
 from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
 from texture_evaluation.train import with_channels
 from texture_features.feature_set import FeatureSet
@@ -70,7 +70,7 @@ class Wanted:
     channels
         'fast' leaves all inputs of the recipe but `signal` out.
     grades
-        CSV file with the grade of every surface, or the name of a shipped table; '' to tell surfaces apart.
+        CSV file with the grade of every surface, or the name of a shipped table; '' to distinguish surfaces.
     per_pair
         Tune a recipe for each pair of surfaces by itself.
     """
@@ -103,21 +103,21 @@ class BagSlides:
     bags: Sequence[str]
     slides: str
     feature_set: FeatureSet
-    _known: dict[WindowParams, Examples] = field(default_factory=dict, repr=False)
+    _known: dict[WindowParams, LabelledWindows] = field(default_factory=dict, repr=False)
 
-    def __call__(self, windows: WindowParams) -> Examples:
+    def __call__(self, windows: WindowParams) -> LabelledWindows:
         """Return the windows of all slides; each length is cut once."""
         if windows not in self._known:
-            self._known[windows] = Examples.from_pieces(self._pieces(windows), self.feature_set.topics)
+            self._known[windows] = LabelledWindows.from_events(self._events(windows), self.feature_set.topics)
         return self._known[windows]
 
-    def _pieces(self, windows: WindowParams) -> Iterator[CutWindow]:
+    def _events(self, windows: WindowParams) -> Iterator[CutWindow]:
         plan = replace(self.feature_set, windows=windows, _layouts={})
-        for slide, pieces in cut_slides(find_slides(self.bags, self.slides), plan):
-            for piece in pieces:
-                if isinstance(piece, CutWindow):
+        for slide, events in cut_slides(find_slides(self.bags, self.slides), plan):
+            for event in events:
+                if isinstance(event, CutWindow):
                     # unlike ids of explorations, names of slides are unique over all bags
-                    yield replace(piece, exploration_id=slide.name)
+                    yield replace(event, exploration_id=slide.name)
 
 
 def optimise_from_bags(
@@ -125,7 +125,7 @@ def optimise_from_bags(
     params: SearchParams,
     out: str | Path,
     *,
-    over: Callable[[], AbstractContextManager[Spread]] = over_cores,
+    over: Callable[[], AbstractContextManager[ParallelMap]] = threaded_map,
     resume: bool = False,
     tell: Tell = lambda *_: None,
 ) -> Written:
@@ -155,19 +155,28 @@ def optimise_from_bags(
     if not target.parent.is_dir():
         raise InvalidParameter(f"there is no folder '{target.parent}' for '{target.name}'; name another place")
     space = _space(wanted)
-    division = Division(BagSlides(wanted.bags, wanted.slides, space.base.feature_set), params.halves, params.seed)
+    search_slides = SearchSlides(
+        BagSlides(wanted.bags, wanted.slides, space.base.feature_set), params.halves, params.seed
+    )
     checkpoint = checkpoint_of(target)
     if resume and not _checkpoints(checkpoint):
         raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to begin anew")
     options: dict[str, Any] = {'checkpoint': checkpoint, 'resume': checkpoint if resume else None}
-    with over() as spread:
+    with over() as parallel_map:
         if wanted.per_pair:
             pairs = optimise_pairs(
-                space, division, params, spread=spread, tell=lambda pair, said: tell(' – '.join(pair), said), **options
+                space,
+                search_slides,
+                params,
+                parallel_map=parallel_map,
+                tell=lambda pair, said: tell(' – '.join(pair), said),
+                **options,
             )
             return _write_pairs(pairs, wanted, params, target)
-        task: Any = Grading(read_grades(wanted.grades)) if wanted.grades else TellingApart()
-        found = optimise(space, division, params, task, spread=spread, tell=lambda said: tell('', said), **options)
+        task: Any = RoughnessTask(read_grades(wanted.grades)) if wanted.grades else ClassificationTask()
+        found = optimise(
+            space, search_slides, params, task, parallel_map=parallel_map, tell=lambda said: tell('', said), **options
+        )
     return _write(found, wanted, params, target)
 
 
@@ -177,16 +186,16 @@ def checkpoint_of(out: str | Path) -> Path:
     return path.with_name(f'{path.stem}.search.json')
 
 
-def over_machine(jobs: int, dask: str) -> Callable[[], AbstractContextManager[Spread]]:
+def parallel_map_for(jobs: int, dask: str) -> Callable[[], AbstractContextManager[ParallelMap]]:
     """Return what spreads over so many cores (-1: all), or over a Dask cluster if its address is given."""
-    return (lambda: over_dask(dask)) if dask else (lambda: over_cores(jobs))
+    return (lambda: dask_map(dask)) if dask else (lambda: threaded_map(jobs))
 
 
 def _space(wanted: Wanted) -> RecipeSpace[Any]:
     recipe: Recipe | RoughnessRecipe
     if wanted.grades:
         recipe = load_roughness_recipe(wanted.recipe)
-        learner = recipe.head_name
+        learner = recipe.regressor_name
     else:
         recipe = with_channels(load_recipe(wanted.recipe), wanted.channels)
         learner = recipe.learner_name
@@ -204,7 +213,7 @@ def _checkpoints(path: Path) -> list[Path]:
     return [path] if path.is_file() else sorted(path.parent.glob(f'{path.stem}-*-vs-*{path.suffix}'))
 
 
-def _write(found: Optimised[Any], wanted: Wanted, params: SearchParams, target: Path) -> Written:
+def _write(found: SearchResult[Any], wanted: Wanted, params: SearchParams, target: Path) -> Written:
     recipes = {target: found.best}
     if params.objective == 'front':
         others = (one for one in found.finalists if one is not found.best)
@@ -221,7 +230,7 @@ def _write(found: Optimised[Any], wanted: Wanted, params: SearchParams, target: 
     return Written((*recipes, checkpoint_of(target), chart), tuple(lines))
 
 
-def _write_pairs(pairs: OptimisedPairs, wanted: Wanted, params: SearchParams, target: Path) -> Written:
+def _write_pairs(pairs: PairSearchResult, wanted: Wanted, params: SearchParams, target: Path) -> Written:
     recipes = {beside(target, pair): found.best for pair, found in pairs.by_pair.items()}
     for path, finalist in recipes.items():
         write_recipe(finalist, path, _origin(wanted, params))

@@ -19,7 +19,7 @@ from texture_core.errors import InvalidParameter
 from texture_evaluation.agreement import intraclass_correlation, krippendorff_alpha, one_against_rest
 from texture_evaluation.ratings import GRADES, Ratings
 
-TEXTURES_A_GRADE = (4, 6)  # of the paper's 25; other numbers of textures in proportion
+TEXTURES_PER_GRADE = (4, 6)  # of the paper's 25; other numbers of textures in proportion
 PAPERS_TEXTURES = 25
 
 
@@ -118,7 +118,7 @@ def protocol_violations(ratings: Ratings) -> list[str]:
 
 
 def _allowed_a_grade(n_textures: int) -> tuple[int, int]:
-    low, high = (number * n_textures / PAPERS_TEXTURES for number in TEXTURES_A_GRADE)
+    low, high = (number * n_textures / PAPERS_TEXTURES for number in TEXTURES_PER_GRADE)
     return math.floor(low), math.ceil(high)
 
 

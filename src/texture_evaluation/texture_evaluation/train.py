@@ -8,10 +8,10 @@ from pathlib import Path
 
 from texture_core.errors import InvalidParameter
 from texture_estimation.classification.training import train
-from texture_estimation.model import Model
+from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_recordings.bags import find_bags
-from texture_recordings.dataset import describe
+from texture_recordings.dataset import extract_features
 
 FAST_TOPIC = 'signal'
 CHANNELS = ('fast', 'all')
@@ -26,7 +26,7 @@ def train_from_bags(
     channels: str = 'all',
     name: str = '',
     namespace: str | None = None,
-) -> Model:
+) -> TextureModel:
     """Return a model trained on the labelled slides of bags, and save it.
 
     Parameters
@@ -53,7 +53,7 @@ def train_from_bags(
     """
     plan = with_channels(load_recipe(recipe), channels)
     windows = replace(plan.feature_set, windows=plan.training_windows)
-    examples = describe(bags, windows, slides, namespace)
+    examples = extract_features(bags, windows, slides, namespace)
     default = Path(out).name.removesuffix('.skops') if out else plan.name
     model = train(plan, examples, name or default)
     if out is not None:
@@ -74,7 +74,7 @@ def with_channels(recipe: Recipe, channels: str) -> Recipe:
     return replace(recipe, feature_set=feature_set)
 
 
-def _save(model: Model, out: Path, bags: Sequence[str | Path], slides: str) -> None:
+def _save(model: TextureModel, out: Path, bags: Sequence[str | Path], slides: str) -> None:
     data = {'bags': [path.name for path in find_bags(bags)], 'slides': slides or 'all'}
     try:
         model.save(out, {'data': data})

@@ -77,12 +77,12 @@ def test_the_node_publishes_what_the_same_recording_gives_offline(bench):
     bench.until(lambda: len(bench.features) == 4)
     bench.states.publish(to_msg(lift()))
     bench.until(lambda: bench.features and bench.features[-1].last)
-    assert {heard.frame_id for heard in bench.features} == {'tip'}
+    assert {received.frame_id for received in bench.features} == {'tip'}
     feature_set = FeatureSet.load('default')
-    pieces = cut_recording({'signal': recording()}, [slide(), lift()], feature_set.windows)
-    for heard, expected in zip(bench.features, map(feature_set.describe, pieces), strict=True):
-        np.testing.assert_array_equal(heard.values, expected.values)
-        assert (heard.start_ns, heard.names, heard.feature_set) == (
+    events = cut_recording({'signal': recording()}, [slide(), lift()], feature_set.windows)
+    for received, expected in zip(bench.features, map(feature_set.extract, events), strict=True):
+        np.testing.assert_array_equal(received.values, expected.values)
+        assert (received.start_ns, received.names, received.feature_set) == (
             expected.start_ns,
             expected.names,
             expected.feature_set,
@@ -101,7 +101,7 @@ def test_a_slide_whose_sensor_died_ends_all_the_same(bench):
 def test_broken_messages_are_counted_and_survived(bench):
     bench.signals.publish(msg.TactileSignal(sensor='s', channels=['a', 'b'], sampling_rate_hz=1000.0, samples=[1.0]))
     bench.states.publish(msg.ExplorationState(phase=99))
-    bench.until(lambda: bench.node._broken == 2)
+    bench.until(lambda: bench.node._invalid == 2)
     bench.states.publish(to_msg(slide()))
     bench.until(lambda: bench.node._cutter._slides)
     bench.play(recording())

@@ -12,7 +12,7 @@ RECIPE = {
     'windows': {'length_s': 0.5, 'hop_s': 0.25},
     'inputs': {
         'signal': {'features': [{'log_bands': {'bands': 16}}, 'hjorth', 'speed']},
-        'signal_static': {'features': ['level', 'log_variance']},
+        'signal_static': {'features': ['mean', 'log_variance']},
     },
 }
 
@@ -27,7 +27,7 @@ def cut(seed=0, rate_hz=1000.0, channels=('dynamic',)):
 
 
 def test_values_have_the_names_of_their_origin():
-    vector = FeatureSet.from_mapping(RECIPE).describe(cut())
+    vector = FeatureSet.from_mapping(RECIPE).extract(cut())
     assert vector.names[0] == 'signal/log_bands/1/dynamic'
     assert vector.names[16:20] == (
         'signal/hjorth/log_activity/dynamic',
@@ -42,30 +42,30 @@ def test_values_have_the_names_of_their_origin():
 
 def test_many_windows_get_the_very_numbers_of_one():
     feature_set = FeatureSet.from_mapping(RECIPE)
-    pieces = (
+    events = (
         [cut(seed) for seed in range(70)] + [SlideEnd(5, 'e1', 0.25)] + [cut(1, 2200.0), cut(2, channels=('a', 'b'))]
     )
-    for piece, vector in zip(pieces, feature_set.describe_many(pieces), strict=True):
-        alone = feature_set.describe(piece)
+    for event, vector in zip(events, feature_set.extract_many(events), strict=True):
+        alone = feature_set.extract(event)
         np.testing.assert_array_equal(vector.values, alone.values)
         assert dataclasses.replace(vector, values=np.empty(0), names=()).__dict__.keys() == alone.__dict__.keys()
         assert (vector.feature_set, vector.names, vector.last) == (alone.feature_set, alone.names, alone.last)
 
 
 def test_the_end_of_a_slide_is_an_empty_last_vector():
-    vector = FeatureSet.from_mapping(RECIPE).describe(SlideEnd(7, 'e1', 0.25, skipped=3))
+    vector = FeatureSet.from_mapping(RECIPE).extract(SlideEnd(7, 'e1', 0.25, skipped=3))
     assert (vector.last, vector.names, vector.skipped, vector.window_s) == (True, (), 3, 0.0)
 
 
 def test_the_fingerprint_says_what_the_values_mean():
     feature_set = FeatureSet.from_mapping(RECIPE)
-    fingerprint = feature_set.describe(cut()).feature_set
+    fingerprint = feature_set.extract(cut()).feature_set
     assert fingerprint.endswith(' signal=1000Hz*1 signal_static=60Hz*2')
     hopped = FeatureSet.from_mapping({**RECIPE, 'windows': {'length_s': 0.5, 'hop_s': 0.1}})
     longer = FeatureSet.from_mapping({**RECIPE, 'windows': {'length_s': 0.6}})
-    assert hopped.describe(cut()).feature_set == fingerprint
-    assert longer.describe(cut()).feature_set != fingerprint
-    assert feature_set.describe(cut(rate_hz=2200.0)).feature_set != fingerprint
+    assert hopped.extract(cut()).feature_set == fingerprint
+    assert longer.extract(cut()).feature_set != fingerprint
+    assert feature_set.extract(cut(rate_hz=2200.0)).feature_set != fingerprint
 
 
 def test_a_feature_set_written_out_is_the_same_again():
@@ -78,7 +78,7 @@ def test_recipes_are_found_by_name_and_by_path(tmp_path):
     path.write_text('inputs: {signal: {features: [hjorth]}}\n')
     assert FeatureSet.load(str(path)).topics == ('signal',)
     card = tmp_path / 'model.json'
-    card.write_text('{"recipe": {"inputs": {"other": {"features": ["level"]}}}}')
+    card.write_text('{"recipe": {"inputs": {"other": {"features": ["mean"]}}}}')
     assert FeatureSet.load(str(card)).topics == ('other',)
     assert FeatureSet.load('default').topics == ('signal',)
 

@@ -4,7 +4,7 @@ from scipy import signal as scipy_signal
 
 from texture_core.errors import InvalidData
 from texture_features.catalogue import FEATURES
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.features.hjorth import hjorth
 from texture_features.features.log_bands import LogBands
 from texture_features.features.spectral_peaks import SpectralPeaks, highest_peaks
@@ -24,7 +24,7 @@ def tone(frequency_hz, n_samples=1000, amplitude=1.0):
 
 def windows(samples, speed_m_s=0.1, force_n=2.0):
     leading = np.asarray(samples).shape[:-2]
-    return Windows(np.asarray(samples), RATE_HZ, np.full(leading, speed_m_s), np.full(leading, force_n))
+    return WindowBatch(np.asarray(samples), RATE_HZ, np.full(leading, speed_m_s), np.full(leading, force_n))
 
 
 @EVERY
@@ -48,19 +48,19 @@ def test_weak_and_strong_signals_give_finite_values(name, scale):
 SAME, TIMES, SQUARED, SHIFTED = 'the same', 'times 1000', 'times 1000 squared', 'plus log 1000 squared'
 SCALING = {
     'log_bands': SHIFTED,
-    'typical_bands': SHIFTED,
-    'low_lines': SHIFTED,
+    'mean_log_bands': SHIFTED,
+    'low_fft_bins': SHIFTED,
     'log_variance': SHIFTED,
-    'log_slope_variance': SHIFTED,
+    'log_difference_variance': SHIFTED,
     'log_spectrum': SHIFTED,
     'short_time_fourier': SHIFTED,
     'wavelet_energy': SHIFTED,
     'mean_amplitude': TIMES,
-    'level': TIMES,
-    'integral': SQUARED,
+    'mean': TIMES,
+    'signal_energy': SQUARED,
     'region_peaks': SAME,
     'correlation': SAME,
-    'power_echo': SAME,
+    'power_autocorrelation': SAME,
     'ordinal_patterns': SAME,
     'speed': SAME,
     'force': SAME,
@@ -78,7 +78,7 @@ def test_the_gain_of_the_sensor_acts_as_declared(name, law):
 @EVERY
 def test_values_come_for_each_channel_and_name(name):
     feature = FEATURES[name]()
-    channels = 3 if feature.of_signal else 1
+    channels = 3 if feature.per_channel else 1
     assert feature(windows(noise(500, 3))).shape == (channels, len(feature.names))
     assert len(set(feature.names)) == len(feature.names)
 
@@ -103,20 +103,20 @@ def test_the_samples_are_not_changed(name):
 @pytest.mark.parametrize('shape', [(0, 2), (500, 0), (500,)])
 def test_empty_windows_are_refused(shape):
     with pytest.raises(InvalidData, match='at least one'):
-        Windows(np.zeros(shape), RATE_HZ)
+        WindowBatch(np.zeros(shape), RATE_HZ)
 
 
 @pytest.mark.parametrize(
     'name',
     [
         'log_bands',
-        'typical_bands',
-        'low_lines',
+        'mean_log_bands',
+        'low_fft_bins',
         'hjorth',
         'log_variance',
-        'log_slope_variance',
-        'integral',
-        'power_echo',
+        'log_difference_variance',
+        'signal_energy',
+        'power_autocorrelation',
     ],
 )
 def test_an_offset_of_the_sensor_changes_nothing(name):
@@ -151,12 +151,12 @@ def test_the_highest_band_holds_the_tone():
 def test_bursts_lie_above_what_is_typical_and_a_steady_hum_does_not():
     steady, bursts = tone(203.0), tone(203.0) * (np.arange(1000) % 250 < 50)[:, None]
     for samples, apart in ((steady, False), (bursts, True)):
-        mean, typical = (FEATURES[name]()(windows(samples))[0, 12] for name in ('log_bands', 'typical_bands'))
+        mean, typical = (FEATURES[name]()(windows(samples))[0, 12] for name in ('log_bands', 'mean_log_bands'))
         assert (mean - typical > 1.0) == apart
 
 
 def test_low_lines_report_ridges_apart_that_share_a_band():
-    feature = FEATURES['low_lines'](points=256)
+    feature = FEATURES['low_fft_bins'](points=256)
     lines = [feature.names[int(feature(windows(tone(hz)))[0].argmax())] for hz in (98.0, 106.0)]
     assert lines == ['25', '27']  # line k stands at k · 1000 / 256 Hz
 
@@ -205,15 +205,15 @@ def test_without_a_speed_what_needs_one_is_not_a_number_and_the_rest_is_as_ever(
 
 
 def test_integral_and_arc_length_have_their_closed_forms():
-    assert FEATURES['integral']()(windows(tone(50.0, amplitude=2.0)))[0, 0] == pytest.approx(2.0, rel=1e-6)
+    assert FEATURES['signal_energy']()(windows(tone(50.0, amplitude=2.0)))[0, 0] == pytest.approx(2.0, rel=1e-6)
     ramp = np.arange(11.0)[:, None] * 3.0
-    line = Windows(ramp, rate_hz=0.25)  # steps of 4 s and 3 units: 5 long
+    line = WindowBatch(ramp, rate_hz=0.25)  # steps of 4 s and 3 units: 5 long
     assert FEATURES['arc_length']()(line)[0, 0] == pytest.approx(50.0)
 
 
 def test_a_ramp_has_no_slope_variance():
     ramp = np.arange(50.0)[:, None]
-    assert FEATURES['log_slope_variance'](floor=0.1)(windows(ramp))[0, 0] == pytest.approx(np.log(0.1))
+    assert FEATURES['log_difference_variance'](floor=0.1)(windows(ramp))[0, 0] == pytest.approx(np.log(0.1))
 
 
 def test_moments_of_a_tone_and_of_noise_are_those_of_their_distributions():
@@ -223,8 +223,8 @@ def test_moments_of_a_tone_and_of_noise_are_those_of_their_distributions():
     assert sine['signal_log_amplitude'] == pytest.approx(np.log(4.0 / np.pi), abs=0.02)
     assert sine['signal_log_kurtosis'] == pytest.approx(np.log(1.5), rel=1e-3)
     steps = np.log(2.0 * 4.0 * np.sin(np.pi * 50.0 / RATE_HZ) ** 2)
-    assert sine['slope_log_power'] == pytest.approx(steps, rel=1e-2)
-    assert sine['bend_log_power'] == pytest.approx(2.0 * steps - np.log(2.0), rel=1e-2)
+    assert sine['difference_log_power'] == pytest.approx(steps, rel=1e-2)
+    assert sine['second_difference_log_power'] == pytest.approx(2.0 * steps - np.log(2.0), rel=1e-2)
     pushes = np.random.default_rng(0).exponential(size=(100_000, 1))
     values = dict(zip(feature.names, feature(windows(pushes))[0], strict=True))
     assert values['signal_skewness'] == pytest.approx(2.0, rel=0.05)
@@ -232,7 +232,7 @@ def test_moments_of_a_tone_and_of_noise_are_those_of_their_distributions():
 
 
 def test_bursts_echo_as_long_as_they_last_and_noise_does_not():
-    feature = FEATURES['power_echo']()
+    feature = FEATURES['power_autocorrelation']()
     assert feature.names[:7] == tuple(f'signal_{lag}' for lag in (1, 2, 3, 4, 6, 8, 12))
     hiss = noise(100_000, 1)
     np.testing.assert_allclose(feature(windows(hiss))[0, :12], 0.0, atol=0.02)

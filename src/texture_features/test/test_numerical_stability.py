@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from texture_features.catalogue import FEATURES
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 
 RATE_HZ = 1000.0
 NOISE = np.random.default_rng(0).normal(size=(500, 2))
@@ -23,5 +23,5 @@ DIFFICULT = {
 @pytest.mark.parametrize('name', FEATURES)
 @pytest.mark.parametrize('samples', DIFFICULT.values(), ids=DIFFICULT)
 def test_values_are_finite(name, samples):
-    window = Windows(samples, RATE_HZ, np.asarray(0.1), np.asarray(2.0))
+    window = WindowBatch(samples, RATE_HZ, np.asarray(0.1), np.asarray(2.0))
     assert np.isfinite(FEATURES[name]()(window)).all()

@@ -21,19 +21,20 @@ def sliding(lines_hz, power_of_speed, rng, noise=0.05, rate_hz=RATE_HZ):
     return (moves * waves + noise * rng.normal(size=times.shape))[:, None]
 
 
-def found(fast, senses, rate_hz=RATE_HZ, noise=0.05):
-    model = OnsetModel(rate_hz, np.array([noise**2]), RAMP_S, senses, 0.05)
+def found(fast, quantity, rate_hz=RATE_HZ, noise=0.05):
+    model = OnsetModel(rate_hz, np.array([noise**2]), RAMP_S, quantity, 0.05)
     known = np.ones(len(fast), dtype=bool)
     return model.find(fast, known, fast[round(0.6 * rate_hz) : round(1.1 * rate_hz)], RANGE_S)
 
 
-@pytest.mark.parametrize(('senses', 'power'), [('force', 0.0), ('change', 1.0), ('change', 1.5), ('either', 1.0)])
+@pytest.mark.parametrize(('quantity', 'power'), [('force', 0.0), ('change', 1.0), ('change', 1.5), ('either', 1.0)])
 @pytest.mark.parametrize('lines_hz', [[180.0], [90.0, 230.0, 310.0], np.arange(40.0, 400.0, 30.0)])
 @pytest.mark.parametrize('rate_hz', [1000.0, 2200.0])
-def test_a_rising_pitch_reports_when_the_finger_set_off(senses, power, lines_hz, rate_hz):
+def test_a_rising_pitch_reports_when_the_finger_set_off(quantity, power, lines_hz, rate_hz):
     rng = np.random.default_rng(0)
     errors = [
-        found(sliding(np.array(lines_hz), power, rng, rate_hz=rate_hz), senses, rate_hz) - SETS_OFF_S for _ in range(10)
+        found(sliding(np.array(lines_hz), power, rng, rate_hz=rate_hz), quantity, rate_hz) - SETS_OFF_S
+        for _ in range(10)
     ]
     assert np.abs(errors).max() < 0.015
     assert abs(np.median(errors)) < 0.008

@@ -7,7 +7,7 @@ from scipy import signal as scipy_signal
 from scipy import stats
 
 from texture_features.catalogue import FEATURES
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.features.correlation import Correlation, cell_means, ranks
 from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.ordinal_patterns import OrdinalPatterns
@@ -29,7 +29,7 @@ def tone(frequency_hz, n_samples=1000, amplitude=1.0):
 
 
 def windows(samples, rate_hz=RATE_HZ):
-    return Windows(np.asarray(samples), rate_hz, np.full(samples.shape[:-2], 0.1), np.full(samples.shape[:-2], 2.0))
+    return WindowBatch(np.asarray(samples), rate_hz, np.full(samples.shape[:-2], 0.1), np.full(samples.shape[:-2], 2.0))
 
 
 def spectrum_of(energies, width=4):
@@ -174,7 +174,7 @@ def test_ordinal_patterns_of_noise_are_equally_frequent():
 
 
 def joined(fast, slow, fast_hz=2200.0, slow_hz=100.0):
-    return Windows(fast, fast_hz, joined=(Windows(slow, slow_hz),))
+    return WindowBatch(fast, fast_hz, joined=(WindowBatch(slow, slow_hz),))
 
 
 def test_correlations_are_scipys_on_the_grid_of_the_slow_input():

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal as scipy_signal
 
 from texture_features.catalogue import FEATURES
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.spectra.spectrum import hann
 
 RATE_HZ = 1000.0
@@ -40,7 +40,7 @@ def plain_power_echo(row):
     return values
 
 
-PLAIN = {'typical_bands': plain_typical_bands, 'moments': plain_moments, 'power_echo': plain_power_echo}
+PLAIN = {'mean_log_bands': plain_typical_bands, 'moments': plain_moments, 'power_autocorrelation': plain_power_echo}
 
 
 @pytest.mark.parametrize('shape', [(500, 1), (130, 3)])
@@ -48,4 +48,4 @@ PLAIN = {'typical_bands': plain_typical_bands, 'moments': plain_moments, 'power_
 def test_the_fast_way_to_the_values_gives_those_of_the_plain_formula(name, shape):
     samples = 3.0 * np.random.default_rng(0).normal(size=shape) + 20.0
     expected = [PLAIN[name](channel - channel.mean()) for channel in samples.T]
-    np.testing.assert_allclose(FEATURES[name]()(Windows(samples, RATE_HZ)), expected, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(FEATURES[name]()(WindowBatch(samples, RATE_HZ)), expected, rtol=1e-9, atol=1e-9)

@@ -3,10 +3,10 @@ import pytest
 from scipy.signal import lfilter
 
 from texture_core.errors import InvalidParameter
-from texture_features.feature import Windows
-from texture_features.features.bursts import Bursts
+from texture_features.feature import WindowBatch
 from texture_features.features.pacinian_power import PacinianPower
-from texture_features.features.spatial_level import SpatialLevel
+from texture_features.features.peak_to_median_power import PeakToMedianPower
+from texture_features.features.spatial_band_power import SpatialBandPower
 from texture_features.features.spatial_variation import SpatialVariation
 from texture_features.features.spectral_exponent import SpectralExponent
 from texture_features.features.temporal_variation import TemporalVariation
@@ -20,11 +20,11 @@ def times(n_samples=2000):
 
 
 def windows(row, speed_m_s=0.15, force_n=2.0):
-    return Windows(np.asarray(row)[:, None], RATE_HZ, np.array(speed_m_s), np.array(force_n))
+    return WindowBatch(np.asarray(row)[:, None], RATE_HZ, np.array(speed_m_s), np.array(force_n))
 
 
 def wave(speed_m_s, pitch_m=1e-3, height=3.0):
-    """Return what a finger gives that feels the rate of change of a sine of the surface."""
+    """Return what a finger gives that measures the rate of change of a sine of the surface."""
     turns = 2 * np.pi * speed_m_s / pitch_m
     return height * turns * np.cos(turns * times())
 
@@ -46,9 +46,9 @@ def test_an_octave_off_the_best_frequency_twelve_decibels_are_missing() -> None:
 
 
 def test_weighed_at_one_speed_a_ridge_is_as_rough_whatever_the_speed() -> None:
-    felt = [value(PacinianPower(), windows(wave(v), v)) for v in SPEEDS]
+    measured = [value(PacinianPower(), windows(wave(v), v)) for v in SPEEDS]
     constant = [value(PacinianPower(at_speed_m_s=0.15), windows(wave(v), v)) for v in SPEEDS]
-    assert np.ptp(felt) > 2.0
+    assert np.ptp(measured) > 2.0
     assert np.ptp(constant) < 0.1
 
 
@@ -83,24 +83,24 @@ def test_spatial_variation_of_a_wave_is_that_of_places_apart_at_any_speed(speed_
 
 
 def test_the_spatial_level_is_that_of_the_surface_at_any_speed() -> None:
-    levels = np.array([SpatialLevel()(windows(wave(v), v))[0] for v in SPEEDS])
+    levels = np.array([SpatialBandPower()(windows(wave(v), v))[0] for v in SPEEDS])
     assert set(levels.argmax(axis=1)) == {1}  # 1 mm lies in the second of four bands from 2 mm to 0.45 mm
     assert np.ptp(levels[:, 1]) < 0.1
 
 
 def test_the_density_in_waves_per_metre_adds_up_to_the_power() -> None:
-    feature = SpatialLevel(bands=1, longest_m=0.15 / 100, shortest_m=0.15 / 300, rate_of_change=False)
+    feature = SpatialBandPower(bands=1, longest_m=0.15 / 100, shortest_m=0.15 / 300, rate_of_change=False)
     tone = 2.0 * np.sin(2 * np.pi * 200.0 * times())
     power = np.exp(value(feature, windows(tone))) * (300 - 100) / 0.15
     assert power == pytest.approx(2.0, rel=0.01)
 
 
-@pytest.mark.parametrize('feature', [SpatialLevel(bands=2), SpatialVariation(), PacinianPower(at_speed_m_s=0.1)])
+@pytest.mark.parametrize('feature', [SpatialBandPower(bands=2), SpatialVariation(), PacinianPower(at_speed_m_s=0.1)])
 def test_without_a_speed_there_is_no_value(feature) -> None:
     assert np.isnan(feature(windows(wave(0.15), np.nan))).all()
 
 
-@pytest.mark.parametrize('feature', [SpatialLevel, SpatialVariation, PacinianPower])
+@pytest.mark.parametrize('feature', [SpatialBandPower, SpatialVariation, PacinianPower])
 def test_hertz_takes_the_force_out(feature) -> None:
     light = value(feature(force_exponent=2 / 3), windows(wave(0.15), force_n=1.0))
     firm = value(feature(force_exponent=2 / 3), windows(8 ** (1 / 3) * wave(0.15), force_n=8.0))
@@ -109,14 +109,14 @@ def test_hertz_takes_the_force_out(feature) -> None:
 
 def test_waves_the_wrong_way_round_are_refused() -> None:
     with pytest.raises(InvalidParameter, match='must be longer'):
-        SpatialLevel(longest_m=1e-4)
+        SpatialBandPower(longest_m=1e-4)
 
 
 def test_a_skid_stands_out_and_an_even_hum_does_not() -> None:
     hum = np.sin(2 * np.pi * 100.0 * times(500))
     skid = np.where((times(500) > 0.2) & (times(500) < 0.22), 10.0, 1.0) * hum
-    assert abs(value(Bursts(), windows(hum))) < 0.1
-    assert value(Bursts(), windows(skid)) > 3.0
+    assert abs(value(PeakToMedianPower(), windows(hum))) < 0.1
+    assert value(PeakToMedianPower(), windows(skid)) > 3.0
     still = np.where((times(500) > 0.2) & (times(500) < 0.25), 0.01, 1.0) * hum
-    assert value(Bursts(), windows(still)) < 0.2
-    assert value(Bursts(pieces=20, over='weakest'), windows(still)) > 3.0
+    assert value(PeakToMedianPower(), windows(still)) < 0.2
+    assert value(PeakToMedianPower(segments=20, reference='minimum'), windows(still)) > 3.0

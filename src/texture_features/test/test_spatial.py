@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_features.array_speed import ArraySpeed
+from texture_features.array_speed import ArraySpeedEstimator
 from texture_features.catalogue import FEATURES
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet
 
 RATE_HZ = 400.0
@@ -14,14 +14,14 @@ PLACES_M = np.array([0.0, 1e-3, 5e-3, 9e-3])
 
 
 def slide(speed_m_s, distance_m=0.05, places_m=PLACES_M, surface=None):
-    """Slide an array of taxels over a surface: each feels the height at its own place."""
+    """Slide an array of taxels over a surface: each measures the height at its own place."""
     along = np.arange(round(distance_m / speed_m_s * RATE_HZ)) / RATE_HZ * speed_m_s
     surface = surface or (lambda x: np.sin(2 * np.pi * x / PITCH_M))
     return surface(along[:, None] + places_m)
 
 
-def felt(speed_m_s, **options):
-    return Windows(slide(speed_m_s, **options), RATE_HZ, np.array(speed_m_s))
+def measured(speed_m_s, **options):
+    return WindowBatch(slide(speed_m_s, **options), RATE_HZ, np.array(speed_m_s))
 
 
 def rough(seed=0, waves=60):
@@ -35,43 +35,43 @@ def rough(seed=0, waves=60):
 @pytest.mark.parametrize('name', ['spatial_bands', 'mean_spatial_bands'])
 def test_the_line_of_a_grating_stands_at_one_over_its_pitch_at_every_speed(name, speed):
     feature = FEATURES[name](bands=24, longest_m=32e-3, shortest_m=1e-3)
-    highest = feature(felt(speed)).argmax(axis=-1)
+    highest = feature(measured(speed)).argmax(axis=-1)
     low, high = feature.edges_per_m[highest], feature.edges_per_m[highest + 1]
     assert ((low <= 1 / PITCH_M) & (high >= 1 / PITCH_M)).all()
 
 
 def test_spatial_bands_are_those_of_the_surface_not_of_the_speed():
     feature = FEATURES['mean_spatial_bands'](bands=8, longest_m=20e-3, shortest_m=2e-3, normalised=False)
-    slow, fast = (feature(felt(speed, distance_m=0.5, surface=rough())) for speed in (0.05, 0.1))
+    slow, fast = (feature(measured(speed, distance_m=0.5, surface=rough())) for speed in (0.05, 0.1))
     np.testing.assert_allclose(slow, fast, atol=0.02)
 
 
 def test_the_power_in_all_bands_adds_up_to_the_variance():
     feature = FEATURES['spatial_bands'](bands=64, longest_m=0.1, shortest_m=1e-3, normalised=False)
-    density = np.exp(feature(felt(0.05, distance_m=0.5)))[0]
+    density = np.exp(feature(measured(0.05, distance_m=0.5)))[0]
     assert (density * np.diff(feature.edges_per_m)).sum() == pytest.approx(0.5, rel=0.02)
 
 
 def test_the_mean_over_the_taxels_does_not_know_which_measured_it():
     samples = slide(0.05) * np.array([1.0, 2.0, 3.0, 4.0])
-    for name in ('mean_spatial_bands', 'mean_shape'):
+    for name in ('mean_spatial_bands', 'mean_statistics'):
         feature = FEATURES[name]()
-        there, swapped = (feature(Windows(x, RATE_HZ, np.array(0.05))) for x in (samples, samples[:, ::-1]))
+        there, swapped = (feature(WindowBatch(x, RATE_HZ, np.array(0.05))) for x in (samples, samples[:, ::-1]))
         np.testing.assert_allclose(there, swapped, rtol=1e-9)
 
 
 @pytest.mark.parametrize('name', ['spatial_bands', 'mean_spatial_bands'])
 def test_a_harder_touch_leaves_the_normalised_bands_and_no_offset_counts(name):
     feature = FEATURES[name](floor=1e-30)
-    soft = feature(felt(0.05, surface=rough()))
-    hard = feature(Windows(5.0 + 3.0 * slide(0.05, surface=rough()), RATE_HZ, np.array(0.05)))
+    soft = feature(measured(0.05, surface=rough()))
+    hard = feature(WindowBatch(5.0 + 3.0 * slide(0.05, surface=rough()), RATE_HZ, np.array(0.05)))
     np.testing.assert_allclose(soft, hard, atol=1e-4)
 
 
 @pytest.mark.parametrize('speed', [np.nan, 0.0, -0.1])
 @pytest.mark.parametrize('name', ['spatial_bands', 'mean_spatial_bands'])
 def test_without_movement_there_are_no_waves(name, speed):
-    assert np.isnan(FEATURES[name]()(Windows(slide(0.05), RATE_HZ, np.array(speed)))).all()
+    assert np.isnan(FEATURES[name]()(WindowBatch(slide(0.05), RATE_HZ, np.array(speed)))).all()
 
 
 def test_windows_of_different_speeds_are_described_together_as_each_alone():
@@ -79,22 +79,22 @@ def test_windows_of_different_speeds_are_described_together_as_each_alone():
     speed = np.array([0.02, np.nan, 0.1])
     for name in ('spatial_bands', 'mean_spatial_bands'):
         feature = FEATURES[name]()
-        together = feature(Windows(samples, RATE_HZ, speed))
+        together = feature(WindowBatch(samples, RATE_HZ, speed))
         for window, at, values in zip(samples, speed, together, strict=True):
-            np.testing.assert_array_equal(feature(Windows(window, RATE_HZ, np.array(at))), values)
+            np.testing.assert_array_equal(feature(WindowBatch(window, RATE_HZ, np.array(at))), values)
 
 
 def test_a_band_beyond_half_the_sampling_rate_holds_the_density_there():
     feature = FEATURES['spatial_bands'](bands=4, longest_m=2e-4, shortest_m=1e-4, normalised=False)
-    values = feature(felt(0.1))
+    values = feature(measured(0.1))
     np.testing.assert_array_equal(values, np.repeat(values[..., :1], 4, axis=-1))
 
 
 def test_shape_has_its_closed_forms():
     ramp = np.arange(8.0)[:, None]
-    level, log_variance, rise, absolute, above, skewness = FEATURES['mean_shape'](floor=1e-12)(Windows(-ramp, RATE_HZ))[
-        0
-    ]
+    level, log_variance, rise, absolute, above, skewness = FEATURES['mean_statistics'](floor=1e-12)(
+        WindowBatch(-ramp, RATE_HZ)
+    )[0]
     assert (level, log_variance) == (pytest.approx(-3.5), pytest.approx(np.log(5.25)))
     assert (rise, absolute, above) == (pytest.approx(-6.0), pytest.approx(6.0), pytest.approx(0.5))
     assert skewness == pytest.approx(0.0, abs=1e-9)
@@ -102,7 +102,7 @@ def test_shape_has_its_closed_forms():
 
 def test_shares_of_the_load_are_the_same_however_hard_it_is_pressed():
     samples = np.random.default_rng(0).uniform(10.0, 20.0, (50, 3))
-    soft, hard = (FEATURES['level_share']()(Windows(x, RATE_HZ)) for x in (samples, 3.0 * samples))
+    soft, hard = (FEATURES['centred_log_ratio']()(WindowBatch(x, RATE_HZ)) for x in (samples, 3.0 * samples))
     np.testing.assert_allclose(soft, hard)
     assert soft.sum() == pytest.approx(0.0, abs=1e-12)
 
@@ -114,18 +114,18 @@ def test_bands_that_end_before_they_begin_are_refused():
 
 @pytest.mark.parametrize('speed', SPEEDS_M_S)
 def test_the_array_reports_its_own_speed_on_a_surface_it_never_met(speed):
-    taught = [(slide(0.04, surface=rough(seed)), RATE_HZ, 0.04) for seed in range(4)]
+    trained = [(slide(0.04, surface=rough(seed)), RATE_HZ, 0.04) for seed in range(4)]
     tried = np.geomspace(0.01, 0.2, 200)
-    for estimator in (ArraySpeed.learnt(taught), ArraySpeed.from_places(PLACES_M)):
+    for estimator in (ArraySpeedEstimator.fit(trained), ArraySpeedEstimator.from_positions(PLACES_M)):
         found = estimator(slide(speed, surface=rough(9)), RATE_HZ, tried)
         assert found == pytest.approx(speed, rel=0.05)
 
 
 def test_places_of_taxels_are_learnt_to_a_tenth_of_a_millimetre():
-    learnt = ArraySpeed.learnt([(slide(0.04, surface=rough(seed)), RATE_HZ, 0.04) for seed in range(4)])
-    np.testing.assert_allclose(learnt.offsets_m, ArraySpeed.from_places(PLACES_M).offsets_m, atol=2e-4)
+    training = ArraySpeedEstimator.fit([(slide(0.04, surface=rough(seed)), RATE_HZ, 0.04) for seed in range(4)])
+    np.testing.assert_allclose(training.offsets_m, ArraySpeedEstimator.from_positions(PLACES_M).offsets_m, atol=2e-4)
     with pytest.raises(InvalidData, match='no slides'):
-        ArraySpeed.learnt([])
+        ArraySpeedEstimator.fit([])
 
 
 def test_the_any_speed_recipe_describes_a_window_live():

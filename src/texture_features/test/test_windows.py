@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_features.windowing.stream import Stream
+from texture_features.windowing.sample_buffer import BufferedStream
 from texture_features.windowing.windows import CutWindow, SlideEnd, WindowCutter, WindowParams, cut_recording
 
 PARAMS = WindowParams(length_s=0.5, hop_s=0.1)
@@ -39,34 +39,34 @@ def run(signals, states, params=PARAMS):
     return list(cut_recording(signals, states, params))
 
 
-def starts(pieces):
-    return [round((piece.start_ns - START_NS) / NANOSECONDS, 6) for piece in pieces if isinstance(piece, CutWindow)]
+def starts(events):
+    return [round((event.start_ns - START_NS) / NANOSECONDS, 6) for event in events if isinstance(event, CutWindow)]
 
 
-def first_samples(pieces, topic='signal'):
-    return [int(piece.windows[topic].samples[0, 0]) for piece in pieces if isinstance(piece, CutWindow)]
+def first_samples(events, topic='signal'):
+    return [int(event.windows[topic].samples[0, 0]) for event in events if isinstance(event, CutWindow)]
 
 
-def as_data(pieces):
-    """Return pieces in a form that compares by value."""
+def as_data(events):
+    """Return events in a form that compares by value."""
     return [
         (
-            piece.start_ns,
-            piece.skipped,
-            repr((piece.speed_m_s, piece.force_n, piece.surface)),
-            {topic: window.samples.tobytes() for topic, window in piece.windows.items()},
+            event.start_ns,
+            event.skipped,
+            repr((event.speed_m_s, event.force_n, event.surface)),
+            {topic: window.samples.tobytes() for topic, window in event.windows.items()},
         )
-        if isinstance(piece, CutWindow)
-        else piece
-        for piece in pieces
+        if isinstance(event, CutWindow)
+        else event
+        for event in events
     ]
 
 
 def test_windows_cover_the_guaranteed_time_and_no_more():
-    pieces = run({'signal': stream(3.0)}, [state(1.0, steady_s=1.0), state(2.0, Phase.LIFT)])
-    assert starts(pieces) == [1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
-    assert first_samples(pieces) == [1000, 1100, 1200, 1300, 1400, 1500]
-    assert pieces[-1] == SlideEnd(ns(2.0), 'e1', 0.1)
+    events = run({'signal': stream(3.0)}, [state(1.0, steady_s=1.0), state(2.0, Phase.LIFT)])
+    assert starts(events) == [1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+    assert first_samples(events) == [1000, 1100, 1200, 1300, 1400, 1500]
+    assert events[-1] == SlideEnd(ns(2.0), 'e1', 0.1)
 
 
 def test_two_slide_states_cover_the_time_between_them():
@@ -115,34 +115,34 @@ def test_jitter_of_later_stamps_moves_no_window():
 
 def test_inputs_of_different_rates_are_aligned_by_their_stamps():
     signals = {'signal': stream(2.0, 2200.0, 22), 'signal_static': stream(2.0, 100.0, 1, begin_s=0.004, columns=3)}
-    pieces = run(signals, [state(0.5, steady_s=1.0), state(1.5, Phase.DONE)])
-    assert first_samples(pieces, 'signal') == [1100, 1320, 1540, 1760, 1980, 2200]
-    assert first_samples(pieces, 'signal_static') == [50, 60, 70, 80, 90, 100]
-    assert pieces[0].windows['signal'].samples.shape == (1100, 1)
-    assert pieces[0].windows['signal_static'].samples.shape == (50, 3)
+    events = run(signals, [state(0.5, steady_s=1.0), state(1.5, Phase.DONE)])
+    assert first_samples(events, 'signal') == [1100, 1320, 1540, 1760, 1980, 2200]
+    assert first_samples(events, 'signal_static') == [50, 60, 70, 80, 90, 100]
+    assert events[0].windows['signal'].samples.shape == (1100, 1)
+    assert events[0].windows['signal_static'].samples.shape == (50, 3)
 
 
 def test_windows_with_lost_samples_are_left_out_and_counted():
     batches = [batch for batch in stream(2.0) if not 700 <= batch.first_sample < 710]
-    pieces = run({'signal': batches}, [state(0.0, steady_s=1.5), state(1.5, Phase.LIFT)])
-    assert starts(pieces) == [0.0, 0.1, 0.2, 0.8, 0.9, 1.0]
-    assert pieces[-1].skipped == 5
+    events = run({'signal': batches}, [state(0.0, steady_s=1.5), state(1.5, Phase.LIFT)])
+    assert starts(events) == [0.0, 0.1, 0.2, 0.8, 0.9, 1.0]
+    assert events[-1].skipped == 5
 
 
 def test_windows_with_samples_that_are_not_finite_are_left_out():
     batches = stream(2.0)
     batches[0].samples[3] = np.nan
     batches[299].samples[0] = np.inf
-    pieces = run({'signal': batches}, [state(0.0, steady_s=1.5), state(1.5, Phase.LIFT)])
-    assert starts(pieces) == [round(0.1 * k, 1) for k in range(1, 10)]
-    assert pieces[-1].skipped == 2
+    events = run({'signal': batches}, [state(0.0, steady_s=1.5), state(1.5, Phase.LIFT)])
+    assert starts(events) == [round(0.1 * k, 1) for k in range(1, 10)]
+    assert events[-1].skipped == 2
 
 
 def test_a_stream_that_begins_late_or_again_costs_only_its_windows():
     first, second = stream(1.0), stream(1.0, begin_s=1.0)
-    pieces = run({'signal': first + second}, [state(0.2, steady_s=1.8), state(2.0, Phase.LIFT)])
-    assert starts(pieces) == [0.2, 0.3, 0.4, 0.5, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
-    assert first_samples(pieces)[4] == 0
+    events = run({'signal': first + second}, [state(0.2, steady_s=1.8), state(2.0, Phase.LIFT)])
+    assert starts(events) == [0.2, 0.3, 0.4, 0.5, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5]
+    assert first_samples(events)[4] == 0
     late = run({'signal': stream(1.0, begin_s=0.35)}, [state(0.0, steady_s=1.0), state(1.0, Phase.LIFT)])
     assert starts(late) == [0.4, 0.5]
     assert late[-1].skipped == 4
@@ -162,8 +162,8 @@ def test_speed_and_force_are_means_over_the_window():
 
 def test_the_next_exploration_ends_one_that_was_never_ended():
     states = [state(0.0, steady_s=0.5), state(1.0, steady_s=0.5, name='e2'), state(1.5, Phase.DONE, name='e2')]
-    pieces = run({'signal': stream(2.0)}, states)
-    assert [piece.exploration_id for piece in pieces] == ['e1', 'e1', 'e2', 'e2']
+    events = run({'signal': stream(2.0)}, states)
+    assert [event.exploration_id for event in events] == ['e1', 'e1', 'e2', 'e2']
 
 
 def test_a_slide_whose_streams_died_ends_after_a_silence():
@@ -172,9 +172,9 @@ def test_a_slide_whose_streams_died_ends_after_a_silence():
     for batch in stream(0.7):
         cutter.add_signal('signal', batch)
     cutter.add_state(state(1.0, Phase.LIFT))
-    assert cutter.silence(100.0) == []
-    assert cutter.silence(100.2) == []
-    [end] = cutter.silence(100.4)
+    assert cutter.time_out(100.0) == []
+    assert cutter.time_out(100.2) == []
+    [end] = cutter.time_out(100.4)
     assert isinstance(end, SlideEnd)
     assert end.skipped == 6
 
@@ -183,12 +183,12 @@ def test_a_stream_that_goes_on_is_no_silence():
     cutter = WindowCutter(PARAMS, ['signal'])
     cutter.add_state(state(0.0, steady_s=1.0))
     cutter.add_state(state(1.0, Phase.LIFT))
-    pieces = []
+    events = []
     for number, batch in enumerate(stream(1.0)):
         cutter.add_signal('signal', batch)
-        pieces += cutter.silence(0.2 * number)
-    assert len(starts(pieces)) == 6
-    assert isinstance(pieces[-1], SlideEnd)
+        events += cutter.time_out(0.2 * number)
+    assert len(starts(events)) == 6
+    assert isinstance(events[-1], SlideEnd)
 
 
 def test_an_idle_cutter_keeps_a_few_seconds_only():
@@ -196,7 +196,7 @@ def test_an_idle_cutter_keeps_a_few_seconds_only():
     for batch in stream(30.0, batch=20):
         cutter.add_signal('signal', batch)
         cutter.take()
-    [run_kept] = cutter._inputs['signal'].stream.runs
+    [run_kept] = cutter._inputs['signal'].stream.buffers
     assert run_kept.next_sample - run_kept.first_sample <= 1020
     assert len(run_kept._rows) <= 2 * 1040
     assert len(run_kept._marks) <= 52
@@ -207,7 +207,7 @@ def test_a_huge_jump_of_the_index_is_a_loss_and_takes_no_memory():
     cutter.add_signal('signal', stream(0.1)[0])
     cutter.add_signal('signal', dataclasses.replace(stream(0.1)[1], first_sample=2**60))
     assert cutter.counts['lost_samples'] == 2**60 - 5
-    assert len(cutter._inputs['signal'].stream.runs[0]._rows) < 50_000
+    assert len(cutter._inputs['signal'].stream.buffers[0]._rows) < 50_000
 
 
 def test_topics_that_are_no_input_are_ignored():
@@ -252,7 +252,7 @@ def test_what_is_cut_does_not_depend_on_the_order_of_arrival(content, order):
     expected = as_data(run(signals, states))
     cutter = WindowCutter(PARAMS, tuple(signals))
     queues = {'': list(states), **{topic: list(batches) for topic, batches in signals.items()}}
-    pieces = []
+    events = []
     while any(queues.values()):
         topic = str(random.choice([name for name, queue in queues.items() if queue]))
         for _ in range(int(random.choice([1, 3, 40]))):
@@ -264,15 +264,15 @@ def test_what_is_cut_does_not_depend_on_the_order_of_arrival(content, order):
             else:
                 cutter.add_state(item)
             if random.random() < 0.5:
-                pieces += cutter.take()
-    assert as_data(pieces + cutter.finish()) == expected
+                events += cutter.take()
+    assert as_data(events + cutter.finish()) == expected
 
 
 def test_a_stream_that_ended_is_forgotten_when_another_has_run_for_as_long_as_is_kept():
-    kept = Stream(keep_s=1.0)
+    kept = BufferedStream(keep_s=1.0)
     for batch in stream(0.5) + stream(0.4, begin_s=1.0):
         kept.add(batch)
-    assert len(kept.runs) == 2
+    assert len(kept.buffers) == 2
     for batch in stream(0.6, begin_s=1.0)[-40:]:
         kept.add(batch)
-    assert [run.next_sample for run in kept.runs] == [600]
+    assert [run.next_sample for run in kept.buffers] == [600]

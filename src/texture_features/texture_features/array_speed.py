@@ -1,4 +1,4 @@
-"""Speed of the finger from its own signal: a bump passes the taxels of an array one after the other."""
+"""Speed of the finger from the delays between the taxels of an array."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ SUM_FLOOR = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class ArraySpeed:
+class ArraySpeedEstimator:
     """Places of the taxels along the direction of sliding, and from them the speed of any slide.
 
     A bump that taxel a meets now, taxel b meets d_ab / v later. The cross-correlations of the rates of change of all
     pairs are read off at d_ab / v and added up; the speed with the greatest sum is taken. Neither the surface nor its
-    label is needed. The places come from a drawing of the sensor, or from slides at known speeds by `learnt`.
+    label is needed. The places come from a drawing of the sensor, or from slides at known speeds by `training`.
 
     Parameters
     ----------
@@ -30,12 +30,14 @@ class ArraySpeed:
     offsets_m: Array
 
     @classmethod
-    def from_places(cls, places_m: Array) -> ArraySpeed:
+    def from_positions(cls, positions_m: Array) -> ArraySpeedEstimator:
         """Return the estimator for taxels at these places along the direction of sliding, (n_taxels,) m."""
-        return cls(np.array([places_m[a] - places_m[b] for a, b in combinations(range(len(places_m)), 2)]))
+        return cls(np.array([positions_m[a] - positions_m[b] for a, b in combinations(range(len(positions_m)), 2)]))
 
     @classmethod
-    def learnt(cls, slides: list[tuple[Array, float, float]], reach_m: float = 0.02, steps: int = 401) -> ArraySpeed:
+    def fit(
+        cls, slides: list[tuple[Array, float, float]], reach_m: float = 0.02, steps: int = 401
+    ) -> ArraySpeedEstimator:
         """Return the estimator from slides at known speeds.
 
         Parameters

@@ -6,45 +6,45 @@ from collections.abc import Mapping
 
 from texture_features.feature import Feature
 from texture_features.features.arc_length import ArcLength
-from texture_features.features.bursts import Bursts
+from texture_features.features.centred_log_ratio import CentredLogRatio
 from texture_features.features.correlation import Correlation
 from texture_features.features.force import Force
 from texture_features.features.hjorth import Hjorth
-from texture_features.features.integral import Integral
-from texture_features.features.level import Level
-from texture_features.features.level_share import LevelShare
 from texture_features.features.log_bands import LogBands
-from texture_features.features.log_slope_variance import LogSlopeVariance
+from texture_features.features.log_difference_variance import LogDifferenceVariance
 from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.log_variance import LogVariance
-from texture_features.features.low_lines import LowLines
+from texture_features.features.low_fft_bins import LowFftBins
+from texture_features.features.mean import ChannelMean
 from texture_features.features.mean_amplitude import MeanAmplitude
 from texture_features.features.mean_hjorth import MeanHjorth
-from texture_features.features.mean_shape import MeanShape
+from texture_features.features.mean_log_bands import MeanLogBands
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
+from texture_features.features.mean_statistics import ChannelMeanStatistics
 from texture_features.features.moments import Moments
 from texture_features.features.ordinal_patterns import OrdinalPatterns
 from texture_features.features.pacinian_power import PacinianPower
-from texture_features.features.power_echo import PowerEcho
+from texture_features.features.peak_to_median_power import PeakToMedianPower
+from texture_features.features.power_autocorrelation import PowerAutocorrelation
 from texture_features.features.region_peaks import RegionPeaks
 from texture_features.features.short_time_fourier import ShortTimeFourier
+from texture_features.features.signal_energy import SignalEnergy
+from texture_features.features.spatial_band_power import SpatialBandPower
 from texture_features.features.spatial_bands import SpatialBands
-from texture_features.features.spatial_level import SpatialLevel
 from texture_features.features.spatial_variation import SpatialVariation
 from texture_features.features.spectral_exponent import SpectralExponent
 from texture_features.features.spectral_peaks import SpectralPeaks
 from texture_features.features.speed import Speed
 from texture_features.features.temporal_variation import TemporalVariation
-from texture_features.features.typical_bands import TypicalBands
 from texture_features.features.wavelet_energy import WaveletEnergy
 
 FEATURES: Mapping[str, type[Feature]] = {
     'log_bands': LogBands,  # Welch 1967
-    'typical_bands': TypicalBands,
-    'low_lines': LowLines,
+    'mean_log_bands': MeanLogBands,
+    'low_fft_bins': LowFftBins,
     'hjorth': Hjorth,  # Hjorth 1970; Kaboli et al. 2015
     'spectral_peaks': SpectralPeaks,  # Roberge et al.
-    'integral': Integral,  # Roberge et al.
+    'signal_energy': SignalEnergy,  # Roberge et al.
     'arc_length': ArcLength,  # Roberge et al.
     'region_peaks': RegionPeaks,  # Jamali & Sammut 2010
     'mean_amplitude': MeanAmplitude,  # Jamali & Sammut 2010
@@ -54,21 +54,21 @@ FEATURES: Mapping[str, type[Feature]] = {
     'short_time_fourier': ShortTimeFourier,
     'wavelet_energy': WaveletEnergy,  # Daubechies 1992
     'moments': Moments,
-    'power_echo': PowerEcho,
+    'power_autocorrelation': PowerAutocorrelation,
     'ordinal_patterns': OrdinalPatterns,  # Bandt & Pompe 2002
-    'level': Level,
+    'mean': ChannelMean,
     'log_variance': LogVariance,
-    'log_slope_variance': LogSlopeVariance,
+    'log_difference_variance': LogDifferenceVariance,
     'pacinian_power': PacinianPower,  # Bensmaia & Hollins 2005
     'spectral_exponent': SpectralExponent,  # Toscani & Metzger 2022
     'temporal_variation': TemporalVariation,  # Lieber & Bensmaia 2019
     'spatial_variation': SpatialVariation,  # Lieber & Bensmaia 2019
-    'spatial_level': SpatialLevel,
-    'bursts': Bursts,
+    'spatial_band_power': SpatialBandPower,
+    'peak_to_median_power': PeakToMedianPower,
     'spatial_bands': SpatialBands,
     'mean_spatial_bands': MeanSpatialBands,
-    'mean_shape': MeanShape,
-    'level_share': LevelShare,
+    'mean_statistics': ChannelMeanStatistics,
+    'centred_log_ratio': CentredLogRatio,
     'speed': Speed,
     'force': Force,
 }

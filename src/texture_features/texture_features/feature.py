@@ -16,7 +16,7 @@ T = TypeVar('T')
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class WindowBatch:
     """One window, or many of one rate and length: the leading axes count the windows.
 
     Parameters
@@ -35,7 +35,7 @@ class Windows:
     rate_hz: float
     speed_m_s: Array = field(default_factory=lambda: np.array(np.nan))
     force_n: Array = field(default_factory=lambda: np.array(np.nan))
-    joined: tuple[Windows, ...] = ()
+    joined: tuple[WindowBatch, ...] = ()
     _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -75,31 +75,31 @@ class Feature(Protocol):
     """Frozen parameters of a feature; called with windows it gives its values.
 
     A feature of the signal gives (..., n_channels, n_names); one of the motion, such as the speed, (..., 1, n_names)
-    and has `of_signal` False. One that can join several inputs, found in `windows.joined`, says so by a class variable
-    `joins` that is True; it has `of_signal` False.
+    and has `per_channel` False. One that can join several inputs, found in `windows.joined`, says so by a class
+    variable `joins` that is True; it has `per_channel` False.
     """
 
     @property
-    def of_signal(self) -> bool:
+    def per_channel(self) -> bool:
         """Whether there are values for each channel."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Name of each value of one channel; '' for the only value of a feature."""
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the values; finite for finite samples."""
 
 
 def centred(rows: Array) -> Array:
     """Return rows less their mean, (..., n_samples)."""
     # A product with equal shares is the fastest mean, and has the same rounding for one row as for many.
-    difference: Array = rows - (rows @ shares(rows.shape[-1]))[..., None]
+    difference: Array = rows - (rows @ mean_weights(rows.shape[-1]))[..., None]
     return difference
 
 
 @lru_cache(maxsize=64)
-def shares(count: int) -> Array:
+def mean_weights(count: int) -> Array:
     """Return 1 / count, `count` times: what a mean is a product with."""
     equal = np.full(count, 1.0 / count)
     equal.flags.writeable = False
@@ -113,7 +113,7 @@ def power(rows: Array) -> Array:
     return squares / rows.shape[-1]
 
 
-def slopes(rows: Array) -> Array:
+def first_difference(rows: Array) -> Array:
     """Return the steps from sample to sample, (..., max(1, n_samples - 1)); 0 for a single sample."""
     if rows.shape[-1] == 1:
         return np.zeros_like(rows)

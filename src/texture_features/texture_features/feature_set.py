@@ -20,20 +20,20 @@ from texture_core.parameters import from_mapping, param
 from texture_core.plain_data import safe_repr
 from texture_core.window import Window
 from texture_features.catalogue import FEATURES
-from texture_features.choice import choose
-from texture_features.feature import Feature, Windows
+from texture_features.feature import Feature, WindowBatch
 from texture_features.features.force import Force
 from texture_features.features.speed import Speed
+from texture_features.recipe_entry import choose
 from texture_features.recipe_file import read_recipe
-from texture_features.windowing.stretch import Stretched
-from texture_features.windowing.windows import CutWindow, Piece, SlideEnd, WindowParams
+from texture_features.windowing.time_stretch import Stretched
+from texture_features.windowing.windows import CutWindow, SlideEnd, WindowEvent, WindowParams
 
 # Windows described in one go: enough for speed, few enough for the memory cache.
 CHUNK = 64
-Layout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of each input
+InputLayout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of each input
 
 
-OF_MOTION = (Speed, Force)
+MOTION_FEATURES = (Speed, Force)
 JOINT = '+'  # between the topics of a joint input
 
 
@@ -61,7 +61,7 @@ class InputOptions:
     """What an input of a recipe may say besides its features."""
 
     stretch_to_m_s: float = param(
-        0.0, 'Speed to which windows are stretched in time before they are described; 0 for none.', unit='m/s', low=0.0
+        0.0, 'Speed to which windows are resampled before feature extraction; 0: no resampling.', unit='m/s', low=0.0
     )
 
 
@@ -72,12 +72,12 @@ class FeatureSet:
     Examples
     --------
     >>> features = FeatureSet.load('default')
-    >>> vectors = [features.describe(piece) for piece in cut_recording(signals, states, features.windows)]
+    >>> vectors = [features.describe(event) for event in cut_recording(signals, states, features.windows)]
     """
 
     windows: WindowParams
     inputs: tuple[InputFeatures, ...]
-    _layouts: dict[Layout, tuple[tuple[str, ...], str]] = field(default_factory=dict, repr=False, compare=False)
+    _layouts: dict[InputLayout, tuple[tuple[str, ...], str]] = field(default_factory=dict, repr=False, compare=False)
 
     @classmethod
     def load(cls, name_or_path: str) -> FeatureSet:
@@ -115,66 +115,66 @@ class FeatureSet:
         """What the inputs need, in order, each once."""
         return tuple(dict.fromkeys(chain.from_iterable(item.topics for item in self.inputs)))
 
-    def describe(self, piece: Piece) -> FeatureVector:
+    def extract(self, event: WindowEvent) -> FeatureVector:
         """Return the features of a window; for the end of a slide, the empty vector that is `last`."""
-        if isinstance(piece, SlideEnd):
+        if isinstance(event, SlideEnd):
             return FeatureVector(
-                start_ns=piece.end_ns,
-                exploration_id=piece.exploration_id,
+                start_ns=event.end_ns,
+                exploration_id=event.exploration_id,
                 window_s=0.0,
-                hop_s=piece.hop_s,
+                hop_s=event.hop_s,
                 last=True,
-                skipped=piece.skipped,
+                skipped=event.skipped,
             )
-        inputs = [piece.windows[topic] for topic in self.topics]
-        speed, force = np.array(piece.speed_m_s), np.array(piece.force_n)
-        values = self._values([Windows(item.samples, item.rate_hz, speed, force) for item in inputs])
-        return self._vector(piece, _layout(inputs), values)
+        inputs = [event.windows[topic] for topic in self.topics]
+        speed, force = np.array(event.speed_m_s), np.array(event.force_n)
+        values = self._values([WindowBatch(item.samples, item.rate_hz, speed, force) for item in inputs])
+        return self._vector(event, _layout(inputs), values)
 
-    def describe_many(self, pieces: Iterable[Piece]) -> list[FeatureVector]:
-        """Return what `describe` returns for each piece, to the last bit, but faster."""
+    def extract_many(self, events: Iterable[WindowEvent]) -> list[FeatureVector]:
+        """Return what `describe` returns for each event, to the last bit, but faster."""
         vectors: list[FeatureVector] = []
-        for kind, group in groupby(pieces, self._kind):
+        for kind, group in groupby(events, self._kind):
             alike = list(group)
             if not kind:
-                vectors += [self.describe(piece) for piece in alike]
+                vectors += [self.extract(event) for event in alike]
                 continue
             for start in range(0, len(alike), CHUNK):
-                vectors += self._describe_alike(alike[start : start + CHUNK])  # type: ignore[arg-type]
+                vectors += self._extract_alike(alike[start : start + CHUNK])  # type: ignore[arg-type]
         return vectors
 
-    def names(self, layout: Layout) -> tuple[str, ...]:
+    def names(self, layout: InputLayout) -> tuple[str, ...]:
         """Return the name of each value, given (rate, channels) of each input: 'signal/log_bands/12/dynamic'."""
         return self._names_and_fingerprint(layout)[0]
 
-    def fingerprint(self, layout: Layout) -> str:
+    def fingerprint(self, layout: InputLayout) -> str:
         """Return what identifies the values, such as '3f9c12ab signal=2200Hz*1 signal_static=100Hz*22'.
 
         The hash covers inputs, features and window length; hop and skip do not change what a value means.
         """
         return self._names_and_fingerprint(layout)[1]
 
-    def _kind(self, piece: Piece) -> tuple[Any, ...]:
-        """Return what pieces must share to be described together; () for the end of a slide."""
-        if isinstance(piece, SlideEnd):
+    def _kind(self, event: WindowEvent) -> tuple[Any, ...]:
+        """Return what events must share to be described together; () for the end of a slide."""
+        if isinstance(event, SlideEnd):
             return ()
         return tuple(
-            (item.rate_hz, item.channels, item.samples.shape) for item in map(piece.windows.__getitem__, self.topics)
+            (item.rate_hz, item.channels, item.samples.shape) for item in map(event.windows.__getitem__, self.topics)
         )
 
-    def _describe_alike(self, pieces: Sequence[CutWindow]) -> list[FeatureVector]:
-        speed = np.array([piece.speed_m_s for piece in pieces])
-        force = np.array([piece.force_n for piece in pieces])
-        inputs = [pieces[0].windows[topic] for topic in self.topics]
+    def _extract_alike(self, events: Sequence[CutWindow]) -> list[FeatureVector]:
+        speed = np.array([event.speed_m_s for event in events])
+        force = np.array([event.force_n for event in events])
+        inputs = [events[0].windows[topic] for topic in self.topics]
         stacked = [
-            Windows(np.stack([piece.windows[topic].samples for piece in pieces]), item.rate_hz, speed, force)
+            WindowBatch(np.stack([event.windows[topic].samples for event in events]), item.rate_hz, speed, force)
             for topic, item in zip(self.topics, inputs, strict=True)
         ]
         values = self._values(stacked)
         layout = _layout(inputs)
-        return [self._vector(piece, layout, row) for piece, row in zip(pieces, values, strict=True)]
+        return [self._vector(event, layout, row) for event, row in zip(events, values, strict=True)]
 
-    def _values(self, inputs: Sequence[Windows]) -> Array:
+    def _values(self, inputs: Sequence[WindowBatch]) -> Array:
         """Return the values of windows, (..., n_values)."""
         flat = (*inputs[0].samples.shape[:-2], -1)
         by_topic = dict(zip(self.topics, inputs, strict=True))
@@ -186,29 +186,29 @@ class FeatureSet:
         ]
         return np.concatenate(blocks, axis=-1)
 
-    def _vector(self, piece: CutWindow, layout: Layout, values: Array) -> FeatureVector:
+    def _vector(self, event: CutWindow, layout: InputLayout, values: Array) -> FeatureVector:
         names, fingerprint = self._names_and_fingerprint(layout)
         return FeatureVector(
-            start_ns=piece.start_ns,
-            exploration_id=piece.exploration_id,
-            window_s=piece.length_s,
-            hop_s=piece.hop_s,
+            start_ns=event.start_ns,
+            exploration_id=event.exploration_id,
+            window_s=event.length_s,
+            hop_s=event.hop_s,
             names=names,
             values=values,
-            speed_m_s=piece.speed_m_s,
-            force_n=piece.force_n,
+            speed_m_s=event.speed_m_s,
+            force_n=event.force_n,
             feature_set=fingerprint,
-            skipped=piece.skipped,
+            skipped=event.skipped,
         )
 
-    def _names_and_fingerprint(self, layout: Layout) -> tuple[tuple[str, ...], str]:
+    def _names_and_fingerprint(self, layout: InputLayout) -> tuple[tuple[str, ...], str]:
         if layout not in self._layouts:
             channels = dict(zip(self.topics, (channels for _, channels in layout), strict=True))
             names = chain.from_iterable(_names(item, channels[item.topics[0]]) for item in self.inputs)
             self._layouts[layout] = (tuple(names), self._fingerprint(layout))
         return self._layouts[layout]
 
-    def _fingerprint(self, layout: Layout) -> str:
+    def _fingerprint(self, layout: InputLayout) -> str:
         meaning = {**self.as_mapping(), 'windows': self.windows.length_s}
         digest = hashlib.sha256(json.dumps(meaning, sort_keys=True).encode()).hexdigest()[:8]
         met = [
@@ -241,24 +241,24 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
 
 def _prepared(feature: Feature, options: InputOptions) -> Feature:
     """Return the feature of the input as the options change it; what tells of the motion itself stays as it is."""
-    if not options.stretch_to_m_s or isinstance(feature, OF_MOTION):
+    if not options.stretch_to_m_s or isinstance(feature, MOTION_FEATURES):
         return feature
     return Stretched(feature, options.stretch_to_m_s)
 
 
-def _joined(windows: Sequence[Windows]) -> Windows:
+def _joined(windows: Sequence[WindowBatch]) -> WindowBatch:
     return windows[0] if len(windows) == 1 else dataclasses.replace(windows[0], joined=tuple(windows[1:]))
 
 
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:
     for name, feature in item.features:
-        columns = channels if feature.of_signal else ('',)
+        columns = channels if feature.per_channel else ('',)
         for channel in columns:
             for value in feature.names:
                 yield '/'.join(part for part in (item.topic, name, value, channel) if part)
 
 
-def _layout(inputs: Sequence[Window]) -> Layout:
+def _layout(inputs: Sequence[Window]) -> InputLayout:
     return tuple((item.rate_hz, item.channels) for item in inputs)
 
 

@@ -1,4 +1,4 @@
-"""Windows of known surfaces, described: what is learnt from and judged by."""
+"""Windows of known surfaces, described: what is used for training and evaluated by."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.features import FeatureVector
-from texture_core.motion import Motion
+from texture_core.slide_motion import SlideMotion
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class LabelledFeatures:
     feature_set: str
     window_s: float
     hop_s: float
-    motions: Mapping[str, Motion] = field(default_factory=dict)
+    motions: Mapping[str, SlideMotion] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         shape = (len(self.labels), len(self.names))
@@ -69,10 +69,10 @@ class LabelledFeatures:
         used = [vector for vector in vectors if not vector.last and surfaces.get(vector.exploration_id)]
         if not used:
             raise InvalidData('there is no window of a labelled surface; record slides with a surface named')
-        kinds = sorted({vector.feature_set for vector in used})
-        if len(kinds) > 1:
+        group_similar = sorted({vector.feature_set for vector in used})
+        if len(group_similar) > 1:
             raise ModelMismatch(
-                f'the windows are described in different ways: {"; ".join(kinds)}; use those of one kind'
+                f'the windows are described in different ways: {"; ".join(group_similar)}; use those of one kind'
             )
         return cls(
             values=np.stack([vector.values for vector in used]),

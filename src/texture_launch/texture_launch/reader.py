@@ -55,7 +55,7 @@ class _BoundedTree(ElementTree.TreeBuilder):
 
 
 @dataclass
-class Reading:
+class ReadState:
     """What has been read so far: nodes, names of all declared arguments, and the files being read."""
 
     nodes: list[NodeDescription] = field(default_factory=list)
@@ -79,7 +79,7 @@ def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -
     InvalidLaunch, UnknownName
         With the file and what is wrong in it.
     """
-    reading = Reading()
+    reading = ReadState()
     _read_file(path, Scope(dict(given), dict(environment)), reading)
     for name in given:
         if name not in reading.declared:
@@ -130,7 +130,7 @@ def _parse(path: Path) -> Element:
     return root
 
 
-def _read_file(path: Path, scope: Scope, reading: Reading) -> None:
+def _read_file(path: Path, scope: Scope, reading: ReadState) -> None:
     root = _parse(path)
     if len(reading.files) > MAX_INCLUDES:
         raise InvalidLaunch(f"'{path}' is included more than {MAX_INCLUDES} levels deep; does it include itself?")
@@ -145,7 +145,7 @@ def _read_file(path: Path, scope: Scope, reading: Reading) -> None:
     reading.files.pop()
 
 
-def _read_children(parent: Element, scope: Scope, reading: Reading) -> None:
+def _read_children(parent: Element, scope: Scope, reading: ReadState) -> None:
     for element in parent:
         reading.elements += 1
         if reading.elements > MAX_ELEMENTS:
@@ -169,7 +169,7 @@ def _wanted(element: Element, scope: Scope) -> bool:
     return met == (given[0] == 'if')
 
 
-def _read_arg(element: Element, scope: Scope, _reading: Reading) -> None:
+def _read_arg(element: Element, scope: Scope, _reading: ReadState) -> None:
     name = attribute(element, 'name')
     if name not in scope.variables:
         if 'default' not in element.attrib:
@@ -180,24 +180,24 @@ def _read_arg(element: Element, scope: Scope, _reading: Reading) -> None:
         raise InvalidLaunch(f"argument '{name}' is '{scope.variables[name]}'; allowed is one of {', '.join(choices)}")
 
 
-def _read_let(element: Element, scope: Scope, _reading: Reading) -> None:
+def _read_let(element: Element, scope: Scope, _reading: ReadState) -> None:
     scope.variables[scope.expand(attribute(element, 'name'))] = scope.expand(attribute(element, 'value'))
 
 
-def _read_set_env(element: Element, scope: Scope, _reading: Reading) -> None:
+def _read_set_env(element: Element, scope: Scope, _reading: ReadState) -> None:
     scope.environment[scope.expand(attribute(element, 'name'))] = scope.expand(attribute(element, 'value'))
 
 
-def _read_namespace(element: Element, scope: Scope, _reading: Reading) -> None:
+def _read_namespace(element: Element, scope: Scope, _reading: ReadState) -> None:
     scope.namespace = joined_namespace(scope.namespace, scope.expand(attribute(element, 'namespace'))) or '/'
 
 
-def _read_group(element: Element, scope: Scope, reading: Reading) -> None:
+def _read_group(element: Element, scope: Scope, reading: ReadState) -> None:
     scoped = truth(element.get('scoped', 'true'), "'scoped' of <group>")
     _read_children(element, scope.copy() if scoped else scope, reading)
 
 
-def _read_include(element: Element, scope: Scope, reading: Reading) -> None:
+def _read_include(element: Element, scope: Scope, reading: ReadState) -> None:
     path = Path(scope.expand(attribute(element, 'file')))
     known = {argument.name for argument in declared_arguments(path)}
     given = {}
@@ -211,11 +211,11 @@ def _read_include(element: Element, scope: Scope, reading: Reading) -> None:
     _read_file(path, scope, reading)
 
 
-def _read_node(element: Element, scope: Scope, reading: Reading) -> None:
+def _read_node(element: Element, scope: Scope, reading: ReadState) -> None:
     reading.nodes.append(read_node(element, scope))
 
 
-READERS: Mapping[str, Callable[[Element, Scope, Reading], None]] = {
+READERS: Mapping[str, Callable[[Element, Scope, ReadState], None]] = {
     'arg': _read_arg,
     'let': _read_let,
     'set_env': _read_set_env,

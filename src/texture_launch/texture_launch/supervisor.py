@@ -152,15 +152,15 @@ class Supervisor:
     def _end(self, running: Running) -> None:
         self._forget(running)
         node, returncode = running.job.node, running.process.returncode
-        asked_for = self._stopping_since_s is not None
+        requested_for = self._stopping_since_s is not None
         # What was started wrongly would only end again.
-        restart = node.respawn and returncode != MISTAKE and not (asked_for or self._together)
+        restart = node.respawn and returncode != MISTAKE and not (requested_for or self._together)
         needed = node.needed or node.respawn or (self._together and returncode != 0)
-        self._failed |= returncode != 0 and not (asked_for or restart)
+        self._failed |= returncode != 0 and not (requested_for or restart)
         self._say(f'[launch] {running.label} {process.ending(returncode)}')
         if restart:
             self._due.append((time.monotonic() + node.respawn_delay_s, replace(running.job, again=True)))
-        elif needed and not asked_for:
+        elif needed and not requested_for:
             self._say(f'[launch] {running.label} is needed by the others, which are stopped now')
             self.stop()
 

@@ -116,12 +116,12 @@ class SignalDecoder:
         """Return the signal in the CDR of a TactileSignal; `samples` is a view of `raw`."""
         tail = STAMP_END + len(self._head)
         if self._like is None or raw[STAMP_END:tail] != self._head or not raw.startswith(LITTLE_ENDIAN):
-            return self._learn(raw)
+            return self._decode_first(raw)
         seconds, nanoseconds = STAMP.unpack_from(raw, len(LITTLE_ENDIAN))
         first, length = INDEX_AND_LENGTH.unpack_from(raw, tail)
         columns = len(self._like.channels)
         if length % columns or len(raw) < tail + INDEX_AND_LENGTH.size + 4 * length:
-            return self._learn(raw)
+            return self._decode_first(raw)
         samples = np.frombuffer(raw, '<f4', length, tail + INDEX_AND_LENGTH.size)
         like = self._like
         return TactileSignal(
@@ -129,7 +129,7 @@ class SignalDecoder:
             first, samples.reshape(-1, columns), like.frame_id,
         )  # fmt: skip
 
-    def _learn(self, raw: bytes) -> TactileSignal:
+    def _decode_first(self, raw: bytes) -> TactileSignal:
         signal: TactileSignal = decode(raw, TYPES[TactileSignal])
         # The samples are the last field: what stands before them, without the stamp, is common to the stream.
         tail = len(raw) - 4 * signal.samples.size - INDEX_AND_LENGTH.size

@@ -11,11 +11,11 @@ from texture_core.exploration import ExplorationState
 from texture_core.features import FeatureVector
 from texture_features.feature_set import FeatureSet
 from texture_features.labelled_features import LabelledFeatures
-from texture_features.windowing.windows import Piece, WindowCutter
-from texture_recordings.slides import Message, Slide, find_slides, read_slides
+from texture_features.windowing.windows import WindowCutter, WindowEvent
+from texture_recordings.slides import LabelledSlide, Message, find_slides, read_slides
 
 
-def describe(
+def extract_features(
     bags: Iterable[str | Path], feature_set: FeatureSet, slides: str = '', namespace: str | None = None
 ) -> LabelledFeatures:
     """Return the features of all windows of the labelled slides in bags.
@@ -40,21 +40,25 @@ def describe(
     """
     chosen = find_slides(bags, slides, namespace)
     surfaces = {slide.name: slide.surface for slide in chosen}
-    vectors = [vector for _, of_slide in describe_slides(chosen, feature_set) for vector in of_slide]
+    vectors = [vector for _, of_slide in extract_slides(chosen, feature_set) for vector in of_slide]
     if not vectors:
         raise no_window(chosen, feature_set)
     motions = {slide.name: slide.motion for slide in chosen if slide.motion}
     return replace(LabelledFeatures.from_vectors(vectors, surfaces), motions=motions)
 
 
-def describe_slides(slides: Sequence[Slide], feature_set: FeatureSet) -> Iterator[tuple[Slide, list[FeatureVector]]]:
+def extract_slides(
+    slides: Sequence[LabelledSlide], feature_set: FeatureSet
+) -> Iterator[tuple[LabelledSlide, list[FeatureVector]]]:
     """Yield each slide with the features of its windows, named after the slide; none if no window could be cut."""
-    for slide, pieces in cut_slides(slides, feature_set):
-        vectors = feature_set.describe_many(pieces)
+    for slide, events in cut_slides(slides, feature_set):
+        vectors = feature_set.extract_many(events)
         yield slide, [replace(vector, exploration_id=slide.name) for vector in vectors if not vector.last]
 
 
-def cut_slides(slides: Sequence[Slide], feature_set: FeatureSet) -> Iterator[tuple[Slide, list[Piece]]]:
+def cut_slides(
+    slides: Sequence[LabelledSlide], feature_set: FeatureSet
+) -> Iterator[tuple[LabelledSlide, list[WindowEvent]]]:
     """Yield each slide with its windows and its end, as the feature extractor cuts them.
 
     Raises
@@ -66,15 +70,15 @@ def cut_slides(slides: Sequence[Slide], feature_set: FeatureSet) -> Iterator[tup
         yield slide, _cut(slide, messages, feature_set)
 
 
-def _cut(slide: Slide, messages: Sequence[Message], feature_set: FeatureSet) -> list[Piece]:
+def _cut(slide: LabelledSlide, messages: Sequence[Message], feature_set: FeatureSet) -> list[WindowEvent]:
     cutter = WindowCutter(feature_set.windows, feature_set.topics)
-    pieces: list[Piece] = []
+    events: list[WindowEvent] = []
     for topic, _, value in messages:
         if isinstance(value, ExplorationState):
             cutter.add_state(value)
         else:
             cutter.add_signal(topic, value)
-        pieces += cutter.take()
+        events += cutter.take()
     if cutter.waiting_for:
         [(_, everything)] = read_slides([slide])
         present = ', '.join(sorted({topic for topic, _, _ in everything} - {'exploration'})) or 'states'
@@ -82,10 +86,10 @@ def _cut(slide: Slide, messages: Sequence[Message], feature_set: FeatureSet) -> 
             f"slide '{slide.name}' in '{slide.bag}' has no '{cutter.waiting_for[0]}', only {present}; "
             f'the windows need {", ".join(feature_set.topics)}: use another recipe or record the missing topic'
         )
-    return pieces + cutter.finish()
+    return events + cutter.finish()
 
 
-def no_window(slides: Sequence[Slide], feature_set: FeatureSet) -> InvalidData:
+def no_window(slides: Sequence[LabelledSlide], feature_set: FeatureSet) -> InvalidData:
     """Return the error for slides of which not one has a usable window."""
     return InvalidData(
         f'none of the {len(slides)} slides has a whole window of {feature_set.windows.length_s} s; '

@@ -9,7 +9,7 @@ from pathlib import Path
 from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_features.segmentation.segments import SegmentParams
+from texture_features.segmentation.segments import SegmentationParams
 from texture_features.segmentation.slide_segmenter import segment_recording
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import RawMessage, find_bags, read_bag, read_raw, short_name
@@ -20,7 +20,7 @@ FAST_TOPIC, SLOW_TOPIC, STATE_TOPIC = 'signal', 'signal_static', 'exploration'
 def segment_bags(
     bags: Iterable[str | Path],
     out: str | Path,
-    params: SegmentParams,
+    params: SegmentationParams,
     surface: str = '',
     namespace: str | None = None,
 ) -> dict[Path, int]:
@@ -53,21 +53,21 @@ def segment_bags(
     }
 
 
-def _segment(path: Path, out: Path, params: SegmentParams, surface: str, namespace: str | None) -> int:
+def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, namespace: str | None) -> int:
     signals: dict[str, list[TactileSignal]] = {FAST_TOPIC: [], SLOW_TOPIC: []}
-    told: list[ExplorationState] = []
+    reported: list[ExplorationState] = []
     for topic, _, value in read_bag(path, (*signals, STATE_TOPIC), namespace):
-        (told if topic == STATE_TOPIC else signals[topic]).append(value)
+        (reported if topic == STATE_TOPIC else signals[topic]).append(value)
     if not signals[FAST_TOPIC]:
         raise InvalidData(f"the bag '{path}' has no '{FAST_TOPIC}' to find slides in; record the vibration too")
     found = segment_recording(signals, params, exploration_id=path.name)
-    states = _labelled(found, sorted(told, key=lambda state: state.stamp_ns), surface)
+    states = _labelled(found, sorted(reported, key=lambda state: state.stamp_ns), surface)
     _write(path, out, states, namespace)
     return sum(state.phase is Phase.SLIDE for state in states)
 
 
 def _labelled(
-    found: Sequence[ExplorationState], told: Sequence[ExplorationState], surface: str
+    found: Sequence[ExplorationState], reported: Sequence[ExplorationState], surface: str
 ) -> list[ExplorationState]:
     """Return the states found, with what was told of the motion at the middle of each slide."""
     states: list[ExplorationState] = []
@@ -75,7 +75,7 @@ def _labelled(
     for state in found:
         middle_ns = state.stamp_ns + round(state.steady_s * 5e8)
         if state.phase is Phase.SLIDE:
-            known = next((item for item in reversed(told) if item.stamp_ns <= middle_ns), known)
+            known = next((item for item in reversed(reported) if item.stamp_ns <= middle_ns), known)
         states.append(
             replace(
                 state,

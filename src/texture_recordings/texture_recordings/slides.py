@@ -12,9 +12,9 @@ from typing import Any
 
 from texture_core.errors import InvalidData
 from texture_core.exploration import Phase
-from texture_core.motion import Motion
+from texture_core.slide_motion import SlideMotion
 from texture_recordings.bags import find_bags, read_bag
-from texture_recordings.motion_made import motion_made
+from texture_recordings.motion_of_states import motion_made
 
 RANGE = re.compile(r'(\d+)(?:-(\d+))?')
 Message = tuple[str, int, Any]
@@ -22,7 +22,7 @@ STREAMS = ('signal', 'signal_static')
 
 
 @dataclass(frozen=True)
-class Slide:
+class LabelledSlide:
     """One exploration with a slide, as it lies in a bag.
 
     `number` counts the slides of this surface from 1 in the order recorded; what belongs to the slide was logged
@@ -36,7 +36,7 @@ class Slide:
     start_ns: int
     stop_ns: int | None
     namespace: str | None = None
-    motion: Motion | None = None
+    motion: SlideMotion | None = None
 
     @property
     def name(self) -> str:
@@ -44,7 +44,9 @@ class Slide:
         return f'{self.surface}/{self.number}'
 
 
-def read_slides(slides: Sequence[Slide], streams: Sequence[str] = STREAMS) -> Iterator[tuple[Slide, list[Message]]]:
+def read_slides(
+    slides: Sequence[LabelledSlide], streams: Sequence[str] = STREAMS
+) -> Iterator[tuple[LabelledSlide, list[Message]]]:
     """Yield each slide with its (topic, log time in ns, data class) of streams and states; each bag is read once.
 
     Slides of one bag come in the order recorded.
@@ -56,7 +58,9 @@ def read_slides(slides: Sequence[Slide], streams: Sequence[str] = STREAMS) -> It
         yield from _share_out(messages, inside)
 
 
-def _share_out(messages: Iterator[Message], slides: Sequence[Slide]) -> Iterator[tuple[Slide, list[Message]]]:
+def _share_out(
+    messages: Iterator[Message], slides: Sequence[LabelledSlide]
+) -> Iterator[tuple[LabelledSlide, list[Message]]]:
     following = next(messages, None)
     for slide in slides:
         mine: list[Message] = []
@@ -87,7 +91,7 @@ def parse_selection(text: str) -> frozenset[int] | None:
     return frozenset(numbers)
 
 
-def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | None = None) -> list[Slide]:
+def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | None = None) -> list[LabelledSlide]:
     """Return the labelled slides in bags that `slides` names ('' for all), by bag and time.
 
     Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
@@ -112,21 +116,25 @@ def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | N
     return found
 
 
-def _slides_of(path: Path, namespace: str | None) -> list[Slide]:
+def _slides_of(path: Path, namespace: str | None) -> list[LabelledSlide]:
     """Return the labelled slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
-    told = ((log_ns, state) for _, log_ns, state in read_bag(path, ('exploration',), namespace) if state.exploration_id)
-    begun: list[tuple[int, Slide | None]] = []
-    for name, group in groupby(told, key=lambda one: one[1].exploration_id):
+    reported = (
+        (log_ns, state) for _, log_ns, state in read_bag(path, ('exploration',), namespace) if state.exploration_id
+    )
+    begun: list[tuple[int, LabelledSlide | None]] = []
+    for name, group in groupby(reported, key=lambda one: one[1].exploration_id):
         logged, states = zip(*group, strict=True)
         surface = next((state.surface for state in reversed(states) if state.phase is Phase.SLIDE), None)
-        slide = Slide(path, name, surface, 0, logged[0], None, namespace, motion_made(states)) if surface else None
+        slide = (
+            LabelledSlide(path, name, surface, 0, logged[0], None, namespace, motion_made(states)) if surface else None
+        )
         begun.append((logged[0], slide))
     stops = [*(start_ns for start_ns, _ in begun[1:]), None][: len(begun)]  # a bag may have no exploration at all
     return [replace(slide, stop_ns=stop_ns) for (_, slide), stop_ns in zip(begun, stops, strict=True) if slide]
 
 
-def _number(slides: Sequence[Slide]) -> list[Slide]:
-    by_surface: defaultdict[str, list[Slide]] = defaultdict(list)
+def _number(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
+    by_surface: defaultdict[str, list[LabelledSlide]] = defaultdict(list)
     for slide in slides:
         by_surface[slide.surface].append(slide)
     numbers = {

@@ -1,4 +1,4 @@
-"""What recognition could do without: features, numbers, units and channels, by what each is worth and what it costs."""
+"""Ablation of features, parameters, units and channels: accuracy and computing time without each."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ import numpy as np
 from texture_benchmarks.recipes.run import (
     ALL_CHANNELS,
     DATA,
-    LAST_LEARNT,
-    QUICK_LAST_LEARNT,
+    LAST_TRAINED,
+    QUICK_LAST_TRAINED,
     RATE_HZ,
     VIBRATION,
     biotac20_settings,
 )
-from texture_benchmarks.recipes.trial import Recorded, comparable, describe_all, examples_of, latency_us
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.recipes.trial import SlideSignals, comparable, examples_of, extract_all, latency_us
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData
-from texture_estimation.classification.training import DEFAULT_GROWTH
-from texture_estimation.model import Model
+from texture_estimation.classification.training import DEFAULT_TEMPERING_EXPONENT
+from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.train import with_channels
@@ -37,18 +37,18 @@ ROUNDS = 3  # of timing; the quickest counts, as other work on the machine only 
 # Of `default`, on the vibration alone.
 VARIANTS: Mapping[str, Changes] = {
     SHIPPED: {},
-    'without typical_bands': {'typical_bands': None},
+    'without mean_log_bands': {'mean_log_bands': None},
     'without moments': {'moments': None},
-    'without power_echo (`fast`)': {'power_echo': None},
-    'typical_bands alone': {'moments': None, 'power_echo': None},
+    'without power_autocorrelation (`fast`)': {'power_autocorrelation': None},
+    'mean_log_bands alone': {'moments': None, 'power_autocorrelation': None},
     'log_bands too': {'log_bands': {}},
     'log_bands for moments': {'moments': None, 'log_bands': {}},
-    '16 bands': {'typical_bands': {'bands': 16}},
-    '24 bands': {'typical_bands': {'bands': 24}},
-    'segments overlap by 0.62': {'typical_bands': {'overlap': 0.625}},
-    'segments overlap by 0.5': {'typical_bands': {'overlap': 0.5}},
-    '10 lags': {'power_echo': {'lags': 10}},
-    '8 lags': {'power_echo': {'lags': 8}},
+    '16 bands': {'mean_log_bands': {'bands': 16}},
+    '24 bands': {'mean_log_bands': {'bands': 24}},
+    'segments overlap by 0.62': {'mean_log_bands': {'overlap': 0.625}},
+    'segments overlap by 0.5': {'mean_log_bands': {'overlap': 0.5}},
+    '10 lags': {'power_autocorrelation': {'lags': 10}},
+    '8 lags': {'power_autocorrelation': {'lags': 8}},
     '32 units': {'mlp': {'hidden': 32}},
     '64 units': {'mlp': {'hidden': 64}},
     '256 units': {'mlp': {'hidden': 256}},
@@ -57,13 +57,13 @@ HALVED = 'sampled at 500 Hz'
 # Of `vibration-and-taxels`: features left out, or channels of the slow input kept.
 SLOW_VARIANTS: Mapping[str, Changes] = {
     SHIPPED: {},
-    'without power_echo': {'power_echo': None},
-    'segments overlap by 0.62': {'typical_bands': {'overlap': 0.625}},
+    'without power_autocorrelation': {'power_autocorrelation': None},
+    'segments overlap by 0.62': {'mean_log_bands': {'overlap': 0.625}},
     'without log_variance': {'log_variance': None},
-    'without log_slope_variance': {'log_slope_variance': None},
-    'without level': {'level': None},
-    'vibration alone': {'log_variance': None, 'log_slope_variance': None, 'level': None},
-    'slow channels alone': {'typical_bands': None, 'moments': None, 'power_echo': None},
+    'without log_difference_variance': {'log_difference_variance': None},
+    'without level': {'mean': None},
+    'vibration alone': {'log_variance': None, 'log_difference_variance': None, 'mean': None},
+    'slow channels alone': {'mean_log_bands': None, 'moments': None, 'power_autocorrelation': None},
 }
 KEPT_CHANNELS: Mapping[str, tuple[str, ...]] = {
     'of the slow ones the electrodes': tuple(f'electrode{number}' for number in range(1, 20)),
@@ -79,15 +79,15 @@ class _Case:
     """One way to recognise."""
 
     recipe: Recipe
-    recorded: Sequence[Recorded]
+    slide_signals: Sequence[SlideSignals]
 
 
 @dataclass(frozen=True, eq=False)
-class _Tried:
+class _AblationResult:
     """What came of it: a model, the share of held-out windows that were right, and the windows of later slides."""
 
     case: _Case
-    model: Model
+    model: TextureModel
     held_out: float
     later: LabelledFeatures
 
@@ -97,45 +97,45 @@ class _Tried:
         return float(np.mean([own == label for own, label in zip(said, self.later.labels, strict=True)]))
 
 
-def run(bench: Bench) -> BenchResult:
-    """Leave out one thing after the other; judge by slides held out, look at the later ones once."""
-    settings = biotac20_settings(bench)
-    vibration, everything = settings[VIBRATION].recorded, settings[ALL_CHANNELS].recorded
+def run(options: BenchmarkOptions) -> BenchmarkResult:
+    """Leave out one thing after the other; evaluate by slides held out, look at the later ones once."""
+    settings = biotac20_settings(options)
+    vibration, everything = settings[VIBRATION].slide_signals, settings[ALL_CHANNELS].slide_signals
     numbers = {
-        VIBRATION: _figures(_vibration_cases(vibration), bench),
-        ALL_CHANNELS: _figures(_channel_cases(everything), bench),
+        VIBRATION: _figures(_vibration_cases(vibration), options),
+        ALL_CHANNELS: _figures(_channel_cases(everything), options),
     }
-    return BenchResult(
+    return BenchmarkResult(
         name='ablation',
         measured='share of single windows of 0.5 s recognised; median time from window to estimate (µs); count of '
         f'values. Of what is at most {100 * WITHIN:g} point below the best the quickest is `smallest`',
         data=DATA['biotac20'],
-        split=f'chosen by `held_out`: slides 1-{LAST_LEARNT} of each material, a third of them held out in turn, '
-        f'neighbours in time together; `later`, learnt from slides 1-{LAST_LEARNT} and tested on the later ones, '
+        split=f'chosen by `held_out`: slides 1-{LAST_TRAINED} of each material, a third of them held out in turn, '
+        f'neighbours in time together; `later`, trained on slides 1-{LAST_TRAINED} and tested on the later ones, '
         'is shown for what ships, the best and the smallest',
         numbers=numbers,
-        charts=(_chart(numbers, bench.out / 'ablation.png'),),
+        charts=(_chart(numbers, options.out / 'ablation.png'),),
     )
 
 
-def _vibration_cases(recorded: Sequence[Recorded]) -> dict[str, _Case]:
+def _vibration_cases(slide_signals: Sequence[SlideSignals]) -> dict[str, _Case]:
     recipe = with_channels(load_recipe('default'), 'fast')
-    cases = {name: _case(recipe, changes, RATE_HZ, recorded) for name, changes in VARIANTS.items()}
-    slower = [item.at_rate('signal', RATE_HZ / 2) for item in recorded]
+    cases = {name: _case(recipe, changes, RATE_HZ, slide_signals) for name, changes in VARIANTS.items()}
+    slower = [item.at_rate('signal', RATE_HZ / 2) for item in slide_signals]
     return {**cases, HALVED: _case(recipe, {}, RATE_HZ / 2, slower)}
 
 
-def _channel_cases(recorded: Sequence[Recorded]) -> dict[str, _Case]:
+def _channel_cases(slide_signals: Sequence[SlideSignals]) -> dict[str, _Case]:
     recipe = load_recipe('vibration-and-taxels')
-    rate_hz = recorded[0].signals['signal'][0].sampling_rate_hz
-    cases = {name: _case(recipe, changes, rate_hz, recorded) for name, changes in SLOW_VARIANTS.items()}
+    rate_hz = slide_signals[0].signals['signal'][0].sampling_rate_hz
+    cases = {name: _case(recipe, changes, rate_hz, slide_signals) for name, changes in SLOW_VARIANTS.items()}
     for name, channels in KEPT_CHANNELS.items():
-        cases[name] = _case(recipe, {}, rate_hz, [_with_slow_channels(item, channels) for item in recorded])
+        cases[name] = _case(recipe, {}, rate_hz, [_with_slow_channels(item, channels) for item in slide_signals])
     return cases
 
 
-def _case(recipe: Recipe, changes: Changes, rate_hz: float, recorded: Sequence[Recorded]) -> _Case:
-    return _Case(comparable(changed(recipe, changes), rate_hz, of_motion=False), recorded)
+def _case(recipe: Recipe, changes: Changes, rate_hz: float, slide_signals: Sequence[SlideSignals]) -> _Case:
+    return _Case(comparable(changed(recipe, changes), rate_hz, of_motion=False), slide_signals)
 
 
 def changed(recipe: Recipe, changes: Changes) -> Recipe:
@@ -164,16 +164,16 @@ def _by_name(section: Mapping[str, Any]) -> dict[str, Any]:
     return {name: parameters for feature in section['features'] for name, parameters in feature.items()}
 
 
-def _with_slow_channels(item: Recorded, channels: Sequence[str]) -> Recorded:
+def _with_slow_channels(item: SlideSignals, channels: Sequence[str]) -> SlideSignals:
     slow = item.signals['signal_static']
     places = [slow[0].channels.index(name) for name in channels]
     chosen = [replace(batch, channels=tuple(channels), samples=batch.samples[:, places]) for batch in slow]
     return replace(item, signals={**item.signals, 'signal_static': chosen})
 
 
-def _figures(cases: Mapping[str, _Case], bench: Bench) -> dict[str, Any]:
-    used = {name: case for name, case in cases.items() if name in QUICK or not bench.quick}
-    tried = {name: _try(case, bench.quick) for name, case in used.items()}
+def _figures(cases: Mapping[str, _Case], options: BenchmarkOptions) -> dict[str, Any]:
+    used = {name: case for name, case in cases.items() if name in QUICK or not options.quick}
+    tried = {name: _try(case, options.quick) for name, case in used.items()}
     times = [[_median_us(item) for item in tried.values()] for _ in range(ROUNDS)]
     latencies = dict(zip(tried, np.min(times, axis=0).tolist(), strict=True))
     best = max(tried, key=lambda name: tried[name].held_out)
@@ -195,31 +195,31 @@ def _figures(cases: Mapping[str, _Case], bench: Bench) -> dict[str, Any]:
     }
 
 
-def _try(case: _Case, quick: bool) -> _Tried:
-    last = QUICK_LAST_LEARNT if quick else LAST_LEARNT
-    described = describe_all(case.recipe, case.recorded)
-    learnt = examples_of({slide: own for slide, own in described.items() if slide.number <= last})
-    later = examples_of({slide: own for slide, own in described.items() if slide.number > last})
-    labels, codes = np.unique(learnt.labels, return_inverse=True)
-    groups = np.unique(learnt.groups, return_inverse=True)[1]
+def _try(case: _Case, quick: bool) -> _AblationResult:
+    last = QUICK_LAST_TRAINED if quick else LAST_TRAINED
+    extracted = extract_all(case.recipe, case.slide_signals)
+    training_features = examples_of({slide: own for slide, own in extracted.items() if slide.number <= last})
+    later = examples_of({slide: own for slide, own in extracted.items() if slide.number > last})
+    labels, codes = np.unique(training_features.labels, return_inverse=True)
+    groups = np.unique(training_features.groups, return_inverse=True)[1]
     learner = replace(case.recipe.learner, folds=QUICK_FOLDS if quick else FOLDS)
-    fitted = learner.fit(learnt.values, codes, groups)
-    model = Model(
+    fitted = learner.fit(training_features.values, codes, groups)
+    model = TextureModel(
         name=case.recipe.name,
         labels=tuple(labels.tolist()),
-        names=learnt.names,
-        feature_set=learnt.feature_set,
+        names=training_features.names,
+        feature_set=training_features.feature_set,
         recipe=case.recipe,
-        parts=fitted.parts,
-        growth=DEFAULT_GROWTH,
+        parameters=fitted.parameters,
+        tempering_exponent=DEFAULT_TEMPERING_EXPONENT,
     )
     if fitted.held_out is None:
-        raise InvalidData('slides to learn from are too short to hold any out; record longer ones')
-    return _Tried(case, model, float(np.mean(fitted.held_out.argmax(axis=1) == codes)), later)
+        raise InvalidData('slides for training are too short to hold any out; record longer ones')
+    return _AblationResult(case, model, float(np.mean(fitted.held_out.argmax(axis=1) == codes)), later)
 
 
-def _median_us(item: _Tried) -> float:
-    return latency_us(item.case.recipe, item.model, item.case.recorded)['median']
+def _median_us(item: _AblationResult) -> float:
+    return latency_us(item.case.recipe, item.model, item.case.slide_signals)['median']
 
 
 def _chart(numbers: Mapping[str, Any], path: Path) -> Path:
@@ -230,13 +230,13 @@ def _chart(numbers: Mapping[str, Any], path: Path) -> Path:
         )  # fmt: skip
         heights = [len(own['variants']) for own in numbers.values()]
         grid = figure.subplots(len(numbers), 2, sharey='row', squeeze=False, height_ratios=heights)
-        for (worth, cost), (name, own) in zip(grid, numbers.items(), strict=True):
+        for (term_effect, cost), (name, own) in zip(grid, numbers.items(), strict=True):
             variants = sorted(own['variants'].items(), key=lambda item: item[1]['held_out'])
             rows = np.arange(len(variants))
             colours = [COLOURS[5 if each in (own['smallest'], SHIPPED) else 0] for each, _ in variants]
-            worth.barh(rows, [figures['change_points'] for _, figures in variants], color=colours)
-            worth.set(yticks=rows, yticklabels=[each for each, _ in variants], title=name)
-            worth.set_xlabel('single windows recognised, against as shipped (points)')
+            term_effect.barh(rows, [figures['change_points'] for _, figures in variants], color=colours)
+            term_effect.set(yticks=rows, yticklabels=[each for each, _ in variants], title=name)
+            term_effect.set_xlabel('single windows recognised, against as shipped (points)')
             cost.barh(rows, [figures['latency_us'] for _, figures in variants], color=colours)
             cost.set_xlabel('time from window to estimate (µs)')
             cost.set_title(f'smallest within {100 * WITHIN:g} point of the best: {own["smallest"]}')

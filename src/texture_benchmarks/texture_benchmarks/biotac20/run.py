@@ -1,4 +1,4 @@
-"""How well 20 recorded materials are recognised from slides of a later time than those learnt from."""
+"""How well 20 recorded materials are recognised from slides of a later time than those trained on."""
 
 from __future__ import annotations
 
@@ -6,43 +6,43 @@ from pathlib import Path
 from typing import Any
 
 from texture_benchmarks.imported_data import imported
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import confusion_chart, evidence_chart
-from texture_evaluation.evaluate import Report, evaluate
+from texture_evaluation.evaluate import EvaluationReport, evaluate
 from texture_evaluation.metrics import curve
 from texture_evaluation.train import train_from_bags
 
 RECIPES = {'default': 'vibration alone', 'vibration-and-taxels': 'vibration, electrodes, pressure and temperature'}
-TAUGHT, TESTED = '1-30', '31-40'
+TRAINED, TESTED = '1-30', '31-40'
 QUICK_MATERIALS = ('material01', 'material02', 'material03')
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on the first 30 slides of each material, test on the last 10."""
-    with imported(bench, 'biotac20', materials=QUICK_MATERIALS if bench.quick else ()) as bags:
+    with imported(options, 'biotac20', materials=QUICK_MATERIALS if options.quick else ()) as bags:
         reports = {recipe: _report(recipe, bags) for recipe in RECIPES}
-    return BenchResult(
+    return BenchmarkResult(
         name='biotac20',
         measured='share of windows and slides recognised; confusion counts single windows',
         data=f'BioTac, {len(bags)} materials × 40 slides of 6 s (github dexrob/BioTac_slide_20_50, Gao et al. 2020)',
-        split=f'by slide and by time: trained on slides {TAUGHT} of each material, tested on {TESTED}',
+        split=f'by slide and by time: trained on slides {TRAINED} of each material, tested on {TESTED}',
         numbers={recipe: _numbers(recipe, report) for recipe, report in reports.items()},
-        charts=_charts(reports, bench.out),
+        charts=_charts(reports, options.out),
     )
 
 
-def _report(recipe: str, bags: list[Path]) -> Report:
-    return evaluate(train_from_bags(recipe, bags, TAUGHT), bags, TESTED)
+def _report(recipe: str, bags: list[Path]) -> EvaluationReport:
+    return evaluate(train_from_bags(recipe, bags, TRAINED), bags, TESTED)
 
 
-def _numbers(recipe: str, report: Report) -> dict[str, Any]:
+def _numbers(recipe: str, report: EvaluationReport) -> dict[str, Any]:
     return {'recipe': load_recipe(recipe).as_mapping(), **report.as_json()}
 
 
-def _charts(reports: dict[str, Report], out: Path) -> tuple[Path, ...]:
+def _charts(reports: dict[str, EvaluationReport], out: Path) -> tuple[Path, ...]:
     where = (
-        f'BioTac, {len(next(iter(reports.values())).labels)} materials, trained on slides {TAUGHT}, tested on {TESTED}'
+        f'BioTac, {len(next(iter(reports.values())).labels)} materials, trained on slides {TRAINED}, tested on {TESTED}'
     )
     lines = {f'{recipe}: {RECIPES[recipe]}': curve(report.known) for recipe, report in reports.items()}
     tables = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from texture_benchmarks.clock.trial import ClockErrors, simulate_clock_errors
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
 from texture_evaluation.charts import error_chart
 
@@ -16,10 +16,12 @@ SHOWN = 600  # points of a line
 TARGET_MS = 0.5
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Stamp simulated streams with 5 ms of arrival jitter and 50 ppm of drift."""
-    duration_s = QUICK_S if bench.quick else DURATION_S
-    trials = [simulate_clock_errors(np.random.default_rng(bench.seed + k), duration_s=duration_s) for k in range(SEEDS)]
+    duration_s = QUICK_S if options.quick else DURATION_S
+    trials = [
+        simulate_clock_errors(np.random.default_rng(options.seed + k), duration_s=duration_s) for k in range(SEEDS)
+    ]
     shown = trials[0]
     chart = error_chart(
         {
@@ -29,10 +31,10 @@ def run(bench: Bench) -> BenchResult:
         },
         'Error of the stamps: 5 ms of arrival jitter, 50 ppm of drift (simulated)',
         ('time since the stream began (s)', 'largest error (ms)'),
-        bench.out / 'clock.png',
+        options.out / 'clock.png',
         points=SHOWN,
     )
-    return BenchResult(
+    return BenchmarkResult(
         name='clock',
         measured=f'largest error of a stamp after {WARM_UP_S:g} s, ms; exponential arrival jitter of mean 5 ms, 50 ppm',
         data=f'{SEEDS} simulated streams of {duration_s:g} s, 1 kHz in batches of 10 ms',

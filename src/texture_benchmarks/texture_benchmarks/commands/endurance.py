@@ -1,4 +1,4 @@
-"""`texture endurance`: explore on the emulator for hours while faults strike at random."""
+"""`texture endurance`: explore on the emulated rig for hours under random fault injection."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from texture_benchmarks.endurance.report import write
-from texture_benchmarks.endurance.run import Plan, endure
-from texture_benchmarks.endurance.verdict import judge
+from texture_benchmarks.endurance.requirements import check_requirements
+from texture_benchmarks.endurance.run import EndurancePlan, endure
 from texture_core.command_options import add_seed
 from texture_core.errors import InvalidData
 
@@ -29,14 +29,14 @@ def run(options: argparse.Namespace) -> int:
         options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InvalidData(f"'{options.out}' cannot be used: {error.strerror}; name another with --out") from error
-    plan = Plan(options.duration, options.quiet, options.seed, options.model)
+    plan = EndurancePlan(options.duration, options.quiet, options.seed, options.model)
     record = endure(plan, options.out / 'nodes.log', _say)
-    verdicts = judge(record)
-    for verdict in verdicts:
-        _say(f'{"holds" if verdict.holds else "FAILS"}: {verdict.asked}: {verdict.seen}')
+    results = check_requirements(record)
+    for result in results:
+        _say(f'{"holds" if result.holds else "FAILS"}: {result.asked}: {result.seen}')
     for path in write(record, options.out):
         _say(f'  {path}')
-    return int(not all(verdict.holds for verdict in verdicts))
+    return int(not all(result.holds for result in results))
 
 
 def _say(line: str) -> None:

@@ -1,4 +1,4 @@
-"""When recorded slides are decided and how rightly, what the confidence is worth, and what is taken for unknown."""
+"""When recorded slides are decided and how rightly, what the confidence contributes, and what is taken for unknown."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.imported_data import imported
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.classification.training import train
-from texture_estimation.model import Model
-from texture_estimation.open_set.novelty import WORTHS, Familiarity
+from texture_estimation.model import TextureModel
+from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, NoveltyDetector
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import line_chart
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.metrics import SlideResult, decided_at
 from texture_features.labelled_features import LabelledFeatures
-from texture_recordings.dataset import describe
+from texture_recordings.dataset import extract_features
 
 RECIPES = ('default', 'vibration-and-taxels')
-TAUGHT, TESTED = '1-30', '31-40'
+TRAINED, TESTED = '1-30', '31-40'
 CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999)
 UNKNOWN, DRAWS = 5, 10
 REJECTED = (0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3)
-ASKED_REJECTED = 0.05
+TARGET_REJECTED = 0.05
 QUICK_MATERIALS = tuple(f'material{number:02d}' for number in range(1, 5))
-QUICK_SLIDES, QUICK_TAUGHT, QUICK_TESTED = '1-8,31-32', '1-8', '9-10'
+QUICK_SLIDES, QUICK_TRAINED, QUICK_TESTED = '1-8,31-32', '1-8', '9-10'
 TARGETS = {
     'default': {'early_accuracy': 0.97, 'early_mean_s': 1.2},
     'vibration-and-taxels': {'early_accuracy': 0.99, 'early_mean_s': 0.6},
@@ -43,88 +43,90 @@ class _Trial:
     """What came out of one recipe."""
 
     recipe: Recipe
-    model: Model
+    model: TextureModel
     results: Sequence[SlideResult]
     figures: dict[str, Any]
     draws: AnyArray  # (n_draws, n_rejected, 2): false rejections and unknown surfaces accepted
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on the first 30 slides of each material, decide about the last 10; leave materials out in several draws."""
-    slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if bench.quick else ('', ())
-    with imported(bench, 'biotac20', slides, materials) as bags:
-        trials = {name: _try(load_recipe(name), bags, bench) for name in RECIPES}
-    return BenchResult(
+    slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ('', ())
+    with imported(options, 'biotac20', slides, materials) as bags:
+        trials = {name: _try(load_recipe(name), bags, options) for name in RECIPES}
+    return BenchmarkResult(
         name='decisions',
         measured='share of slides decided rightly and mean sliding time when each ends as soon as it is certain; '
         'calibration error over all estimates; share of known and of unknown slides taken for unknown after 2.5 s',
         data=f'BioTac, {len(bags)} materials (github dexrob/BioTac_slide_20_50, Gao et al. 2020)',
-        split=f'by slide and by time: trained on slides {TAUGHT} of each material, tested on {TESTED}; for unknown '
-        f'ones {UNKNOWN} materials are left out of the training, in {DRAWS} draws. Rules are learnt on slides {TAUGHT}',
+        split=f'by slide and by time: trained on slides {TRAINED} of each material, tested on {TESTED}; for unknown '
+        f'ones {UNKNOWN} materials are held out, in {DRAWS} draws. Rules are fitted on slides {TRAINED}',
         numbers={'targets': TARGETS, **{name: _numbers(trial) for name, trial in trials.items()}},
-        charts=_charts(trials, bench.out),
+        charts=_charts(trials, options.out),
     )
 
 
-def _try(recipe: Recipe, bags: list[Path], bench: Bench) -> _Trial:
-    first, last = (QUICK_TAUGHT, QUICK_TESTED) if bench.quick else (TAUGHT, TESTED)
-    taught = describe(bags, replace(recipe.feature_set, windows=recipe.training_windows), first)
-    model = train(recipe, taught)
+def _try(recipe: Recipe, bags: list[Path], options: BenchmarkOptions) -> _Trial:
+    first, last = (QUICK_TRAINED, QUICK_TESTED) if options.quick else (TRAINED, TESTED)
+    trained = extract_features(bags, replace(recipe.feature_set, windows=recipe.training_windows), first)
+    model = train(recipe, trained)
     report = evaluate(model, bags, last)
-    tested = describe(bags, recipe.feature_set, last)
-    unknown, draws = (1, 2) if bench.quick else (UNKNOWN, DRAWS)
-    labels, rng = np.unique(taught.labels), np.random.default_rng(bench.seed)
+    tested = extract_features(bags, recipe.feature_set, last)
+    unknown, draws = (1, 2) if options.quick else (UNKNOWN, DRAWS)
+    labels, rng = np.unique(trained.labels), np.random.default_rng(options.seed)
     return _Trial(
         recipe,
         model,
         report.known,
         report.as_json(),
-        np.array([_rejected(taught, tested, rng.permutation(labels)[:unknown]) for _ in range(draws)]),
+        np.array([_rejected(trained, tested, rng.permutation(labels)[:unknown]) for _ in range(draws)]),
     )
 
 
-def _rejected(taught: LabelledFeatures, tested: LabelledFeatures, unknown: AnyArray) -> Array:
+def _rejected(trained: LabelledFeatures, tested: LabelledFeatures, unknown: AnyArray) -> Array:
     """Return false rejections and unknown surfaces accepted, (n_rejected, 2), at shares of false rejections allowed."""
-    kept = ~np.isin(taught.labels, unknown)
-    codes, groups = (np.unique(names[kept], return_inverse=True)[1] for names in (taught.labels, taught.groups))
-    overlap = taught.hop_s / taught.window_s
-    first = 1 + round((WORTHS[-1] - 1.0) * tested.window_s / tested.hop_s)
+    kept = ~np.isin(trained.labels, unknown)
+    codes, groups = (np.unique(names[kept], return_inverse=True)[1] for names in (trained.labels, trained.groups))
+    overlap = trained.hop_s / trained.window_s
+    first = 1 + round((EFFECTIVE_WINDOWS[-1] - 1.0) * tested.window_s / tested.hop_s)
     slides = [np.flatnonzero(tested.groups == group)[:first] for group in np.unique(tested.groups)]
-    strange = np.isin(tested.labels[[rows[0] for rows in slides]], unknown)
+    novel = np.isin(tested.labels[[rows[0] for rows in slides]], unknown)
     means = [tested.values[rows].mean(axis=0) for rows in slides]
     shares = []
     for allowed in REJECTED:
-        familiarity = Familiarity.learnt(taught.values[kept], codes, groups, overlap, allowed)
-        known = np.array([familiarity is None or familiarity.knows(mean, WORTHS[-1]) for mean in means])
-        shares.append((1.0 - known[~strange].mean(), known[strange].mean()))
+        novelty_detector = NoveltyDetector.fit(trained.values[kept], codes, groups, overlap, allowed)
+        known = np.array(
+            [novelty_detector is None or novelty_detector.is_known(mean, EFFECTIVE_WINDOWS[-1]) for mean in means]
+        )
+        shares.append((1.0 - known[~novel].mean(), known[novel].mean()))
     return np.array(shares)
 
 
 def _numbers(trial: _Trial) -> dict[str, Any]:
-    figures, stopping = trial.figures, trial.model.stopping
-    at = REJECTED.index(ASKED_REJECTED)
+    figures, stopping = trial.figures, trial.model.stopping_rule
+    at = REJECTED.index(TARGET_REJECTED)
     means = trial.draws.mean(axis=0)
     return {
         'early': figures['early'],
-        'rule': {'confidence': stopping.confidence, 'patience_s': stopping.patience * 0.5},
+        'rule': {'confidence': stopping.confidence, 'patience_s': stopping.max_windows * 0.5},
         'accuracy_at_s': figures['accuracy_at_s'],
         'calibration_error': figures['calibration_error'],
-        'candidates': {'asked_coverage': trial.model.sets.coverage, **figures['candidates']},
+        'candidates': {'asked_coverage': trial.model.prediction_sets.coverage, **figures['candidates']},
         'falsely_rejected_when_decided': figures['falsely_rejected'],
         'unknown': {
-            'allowed_false_rejections': ASKED_REJECTED,
+            'allowed_false_rejections': TARGET_REJECTED,
             'false_rejections': float(means[at, 0]),
             'accepted': float(means[at, 1]),
             'accepted_per_draw': trial.draws[:, at, 1].tolist(),
-            'accepted_at_false_rejections': float(np.interp(ASKED_REJECTED, *means.T)),
+            'accepted_at_false_rejections': float(np.interp(TARGET_REJECTED, *means.T)),
         },
     }
 
 
 def _charts(trials: dict[str, _Trial], out: Path) -> tuple[Path, ...]:
-    where = f'BioTac, trained on slides {TAUGHT}, tested on {TESTED}'
+    where = f'BioTac, trained on slides {TRAINED}, tested on {TESTED}'
     early = {f'{name}: ending at a confidence': _by_confidence(trial.results) for name, trial in trials.items()}
-    early |= {f'{name}: the rule learnt': _point(trial.figures['early']) for name, trial in trials.items()}
+    early |= {f'{name}: the fitted rule': _point(trial.figures['early']) for name, trial in trials.items()}
     return (
         line_chart(
             early,
@@ -162,8 +164,8 @@ def _point(early: dict[str, float]) -> tuple[Array, Array]:
 
 def _reliability(results: Sequence[SlideResult]) -> tuple[Array, Array]:
     """Return mean confidence and accuracy (%) in tenths of the confidence that hold 20 estimates or more."""
-    told = np.array([(e.confidence, e.label == r.surface) for r in results for e in r.estimates], dtype=np.float64)
-    bins = np.minimum((10.0 * told[:, 0]).astype(int), 9)
-    used = [told[bins == number] for number in range(10) if np.count_nonzero(bins == number) >= 20]
+    reported = np.array([(e.confidence, e.label == r.surface) for r in results for e in r.estimates], dtype=np.float64)
+    bins = np.minimum((10.0 * reported[:, 0]).astype(int), 9)
+    used = [reported[bins == number] for number in range(10) if np.count_nonzero(bins == number) >= 20]
     confidence, right = 100.0 * np.array([part.mean(axis=0) for part in used]).reshape(-1, 2).T
     return confidence, right

@@ -1,1 +1,1 @@
-"""Endurance: hours of explorations on the emulator while faults strike at random."""
+"""Endurance: hours of explorations on the emulator while faults is injected at random."""

@@ -1,4 +1,4 @@
-"""Which faults strike a running bench, when, and for how long."""
+"""Which faults are injected, when, and for how long."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Fault:
     action
         What is done: 'unplug', 'corrupt', 'freeze' or 'kill'.
     node
-        Whom it strikes.
+        Whom it is injected.
     weight
         How often, compared with the others.
     low_s, high_s
@@ -33,9 +33,9 @@ class Fault:
 
 # Kills are rare, so that nodes also live long enough to show whether their memory grows.
 FAULTS: Mapping[str, Fault] = {
-    'sensor unplugged': Fault('unplug', 'bench', 3.0, 0.3, 4.0),
-    'bytes corrupted': Fault('corrupt', 'bench', 3.0, 1.0, 5.0),
-    'bench frozen': Fault('freeze', 'bench', 2.0, 0.2, 3.0),
+    'sensor unplugged': Fault('unplug', 'emulator', 3.0, 0.3, 4.0),
+    'bytes corrupted': Fault('corrupt', 'emulator', 3.0, 1.0, 5.0),
+    'emulator frozen': Fault('freeze', 'emulator', 2.0, 0.2, 3.0),
     'explorer frozen': Fault('freeze', 'explorer', 2.0, 0.1, 3.0),
     'sensor killed': Fault('kill', 'sensor', 0.4),
     'feature_extractor killed': Fault('kill', 'feature_extractor', 0.4),
@@ -46,7 +46,7 @@ FLIPS = (1e-4, 2e-2)  # of a bit a byte: from a bad cable to a line on which har
 
 
 @dataclass(frozen=True)
-class Strike:
+class PlannedFault:
     """One fault: after so much quiet, for so long; `strength` is the probability of a flipped bit."""
 
     name: str
@@ -60,7 +60,7 @@ class Strike:
         return FAULTS[self.name]
 
 
-def strikes(rng: np.random.Generator, mean_quiet_s: float) -> Iterator[Strike]:
+def planned_faults(rng: np.random.Generator, mean_quiet_s: float) -> Iterator[PlannedFault]:
     """Yield faults without end; the quiet before each is exponentially distributed."""
     names = list(FAULTS)
     weights = np.array([fault.weight for fault in FAULTS.values()])
@@ -69,4 +69,4 @@ def strikes(rng: np.random.Generator, mean_quiet_s: float) -> Iterator[Strike]:
         name = names[int(rng.choice(len(names), p=weights / weights.sum()))]
         fault = FAULTS[name]
         hold_s = float(rng.uniform(fault.low_s, fault.high_s))
-        yield Strike(name, float(rng.exponential(mean_quiet_s)), hold_s, float(np.exp(rng.uniform(low, high))))
+        yield PlannedFault(name, float(rng.exponential(mean_quiet_s)), hold_s, float(np.exp(rng.uniform(low, high))))

@@ -14,20 +14,26 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.endurance.chart import draw
-from texture_benchmarks.endurance.record import Record
-from texture_benchmarks.endurance.verdict import Verdict, cpu_change, judge, lives, work_change
+from texture_benchmarks.endurance.endurance_record import EnduranceRecord
+from texture_benchmarks.endurance.requirements import (
+    RequirementResult,
+    check_requirements,
+    cpu_change,
+    lives,
+    work_change,
+)
 from texture_benchmarks.result import machine
 
 MIB = 2**20
 NUMBERS = re.compile(r'\d[\w.:-]*')
 
 
-def write(record: Record, out: Path) -> list[Path]:
+def write(record: EnduranceRecord, out: Path) -> list[Path]:
     """Write endurance.md, endurance.json, endurance-events.json and endurance.png into a folder; return them."""
-    verdicts = judge(record)
+    results = check_requirements(record)
     page = out / 'endurance.md'
-    page.write_text('\n'.join(as_page(record, verdicts)) + '\n', encoding='utf-8')
-    figures = _write_json(out / 'endurance.json', as_json(record, verdicts))
+    page.write_text('\n'.join(as_page(record, results)) + '\n', encoding='utf-8')
+    figures = _write_json(out / 'endurance.json', as_json(record, results))
     events = _write_json(out / 'endurance-events.json', events_as_json(record))
     return [page, figures, events, draw(record, out / 'endurance.png')]
 
@@ -37,18 +43,18 @@ def _write_json(path: Path, content: Any) -> Path:
     return path
 
 
-def as_json(record: Record, verdicts: Sequence[Verdict]) -> dict[str, Any]:
+def as_json(record: EnduranceRecord, results: Sequence[RequirementResult]) -> dict[str, Any]:
     """Return the figures."""
     return {
         'machine': machine(),
         'seed': record.seed,
         'duration_s': record.end_s - record.begin_s,
-        'verdicts': [asdict(verdict) for verdict in verdicts],
+        'verdicts': [asdict(result) for result in results],
         'endings': _endings(record),
         'messages': _messages(record),
         'recovery_s': {name: _spread(seconds) for name, seconds in _recoveries(record).items()},
         'memory': [
-            {**asdict(life), 'growth': life.growth, 'own_growth': life.own_growth} for life in lives(record.uses)
+            {**asdict(life), 'growth': life.growth, 'own_growth': life.own_growth} for life in lives(record.usages)
         ],
         'cpu_share_early_late': dict(cpu_change(record)),
         'fixed_work_s_early_late': work_change(record),
@@ -67,30 +73,30 @@ def as_json(record: Record, verdicts: Sequence[Verdict]) -> dict[str, Any]:
     }
 
 
-def events_as_json(record: Record) -> dict[str, Any]:
+def events_as_json(record: EnduranceRecord) -> dict[str, Any]:
     """Return each exploration, fault and look at a process; times are counted from the beginning of the run."""
     return {
         'explorations': [_since(record, asdict(item)) for item in record.explored],
-        'faults': [_since(record, asdict(item)) for item in record.struck],
-        'usage': [_since(record, asdict(item)) for item in record.uses],
-        'pace': [_since(record, asdict(item)) for item in record.paces],
+        'faults': [_since(record, asdict(item)) for item in record.fault_events],
+        'usage': [_since(record, asdict(item)) for item in record.usages],
+        'pace': [_since(record, asdict(item)) for item in record.machine_speeds],
     }
 
 
-def as_page(record: Record, verdicts: Sequence[Verdict]) -> list[str]:
+def as_page(record: EnduranceRecord, results: Sequence[RequirementResult]) -> list[str]:
     """Return the lines of the page."""
     minutes = (record.end_s - record.begin_s) / 60
     return [
         '# Endurance',
         '',
-        f'{minutes:.0f} minutes on the emulator, {len(record.explored)} explorations, {len(record.struck)} '
+        f'{minutes:.0f} minutes on the emulator, {len(record.explored)} explorations, {len(record.fault_events)} '
         f'faults; seed {record.seed}; {machine()}.',
         '',
-        *_table(('asked', 'seen', 'holds'), [(v.asked, v.seen, 'yes' if v.holds else '**no**') for v in verdicts]),
+        *_table(('asked', 'seen', 'holds'), [(v.asked, v.seen, 'yes' if v.holds else '**no**') for v in results]),
         '',
         '## Explorations',
         '',
-        *_table(('ended', 'while faults struck', 'without'), _endings_rows(record)),
+        *_table(('ended', 'while faults was injected', 'without'), _endings_rows(record)),
         '',
         *_table(('reason', 'times'), [(text, str(n)) for text, n in _messages(record).items()]),
         '',
@@ -124,7 +130,7 @@ def as_page(record: Record, verdicts: Sequence[Verdict]) -> list[str]:
                     f'{life.growth:+.2%}',
                     f'{life.own_growth:+.2%}',
                 )
-                for life in sorted(lives(record.uses), key=lambda life: (life.node, -life.age_s))
+                for life in sorted(lives(record.usages), key=lambda life: (life.node, -life.age_s))
             ],
         ),
         '',
@@ -159,7 +165,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     return ['| ' + ' | '.join(cell.replace('|', '/').replace('\n', ' ') for cell in line) + ' |' for line in lines]
 
 
-def _endings(record: Record) -> dict[str, dict[str, int]]:
+def _endings(record: EnduranceRecord) -> dict[str, dict[str, int]]:
     counts = Counter((item.ending, 'with a fault' if item.faults else 'without') for item in record.explored)
     found: dict[str, dict[str, int]] = {}
     for (ending, when), number in sorted(counts.items()):
@@ -167,23 +173,23 @@ def _endings(record: Record) -> dict[str, dict[str, int]]:
     return found
 
 
-def _endings_rows(record: Record) -> list[Sequence[str]]:
+def _endings_rows(record: EnduranceRecord) -> list[Sequence[str]]:
     return [
         (ending, str(row.get('with a fault', 0)), str(row.get('without', 0)))
         for ending, row in _endings(record).items()
     ]
 
 
-def _messages(record: Record) -> dict[str, int]:
+def _messages(record: EnduranceRecord) -> dict[str, int]:
     texts = Counter(
         f'{item.ending}: {NUMBERS.sub("…", item.message)}' for item in record.explored if item.ending != 'success'
     )
     return dict(texts.most_common())
 
 
-def _recoveries(record: Record) -> dict[str, list[float]]:
+def _recoveries(record: EnduranceRecord) -> dict[str, list[float]]:
     found: dict[str, list[float]] = {}
-    for item in record.struck:
+    for item in record.fault_events:
         if math.isfinite(item.recovery_s):
             found.setdefault(item.name, []).append(item.recovery_s)
     return found
@@ -193,7 +199,7 @@ def _spread(seconds: Sequence[float]) -> dict[str, float]:
     return {'times': len(seconds), 'median': float(np.median(seconds)), 'longest': max(seconds)}
 
 
-def _since(record: Record, row: dict[str, Any]) -> dict[str, Any]:
+def _since(record: EnduranceRecord, row: dict[str, Any]) -> dict[str, Any]:
     """Return a row with its times counted from the beginning; what is not known as None."""
     timed = {'begin_s', 'end_s', 'back_s', 'time_s'}
     moved = {name: round(value - record.begin_s, 3) if name in timed else value for name, value in row.items()}

@@ -12,7 +12,7 @@ KIB = 1024
 
 
 @dataclass(frozen=True)
-class Use:
+class ProcessUsage:
     """What a process used at a time.
 
     Parameters
@@ -41,7 +41,7 @@ class Use:
     files: int
 
 
-def read_use(node: str, pid: int, time_s: float) -> Use | None:
+def read_usage(node: str, pid: int, time_s: float) -> ProcessUsage | None:
     """Return what a process uses now; None if it has ended."""
     folder = Path('/proc') / str(pid)
     try:
@@ -54,7 +54,7 @@ def read_use(node: str, pid: int, time_s: float) -> Use | None:
     numbers = {name: int(value) for name, value in re.findall(r'^(\w+):\s+(\d+)', status, re.MULTILINE)}
     if 'VmRSS' not in numbers:  # it has ended, and nobody has asked how yet
         return None
-    return Use(
+    return ProcessUsage(
         time_s=time_s,
         node=node,
         pid=pid,

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_evaluation.charts import COLOURS, chart
 from texture_features.catalogue import FEATURES
-from texture_features.feature import Feature, Windows
+from texture_features.feature import Feature, WindowBatch
 
 RATE_HZ, SAMPLES = 1000.0, 500
 SLOW_HZ, SLOW_SAMPLES, TAXELS = 60.0, 30, 28
@@ -21,19 +21,19 @@ ALONE, QUICK_ALONE = 200, 5  # calls a round
 SHORT_S = 1e-6  # a time below this is that of the clock itself
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Time every feature of the catalogue with its default parameters."""
-    rng = np.random.default_rng(bench.seed)
-    batch, alone, rounds = (QUICK_BATCH, QUICK_ALONE, QUICK_ROUNDS) if bench.quick else (BATCH, ALONE, ROUNDS)
+    rng = np.random.default_rng(options.seed)
+    batch, alone, rounds = (QUICK_BATCH, QUICK_ALONE, QUICK_ROUNDS) if options.quick else (BATCH, ALONE, ROUNDS)
     costs = {name: _cost(kind(), rng, batch, alone, rounds) for name, kind in FEATURES.items()}
-    return BenchResult(
+    return BenchmarkResult(
         name='features',
         measured=f'µs per window, median of {rounds} rounds: one window a call, and {batch} windows a call',
         data=f'noise: windows of {SAMPLES} samples of one channel at {RATE_HZ:g} Hz; for `correlation` joined with '
         f'{SLOW_SAMPLES} samples of {TAXELS} taxels',
         split='none: nothing is trained',
         numbers={name: {'alone_us': alone_us, 'batch_us': batch_us} for name, (alone_us, batch_us) in costs.items()},
-        charts=(_chart(costs, bench.out / 'features.png'),),
+        charts=(_chart(costs, options.out / 'features.png'),),
     )
 
 
@@ -41,10 +41,10 @@ def _cost(feature: Feature, rng: np.random.Generator, batch: int, alone: int, ro
     """Return the µs per window alone and in a batch."""
     fast, slow = rng.normal(size=(batch, SAMPLES, 1)), rng.normal(size=(batch, SLOW_SAMPLES, TAXELS))
 
-    def windows(which: int | slice) -> Windows:
+    def windows(which: int | slice) -> WindowBatch:
         some = fast[which]
         motion = np.full(some.shape[:-2], 0.1), np.full(some.shape[:-2], 2.0)
-        return Windows(some, RATE_HZ, *motion, joined=(Windows(slow[which], SLOW_HZ),))
+        return WindowBatch(some, RATE_HZ, *motion, joined=(WindowBatch(slow[which], SLOW_HZ),))
 
     feature(windows(0))  # tables that are made once
     one = _median_s(lambda: [feature(windows(k % batch)) for k in range(alone)], rounds) / alone

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from itertools import product
 from pathlib import Path
 
-from texture_benchmarks.frontier.training_costs import Cost, Size
+from texture_benchmarks.frontier.training_costs import Cost, TrainingSize
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 
-AXES = {'windows': 'windows learnt from', 'labels': 'surfaces'}
+AXES = {'windows': 'training windows', 'labels': 'surfaces'}
 COSTS = {'seconds': 'computing time of a training (s)', 'mebibytes': 'memory beyond the examples (MiB)'}
 MIN_MIB = 0.1  # nothing measurable
 
@@ -31,7 +31,7 @@ def early_chart(
         axes = figure.subplots()
         for (name, (seconds, shares)), colour in zip(lines.items(), COLOURS, strict=False):
             axes.plot(seconds, 100.0 * shares, marker='.', color=colour, label=name)
-        axes.plot(rule[0], 100.0 * rule[1], '*', color='black', markersize=12, label='the rule learnt, every 0.1 s')
+        axes.plot(rule[0], 100.0 * rule[1], '*', color='black', markersize=12, label='the fitted rule, every 0.1 s')
         axes.set(xlabel='mean sliding time (s)', ylabel='slides decided rightly (%)', title=title)
         axes.set_xlim(left=0)
         axes.legend(loc='lower right')
@@ -39,7 +39,7 @@ def early_chart(
 
 
 def size_chart(
-    panels: Mapping[str, Mapping[str, Mapping[Size, Cost]]], fixed: Mapping[str, str], path: str | Path
+    panels: Mapping[str, Mapping[str, Mapping[TrainingSize, Cost]]], fixed: Mapping[str, str], path: str | Path
 ) -> Path:
     """Draw time and memory of trainings over their size, a line for each learner.
 

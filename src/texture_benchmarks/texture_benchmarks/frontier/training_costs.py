@@ -15,14 +15,14 @@ from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
 
 N_FEATURES = 68  # those of the default recipe
-WINDOWS_OF_A_SLIDE = 5
+WINDOWS_PER_SLIDE = 5
 # Distance of the classes from each other in every feature, in standard deviations within one.
 SPREAD = 0.5
 KIB = 1024.0
 
 
 @dataclass(frozen=True)
-class Size:
+class TrainingSize:
     """Of a training: how many windows, and of how many surfaces."""
 
     windows: int
@@ -37,10 +37,10 @@ class Cost:
     mebibytes: float
 
 
-def costs(learner: str, sizes: Sequence[Size], limit_s: float, seed: int) -> Mapping[Size, Cost]:
+def costs(learner: str, sizes: Sequence[TrainingSize], limit_s: float, seed: int) -> Mapping[TrainingSize, Cost]:
     """Return the costs of rising sizes, up to the first that would take longer than the limit, in proportion."""
-    found: dict[Size, Cost] = {}
-    before: Size | None = None
+    found: dict[TrainingSize, Cost] = {}
+    before: TrainingSize | None = None
     for size in sizes:
         if before is not None and found[before].seconds * size.windows / before.windows > limit_s:
             break
@@ -49,7 +49,7 @@ def costs(learner: str, sizes: Sequence[Size], limit_s: float, seed: int) -> Map
     return found
 
 
-def cost(learner: Learner, size: Size, seed: int) -> Cost:
+def cost(learner: Learner, size: TrainingSize, seed: int) -> Cost:
     """Return what one training on made-up examples costs."""
     context = multiprocessing.get_context('fork')
     here, there = context.Pipe()
@@ -63,10 +63,10 @@ def cost(learner: Learner, size: Size, seed: int) -> Cost:
     return result
 
 
-def _measure(learner: Learner, size: Size, seed: int, answer: Connection) -> None:
+def _measure(learner: Learner, size: TrainingSize, seed: int, answer: Connection) -> None:
     rng = np.random.default_rng(seed)
     codes = np.arange(size.windows) % size.labels
-    groups = codes + size.labels * (np.arange(size.windows) // (size.labels * WINDOWS_OF_A_SLIDE))
+    groups = codes + size.labels * (np.arange(size.windows) // (size.labels * WINDOWS_PER_SLIDE))
     centres = SPREAD * rng.standard_normal((size.labels, N_FEATURES))
     values = centres[codes] + rng.standard_normal((size.windows, N_FEATURES))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
 from texture_evaluation.charts import histogram_chart
-from texture_evaluation.evaluate import judge
+from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
 from texture_recordings.dataset import cut_slides
 from texture_recordings.slides import find_slides
@@ -21,7 +21,7 @@ from texture_simulation.scene import load_scene
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 if TYPE_CHECKING:
-    from texture_benchmarks.ros.live_latency import Live
+    from texture_benchmarks.ros.live_latency import LiveLatency
 
 RECIPES = ('default', 'vibration-and-taxels')
 CLASSES = 10
@@ -31,23 +31,23 @@ LIVE_S, QUICK_LIVE_S = 40.0, 3.0
 TARGETS = {'in_process_median_us': 150.0, 'in_process_p99_us': 400.0, 'dds_p99_ms': 5.0, 'cpu_percent': 60.0}
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on simulated slides over ten surfaces, then time windows in one process and through the graph."""
     from texture_benchmarks.ros.live_latency import driver_cpu  # noqa: PLC0415  # ROS is needed for this alone
 
-    plan = QUICK_PLAN if bench.quick else PLAN
+    plan = QUICK_PLAN if options.quick else PLAN
     with tempfile.TemporaryDirectory() as folder:
         surfaces = tuple(load_scene('twelve_textures').surfaces)[:CLASSES]
-        bags = write_simulated(Path(folder) / 'bags', plan, np.random.default_rng(bench.seed), surfaces=surfaces)
-        timings = {recipe: _time(recipe, bags, plan.slides, Path(folder), bench) for recipe in RECIPES}
+        bags = write_simulated(Path(folder) / 'bags', plan, np.random.default_rng(options.seed), surfaces=surfaces)
+        timings = {recipe: _time(recipe, bags, plan.slides, Path(folder), options) for recipe in RECIPES}
     driver = driver_cpu()
     chart = histogram_chart(
         {f'{name}, {recipe}': values for recipe, timing in timings.items() for name, values in timing.charted.items()},
         'From the last sample of a window to the estimate (simulated slides)',
         'time (ms)',
-        bench.out / 'latency.png',
+        options.out / 'latency.png',
     )
-    return BenchResult(
+    return BenchmarkResult(
         name='latency',
         measured=(
             f'windows of 0.5 s at 1 kHz every 0.1 s, {CLASSES} surfaces. In one process: from window to estimate, '
@@ -71,7 +71,7 @@ class _Timing:
     """Times of one recipe."""
 
     alone_us: Array
-    live: Live
+    live: LiveLatency
 
     @property
     def charted(self) -> Mapping[str, Array]:
@@ -88,13 +88,13 @@ class _Timing:
         }
 
 
-def _time(recipe: str, bags: list[Path], slides: int, folder: Path, bench: Bench) -> _Timing:
+def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: BenchmarkOptions) -> _Timing:
     from texture_benchmarks.ros.live_latency import measure  # noqa: PLC0415
 
     model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
-    cut = [list(pieces) for _, pieces in cut_slides(find_slides(bags, str(slides)), model.recipe.feature_set)]
+    cut = [list(events) for _, events in cut_slides(find_slides(bags, str(slides)), model.recipe.feature_set)]
     # The last of each is the end of the slide, which is no window; the first pass warms up.
-    passes = [[judge(model, pieces)[2][:-1] for pieces in cut] for _ in range(1 + PASSES)]
+    passes = [[run_model(model, events)[2][:-1] for events in cut] for _ in range(1 + PASSES)]
     alone_us = np.concatenate([taken for one in passes[1:] for taken in one])
-    live = measure(folder / f'{recipe}.skops', bench.seed, QUICK_LIVE_S if bench.quick else LIVE_S)
+    live = measure(folder / f'{recipe}.skops', options.seed, QUICK_LIVE_S if options.quick else LIVE_S)
     return _Timing(alone_us, live)

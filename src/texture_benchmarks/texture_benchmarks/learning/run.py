@@ -1,4 +1,4 @@
-"""A model taught more textures slide by slide against one trained anew on the same slides, on recorded slides."""
+"""A model trained more textures slide by slide against one trained anew on the same slides, on recorded slides."""
 
 from __future__ import annotations
 
@@ -11,47 +11,53 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.imported_data import imported
-from texture_benchmarks.learning.trial import Course, Score, try_course
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.learning.trial import IncrementalRun, Score, run_incremental
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import line_chart
-from texture_recordings.dataset import describe
+from texture_recordings.dataset import extract_features
 
 RECIPE = 'default'
-TAUGHT, STAGES, NEW, DRAWS = 30, (1, 2, 5, 10, 30), 5, 3
-QUICK_SLIDES, QUICK_TAUGHT, QUICK_STAGES = '1-3,31-32', 3, (1, 2)
+TRAINED, STAGES, NEW, DRAWS = 30, (1, 2, 5, 10, 30), 5, 3
+QUICK_SLIDES, QUICK_TRAINED, QUICK_STAGES = '1-3,31-32', 3, (1, 2)
 QUICK_MATERIALS = ('material01', 'material02', 'material03', 'material04')
 FOLDS = 2  # for the calibration alone: less to wait for
-TARGETS = {'lesson_ms': 50.0, 'behind_training_points': 3.0}
+TARGETS = {'add_ms': 50.0, 'behind_training_points': 3.0}
 
 
-def run(bench: Bench) -> BenchResult:
-    """Train on 15 materials, teach 5 more, test on later slides of all; several draws of the five."""
+def run(options: BenchmarkOptions) -> BenchmarkResult:
+    """Train on 15 materials, add 5 more, test on later slides of all; several draws of the five."""
     recipe = _recipe()
-    stages, taught = (QUICK_STAGES, QUICK_TAUGHT) if bench.quick else (STAGES, TAUGHT)
-    slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if bench.quick else ('', ())
-    with imported(bench, 'biotac20', slides, materials) as bags, tempfile.TemporaryDirectory() as folder:
-        examples = describe(bags, replace(recipe.feature_set, windows=recipe.training_windows))
-        labels, rng = np.unique(examples.labels), np.random.default_rng(bench.seed)
-        draws = [rng.permutation(labels)[: 1 if bench.quick else NEW] for _ in range(1 if bench.quick else DRAWS)]
-        courses = [
-            try_course(
-                recipe, examples, draw.tolist(), taught=taught, stages=stages, path=Path(folder) / f'draw{number}'
+    stages, last_training = (QUICK_STAGES, QUICK_TRAINED) if options.quick else (STAGES, TRAINED)
+    slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ('', ())
+    with imported(options, 'biotac20', slides, materials) as bags, tempfile.TemporaryDirectory() as folder:
+        examples = extract_features(bags, replace(recipe.feature_set, windows=recipe.training_windows))
+        labels, rng = np.unique(examples.labels), np.random.default_rng(options.seed)
+        draws = [rng.permutation(labels)[: 1 if options.quick else NEW] for _ in range(1 if options.quick else DRAWS)]
+        incremental_runs = [
+            run_incremental(
+                recipe,
+                examples,
+                draw.tolist(),
+                last_training=last_training,
+                stages=stages,
+                path=Path(folder) / f'draw{number}',
             )
             for number, draw in enumerate(draws)
         ]
-    return BenchResult(
+    return BenchmarkResult(
         name='learning',
         measured='share of test windows and whole test slides (summed log-probabilities) that are right, mean over the '
-        'draws; time of a lesson with its writing to disk, by the clock of the processor; time to judge a window',
+        'draws; processor time of adding a slide, stored on disk; time to classify a window',
         data=f'BioTac vibration, {len(labels)} materials (github dexrob/BioTac_slide_20_50, Gao et al. 2020), recipe '
         f'{RECIPE} calibrated in {FOLDS} parts',
-        split=f'{len(courses)} draws of {len(draws[0])} new materials: trained on slides 1-{taught} of the others, '
-        f'taught slide by slide from slide 1 on, tested on the slides after {taught} of all',
-        numbers=_numbers(courses, draws, stages),
-        charts=(_chart(courses, stages, len(draws[0]), bench.out / 'learning.png'),),
+        split=f'{len(incremental_runs)} draws of {len(draws[0])} new materials: trained on slides '
+        f'1-{last_training} of the others, '
+        f'trained slide by slide from slide 1 on, tested on the slides after {last_training} of all',
+        numbers=_numbers(incremental_runs, draws, stages),
+        charts=(_chart(incremental_runs, stages, len(draws[0]), options.out / 'learning.png'),),
     )
 
 
@@ -61,36 +67,44 @@ def _recipe() -> Recipe:
     return replace(recipe, learner=replace(learner, folds=FOLDS)) if isinstance(learner, Mlp) else recipe
 
 
-def _numbers(courses: Sequence[Course], draws: Sequence[Any], stages: Sequence[int]) -> Mapping[str, Any]:
-    lesson_ms = 1000 * np.concatenate([course.lesson_s for course in courses])
+def _numbers(
+    incremental_runs: Sequence[IncrementalRun], draws: Sequence[Any], stages: Sequence[int]
+) -> Mapping[str, Any]:
+    added_slide_ms = 1000 * np.concatenate([incremental_run.add_s for incremental_run in incremental_runs])
     gaps = [
-        100 * (course.trained[stage].windows - course.taught[stage].windows) for course in courses for stage in stages
+        100 * (incremental_run.retrained[stage].windows - incremental_run.incremental[stage].windows)
+        for incremental_run in incremental_runs
+        for stage in stages
     ]
     return {
         'targets': TARGETS,
         'new': [sorted(draw.tolist()) for draw in draws],
         'slides': {
             str(stage): {
-                'taught': _mean([course.taught[stage] for course in courses]),
-                'trained': _mean([course.trained[stage] for course in courses]),
-                'taught, new textures': _mean([course.new[stage] for course in courses]),
-                'taught, old textures': _mean([course.old[stage] for course in courses]),
+                'incremental': _mean([incremental_run.incremental[stage] for incremental_run in incremental_runs]),
+                'retrained': _mean([incremental_run.retrained[stage] for incremental_run in incremental_runs]),
+                'trained, new textures': _mean([incremental_run.new[stage] for incremental_run in incremental_runs]),
+                'trained, old textures': _mean([incremental_run.old[stage] for incremental_run in incremental_runs]),
             }
             for stage in stages
         },
-        'old textures before any lesson': _mean([course.before for course in courses]),
+        'old textures before any added slide': _mean([incremental_run.before for incremental_run in incremental_runs]),
         'behind_training_points': {
             'most, windows': round(max(gaps), 1),
             'mean, windows': round(float(np.mean(gaps)), 1),
         },
-        'lesson_ms': {
-            'lessons': len(lesson_ms),
-            'median': round(float(np.median(lesson_ms)), 1),
-            '95 %': round(float(np.percentile(lesson_ms, 95)), 1),
-            'longest': round(float(lesson_ms.max()), 1),
+        'add_ms': {
+            'added_slides': len(added_slide_ms),
+            'median': round(float(np.median(added_slide_ms)), 1),
+            '95 %': round(float(np.percentile(added_slide_ms, 95)), 1),
+            'longest': round(float(added_slide_ms.max()), 1),
         },
-        'judge_us': dict(
-            zip(('trained', 'taught'), np.median([course.judge_us for course in courses], axis=0).round(1), strict=True)
+        'predict_us': dict(
+            zip(
+                ('retrained', 'incremental'),
+                np.median([incremental_run.predict_us for incremental_run in incremental_runs], axis=0).round(1),
+                strict=True,
+            )
         ),
     }
 
@@ -102,18 +116,24 @@ def _mean(scores: Sequence[Score]) -> Mapping[str, float]:
     }
 
 
-def _chart(courses: Sequence[Course], stages: Sequence[int], new: int, path: Path) -> Path:
+def _chart(incremental_runs: Sequence[IncrementalRun], stages: Sequence[int], new: int, path: Path) -> Path:
     x = np.array(stages, dtype=float)
 
     def percent(field: str, what: str) -> Array:
-        shares = [[getattr(getattr(course, field)[stage], what) for course in courses] for stage in stages]
+        shares = [
+            [getattr(getattr(incremental_run, field)[stage], what) for incremental_run in incremental_runs]
+            for stage in stages
+        ]
         shown: Array = 100 * np.mean(shares, axis=1)
         return shown
 
     lines = {
         f'{how}: {what}': (x, percent(field, what))
         for what in ('slides', 'windows')
-        for how, field in (('taught one slide at a time', 'taught'), ('trained anew on the same slides', 'trained'))
+        for how, field in (
+            ('trained one slide at a time', 'incremental'),
+            ('trained anew on the same slides', 'retrained'),
+        )
     }
     return line_chart(
         lines,

@@ -1,4 +1,4 @@
-"""Teach a trained model more textures slide by slide, and train another on the very same slides, for comparison."""
+"""Incremental training slide by slide, compared with training from scratch on the same slides."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from texture_core.arrays import Array
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
 from texture_estimation.classification.training import train
-from texture_estimation.incremental.incremental_classifier import Pupil
-from texture_estimation.model import Model
+from texture_estimation.incremental.incremental_classifier import IncrementalClassifier
+from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_features.labelled_features import LabelledFeatures
 
@@ -31,60 +31,70 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
-    """What came of teaching: scores by the number of slides of each new texture, and the time of each lesson.
+class IncrementalRun:
+    """Result of incremental training: scores by the number of slides of each new texture, and times.
 
     `before` and `old` are the scores on the old textures alone: without the new ones, and after each stage.
     """
 
-    taught: dict[int, Score]
-    trained: dict[int, Score]
+    incremental: dict[int, Score]
+    retrained: dict[int, Score]
     new: dict[int, Score]
     old: dict[int, Score]
     before: Score
-    lesson_s: Array
-    judge_us: tuple[float, float]
+    add_s: Array
+    predict_us: tuple[float, float]
 
 
-def try_course(
-    recipe: Recipe, examples: LabelledFeatures, new: Sequence[str], *, taught: int, stages: Sequence[int], path: Path
-) -> Course:
-    """Return how a model does that knows all labels but `new` and is taught these slide by slide.
+def run_incremental(
+    recipe: Recipe,
+    examples: LabelledFeatures,
+    new: Sequence[str],
+    *,
+    last_training: int,
+    stages: Sequence[int],
+    path: Path,
+) -> IncrementalRun:
+    """Return how a model does that knows all labels but `new` and is trained these slide by slide.
 
     Parameters
     ----------
     recipe
         Of all models.
     examples
-        Slides 'label/NUMBER' of all labels: those up to `taught` are learnt from, the others tested.
+        Slides 'label/NUMBER' of all labels: those up to `last_training` are used for training, the others tested.
     stages
         Numbers of slides of each new label after which is tested, rising.
     path
-        Where the model is saved, and its lessons with it.
+        Where the model is saved, and its added slides with it.
     """
     numbers = np.array([int(group.rsplit('/', 1)[1].removeprefix('slide')) for group in examples.groups])
     is_new = np.isin(examples.labels, list(new))
-    test, learnt = numbers > taught, numbers <= taught
-    base = train(recipe, _some(examples, learnt & ~is_new))
+    test, training = numbers > last_training, numbers <= last_training
+    base = train(recipe, _some(examples, training & ~is_new))
     base.save(path)
-    pupil, lesson_s = Pupil(base, path), []
-    course = Course({}, {}, {}, {}, _score(base, _some(examples, test & ~is_new)), np.empty(0), (0.0, 0.0))
+    incremental_classifier, add_s = IncrementalClassifier(base, path), []
+    incremental_run = IncrementalRun(
+        {}, {}, {}, {}, _score(base, _some(examples, test & ~is_new)), np.empty(0), (0.0, 0.0)
+    )
     for stage, before in zip(stages, (0, *stages), strict=False):
         for number in range(before + 1, stage + 1):
             for label in new:
                 rows = np.flatnonzero((numbers == number) & (examples.labels == label))
-                lesson_s.append(_teach(pupil, examples, rows))
-        trained = train(recipe, _some(examples, learnt & (~is_new | (numbers <= stage))))
+                add_s.append(_teach(incremental_classifier, examples, rows))
+        retrained = train(recipe, _some(examples, training & (~is_new | (numbers <= stage))))
         for scores, model, which in (
-            (course.taught, pupil.model, test),
-            (course.trained, trained, test),
-            (course.new, pupil.model, test & is_new),
-            (course.old, pupil.model, test & ~is_new),
+            (incremental_run.incremental, incremental_classifier.model, test),
+            (incremental_run.retrained, retrained, test),
+            (incremental_run.new, incremental_classifier.model, test & is_new),
+            (incremental_run.old, incremental_classifier.model, test & ~is_new),
         ):
             scores[stage] = _score(model, _some(examples, which))
     window = examples.values[0]
     return replace(
-        course, lesson_s=np.array(lesson_s), judge_us=(_judge_us(base, window), _judge_us(pupil.model, window))
+        incremental_run,
+        add_s=np.array(add_s),
+        predict_us=(_predict_us(base, window), _predict_us(incremental_classifier.model, window)),
     )
 
 
@@ -92,24 +102,24 @@ def _some(examples: LabelledFeatures, rows: Mask) -> LabelledFeatures:
     return replace(examples, values=examples.values[rows], labels=examples.labels[rows], groups=examples.groups[rows])
 
 
-def _teach(pupil: Pupil, examples: LabelledFeatures, rows: NDArray[np.intp]) -> float:
-    """Teach one slide, and return how long it took by the clock of the processor, which other work hardly lengthens."""
+def _teach(incremental_classifier: IncrementalClassifier, examples: LabelledFeatures, rows: NDArray[np.intp]) -> float:
+    """Add one slide, and return the processor time that it took, s."""
     name = str(examples.groups[rows[0]])
     for place, row in enumerate(rows):
         start_ns = round(place * examples.hop_s * NANOSECONDS)
         values = examples.values[row]
-        pupil.remember(
+        incremental_classifier.observe(
             FeatureVector(
                 start_ns, name, examples.window_s, examples.hop_s, examples.names, values,
                 feature_set=examples.feature_set,
             )
         )  # fmt: skip
     began = time.process_time()
-    pupil.learn(str(examples.labels[rows[0]]), name)
+    incremental_classifier.add(str(examples.labels[rows[0]]), name)
     return time.process_time() - began
 
 
-def _score(model: Model, examples: LabelledFeatures) -> Score:
+def _score(model: TextureModel, examples: LabelledFeatures) -> Score:
     log_probabilities = model.predict_log_proba(examples.values)
     truth = np.array([model.labels.index(label) for label in examples.labels])
     slides, first, inverse = np.unique(examples.groups, return_index=True, return_inverse=True)
@@ -120,11 +130,11 @@ def _score(model: Model, examples: LabelledFeatures) -> Score:
     )
 
 
-def _judge_us(model: Model, window: Array, repeats: int = 200) -> float:
-    """Return the median time of judging one window, µs."""
+def _predict_us(model: TextureModel, window: Array, repeats: int = 200) -> float:
+    """Return the median time of classifying one window, µs."""
     times = []
     for _ in range(repeats):
         began = time.perf_counter()
-        model.judge(window)
+        model.predictor(window)
         times.append(time.perf_counter() - began)
     return 1e6 * float(np.median(times))

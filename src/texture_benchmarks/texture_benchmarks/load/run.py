@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from texture_benchmarks.load.rig import Rig, fast_daq
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_evaluation.charts import line_chart
 
 if TYPE_CHECKING:
-    from texture_benchmarks.ros.sensor_load import Load
+    from texture_benchmarks.ros.sensor_load import SensorLoad
 
 ALONE = ('tsf85', 'tsf85_pair', 'biotac', 'daq', 'pvdf')
 TOGETHER = ('tsf85', 'biotac', 'daq', 'pvdf')
@@ -26,13 +26,13 @@ QUICK_S, ALONE_S, RATE_S = 2.0, 30.0, 10.0
 TARGETS = {'daq_lost': 0, 'daq_cpu_percent': 12.0, 'tsf85_cpu_percent': 12.0}
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Run each sensor's node alone, four at once, and one at ever higher rates."""
-    seconds = QUICK_S if bench.quick else max(QUICK_S, bench.duration_s)
+    seconds = QUICK_S if options.quick else max(QUICK_S, options.duration_s)
     alone_s, rate_s = min(seconds, ALONE_S), min(seconds, RATE_S)
-    alone = {name: _loads([name], alone_s)[name] for name in (('daq',) if bench.quick else ALONE)}
+    alone = {name: _loads([name], alone_s)[name] for name in (('daq',) if options.quick else ALONE)}
     together = _loads(TOGETHER, seconds)
-    rates = [_fast(factor, rate_s) for factor in (QUICK_FACTORS if bench.quick else FACTORS)]
+    rates = [_fast(factor, rate_s) for factor in (QUICK_FACTORS if options.quick else FACTORS)]
     kilohertz = np.array([wanted_hz for wanted_hz, _ in rates]) / 1000
     chart = line_chart(
         {
@@ -41,9 +41,9 @@ def run(bench: Bench) -> BenchResult:
         },
         'Sensor node with 8 channels at ever higher rates (emulated DAQ finger)',
         ('samples of each channel a second (kHz)', '%'),
-        bench.out / 'sensors-load.png',
+        options.out / 'sensors-load.png',
     )
-    return BenchResult(
+    return BenchmarkResult(
         name='sensors-load',
         measured=(
             f'the node `sensor` as a process of its own: each alone for {alone_s:g} s, four together for {seconds:g} '
@@ -64,16 +64,16 @@ def run(bench: Bench) -> BenchResult:
     )
 
 
-def _loads(names: tuple[str, ...] | list[str], seconds: float) -> Mapping[str, Load]:
+def _loads(names: tuple[str, ...] | list[str], seconds: float) -> Mapping[str, SensorLoad]:
     from texture_benchmarks.ros.sensor_load import measure  # noqa: PLC0415  # ROS is needed for this alone
 
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
         rigs = {name: stack.enter_context(Rig(name, Path(folder) / name)) for name in names}
-        loads: Mapping[str, Load] = measure(rigs, {name: name for name in names}, seconds)
+        loads: Mapping[str, SensorLoad] = measure(rigs, {name: name for name in names}, seconds)
         return loads
 
 
-def _fast(factor: float, seconds: float) -> tuple[float, Load]:
+def _fast(factor: float, seconds: float) -> tuple[float, SensorLoad]:
     """Return the rate and the load of a DAQ finger of another rate."""
     from texture_benchmarks.ros.sensor_load import measure  # noqa: PLC0415
 
@@ -81,14 +81,14 @@ def _fast(factor: float, seconds: float) -> tuple[float, Load]:
         return rig.case.rate_hz, measure({'daq': rig}, {'daq': 'daq'}, seconds)['daq']
 
 
-def _lost_share(load: Load) -> float:
+def _lost_share(load: SensorLoad) -> float:
     return float(load.lost / max(1.0, load.lost + load.rate_hz * load.seconds))
 
 
-def _numbers(loads: Mapping[str, Load]) -> dict[str, Any]:
+def _numbers(loads: Mapping[str, SensorLoad]) -> dict[str, Any]:
     return {name: _row(load) for name, load in loads.items()}
 
 
-def _row(load: Load) -> Mapping[str, Any]:
+def _row(load: SensorLoad) -> Mapping[str, Any]:
     values = asdict(load)
     return {**values, 'cpu_percent': round(100 * values.pop('cpu'), 1)}

@@ -1,4 +1,4 @@
-"""Slides of emulated robots in real time, judged by where the finger really was and how hard it really pressed."""
+"""Slides of emulated robots in real time, evaluated by where the finger really was and how hard it really pressed."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def hand(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
 
 
 @dataclass(frozen=True)
-class Robot:
+class RobotUnderTest:
     """An emulated robot: how it is started, what it does, how it touches, and the module that it needs."""
 
     start: Callable[[float, int], AbstractContextManager[Arm]]
@@ -118,11 +118,13 @@ class Robot:
     touch: TouchParams = TOUCH
 
 
-ROBOTS: Mapping[str, Robot] = {
-    'emulated UR': Robot(ur, 'rtde_control'),
-    'emulated rails': Robot(rails, 'serial'),
+ROBOTS: Mapping[str, RobotUnderTest] = {
+    'emulated UR': RobotUnderTest(ur, 'rtde_control'),
+    'emulated rails': RobotUnderTest(rails, 'serial'),
     # Motors tell their speed and current in coarse steps.
-    'emulated hand': Robot(hand, 'dynamixel_sdk', (RUB,), TouchParams(speed_tolerance=0.3, force_tolerance=0.2)),
+    'emulated hand': RobotUnderTest(
+        hand, 'dynamixel_sdk', (RUB,), TouchParams(speed_tolerance=0.3, force_tolerance=0.2)
+    ),
 }
 
 

@@ -31,7 +31,7 @@ from texture_benchmarks.motion.trial import (
     simulate_force_controlled_slide,
     simulate_slides_on_surfaces,
 )
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
 from texture_exploration.arms.simulated import RATE_HZ, SimulatedArmParams
 from texture_exploration.force_control import ForceController, ForceLoopParams
@@ -59,23 +59,23 @@ TARGETS = {
 }
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Slide straight and in a circle with every robot, over every surface; draw the border of stability."""
-    stiffnesses = STIFFNESSES_N_M[1:2] if bench.quick else STIFFNESSES_N_M
-    fine = STIFFNESSES_N_M if bench.quick else FINE_STIFFNESSES_N_M
+    stiffnesses = STIFFNESSES_N_M[1:2] if options.quick else STIFFNESSES_N_M
+    fine = STIFFNESSES_N_M if options.quick else FINE_STIFFNESSES_N_M
     surfaces = simulate_slides_on_surfaces(fine)
-    lags_s = LAGS_S[::3] if bench.quick else LAGS_S
-    lags, hazards = lag_trials(fine, lags_s), hazard_trials(lags_s, 2 if bench.quick else None)
-    border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if bench.quick else DELAYS_S, _controller)
+    lags_s = LAGS_S[::3] if options.quick else LAGS_S
+    lags, hazards = lag_trials(fine, lags_s), hazard_trials(lags_s, 2 if options.quick else None)
+    border = stability_chart(BORDER_STIFFNESSES_N_M, QUICK_DELAYS_S if options.quick else DELAYS_S, _controller)
     robots = {name: _simulated(arm, stiffnesses) for name, arm in SIMULATED.items()}
     here = [name for name, robot in ROBOTS.items() if importlib.util.find_spec(robot.needs)]
-    for name in QUICK_ROBOTS if bench.quick else here:
-        robots[name] = _emulated(name, stiffnesses, 1 if bench.quick else REPEATS)
-    bench.out.mkdir(parents=True, exist_ok=True)
-    table = bench.out / 'motion.md'
+    for name in QUICK_ROBOTS if options.quick else here:
+        robots[name] = _emulated(name, stiffnesses, 1 if options.quick else REPEATS)
+    options.out.mkdir(parents=True, exist_ok=True)
+    table = options.out / 'motion.md'
     tables = (robot_table(robots, TARGETS), surface_table(surfaces), lag_table(lags), hazard_table(hazards))
     table.write_text('\n'.join(tables), encoding='utf-8')
-    return BenchResult(
+    return BenchmarkResult(
         name='motion',
         measured=(
             'one slide of 60 mm at 0.05 m/s and one of two turns at 0.1 m/s on a circle of 20 mm, with 1 N, for each '
@@ -99,10 +99,10 @@ def run(bench: Bench) -> BenchResult:
             'margin': _margins(),
         },
         charts=(
-            robot_chart(robots, TARGETS, bench.out / 'motion_robots.png'),
-            surface_chart(surfaces, TARGETS, bench.out / 'motion_surfaces.png'),
-            hazard_chart(lags, hazards, TARGETS, bench.out / 'motion_hazards.png'),
-            border_chart(border, _defaults(border), bench.out / 'motion_stability.png'),
+            robot_chart(robots, TARGETS, options.out / 'motion_robots.png'),
+            surface_chart(surfaces, TARGETS, options.out / 'motion_surfaces.png'),
+            hazard_chart(lags, hazards, TARGETS, options.out / 'motion_hazards.png'),
+            border_chart(border, _defaults(border), options.out / 'motion_stability.png'),
         ),
     )
 

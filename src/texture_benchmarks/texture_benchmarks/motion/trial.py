@@ -70,7 +70,7 @@ def simulate_force_controlled_slide(
     touch: TouchParams = TOUCH,
     injection: Injection | None = None,
 ) -> ForceControlMetrics:
-    """Explore once with a simulated arm, under the real exploration loop; judged by the true force."""
+    """Explore once with a simulated arm, under the real exploration loop; evaluated by the true force."""
     log: list[tuple[Phase, ArmState]] = []
     now_ns = due_ns = 0
     injected_ns: int | None = None

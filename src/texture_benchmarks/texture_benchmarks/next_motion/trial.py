@@ -9,10 +9,10 @@ import numpy as np
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.catalogue import find
-from texture_core.motion import Motion
+from texture_core.slide_motion import SlideMotion
 from texture_core.window import Window
 from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.next_motion.choice import Explorations
+from texture_estimation.next_motion.next_touch_model import NextTouchModel
 from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import CutWindow
 from texture_simulation.scene import Scene
@@ -21,42 +21,42 @@ from texture_simulation.simulated_slide import SimulatedSlide
 from texture_simulation.slide_batches import simulate_slides
 
 # Chooses a motion, by the log-posterior and the number of the slide.
-Choose = Callable[[Array, int], Motion]
+ChooseMotion = Callable[[Array, int], SlideMotion]
 PLANNED, SIMULATED = 8, 20  # slides that are planned, and simulated trials of each texture by which they are
 
 
-def _informed(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
-    return lambda posterior, slide: known.best(posterior, motions).motion
+def _informed(known: NextTouchModel, motions: Sequence[SlideMotion], rng: np.random.Generator) -> ChooseMotion:
+    return lambda posterior, slide: known.best_motion(posterior, motions).motion
 
 
-def _planned(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
-    """The order that tells most on average, found on simulated trials: whatever is felt, it is kept."""
+def _planned(known: NextTouchModel, motions: Sequence[SlideMotion], rng: np.random.Generator) -> ChooseMotion:
+    """Fixed order of motions with the largest mean information gain in simulated trials."""
     truth = np.repeat(np.arange(len(known.textures)), SIMULATED)
-    posteriors = np.tile(known.ignorance, (len(truth), 1))
-    order: list[Motion] = []
+    posteriors = np.tile(known.uniform_log_prior, (len(truth), 1))
+    order: list[SlideMotion] = []
     for _ in range(PLANNED):
-        told = {motion: sum(known.information(own, motion) for own in posteriors) for motion in motions}
-        order.append(max(motions, key=told.__getitem__))
-        felt = known.felt[order[-1]]
-        places = felt.means[truth] + rng.standard_normal((len(truth), felt.means.shape[1]))
-        posteriors = log_softmax(posteriors + felt.log_likelihoods(places))
+        reported = {motion: sum(known.information(own, motion) for own in posteriors) for motion in motions}
+        order.append(max(motions, key=reported.__getitem__))
+        measured = known.gaussians[order[-1]]
+        places = measured.means[truth] + rng.standard_normal((len(truth), measured.means.shape[1]))
+        posteriors = log_softmax(posteriors + measured.log_likelihoods(places))
     return lambda posterior, slide: order[slide % PLANNED]
 
 
-def _in_order(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+def _in_order(known: NextTouchModel, motions: Sequence[SlideMotion], rng: np.random.Generator) -> ChooseMotion:
     return lambda posterior, slide: motions[slide % len(motions)]
 
 
-def _by_direction(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+def _by_direction(known: NextTouchModel, motions: Sequence[SlideMotion], rng: np.random.Generator) -> ChooseMotion:
     ordered = sorted(motions, key=lambda motion: motion.direction_rad)
     return lambda posterior, slide: ordered[slide % len(ordered)]
 
 
-def _at_random(known: Explorations, motions: Sequence[Motion], rng: np.random.Generator) -> Choose:
+def _at_random(known: NextTouchModel, motions: Sequence[SlideMotion], rng: np.random.Generator) -> ChooseMotion:
     return lambda posterior, slide: motions[int(rng.integers(len(motions)))]
 
 
-CHOICES: Mapping[str, Callable[[Explorations, Sequence[Motion], np.random.Generator], Choose]] = {
+CHOICES: Mapping[str, Callable[[NextTouchModel, Sequence[SlideMotion], np.random.Generator], ChooseMotion]] = {
     'informed': _informed,
     'fixed order, planned': _planned,
     'fixed order, turning first': _in_order,  # the order of the motions
@@ -65,8 +65,8 @@ CHOICES: Mapping[str, Callable[[Explorations, Sequence[Motion], np.random.Genera
 }
 
 
-def described(
-    scene: Scene, motions: Sequence[Motion], count: int, features: FeatureSet, rng: np.random.Generator
+def extracted(
+    scene: Scene, motions: Sequence[SlideMotion], count: int, features: FeatureSet, rng: np.random.Generator
 ) -> Array:
     """Return the features of slides, each one window long: (n_motions, n_textures, count, n_features)."""
     return np.stack(
@@ -77,10 +77,10 @@ def described(
     )
 
 
-def learnt(scene: Scene, motions: Sequence[Motion], values: Array) -> Explorations:
-    """Learn from what `described` gave; the textures keep the order of their names."""
+def training(scene: Scene, motions: Sequence[SlideMotion], values: Array) -> NextTouchModel:
+    """Learn from what `extracted` gave; the textures keep the order of their names."""
     n_motions, n_textures, count, n_features = values.shape
-    return Explorations.learnt(
+    return NextTouchModel.fit(
         values.reshape(-1, n_features),
         np.tile(np.repeat(list(scene.surfaces), count), n_motions).tolist(),
         [motion for motion in motions for _ in range(n_textures * count)],
@@ -103,7 +103,13 @@ class Trials:
 
 
 def explored(
-    scene: Scene, known: Explorations, motions: Sequence[Motion], values: Array, *, choose: Choose, n_slides: int
+    scene: Scene,
+    known: NextTouchModel,
+    motions: Sequence[SlideMotion],
+    values: Array,
+    *,
+    choose: ChooseMotion,
+    n_slides: int,
 ) -> Trials:
     """Explore each texture in trials of several slides.
 
@@ -121,7 +127,7 @@ def explored(
     for number, texture in enumerate(scene.surfaces):
         truth = known.textures.index(texture)
         for first in range(0, values.shape[2] - n_slides + 1, n_slides):
-            posteriors = [known.ignorance]
+            posteriors = [known.uniform_log_prior]
             for slide in range(n_slides):
                 motion = choose(posteriors[-1], slide)
                 posteriors.append(known.update(posteriors[-1], motion, values[places[motion], number, first + slide]))
@@ -131,17 +137,17 @@ def explored(
 
 
 def _values(
-    scene: Scene, texture: str, motion: Motion, count: int, *, features: FeatureSet, rng: np.random.Generator
+    scene: Scene, texture: str, motion: SlideMotion, count: int, *, features: FeatureSet, rng: np.random.Generator
 ) -> Array:
     """Return the features of slides over one texture with one motion, (count, n_features)."""
     sliding = SimulatedSlide(motion.speed_m_s, motion.force_n, motion.duration_s, motion.direction_rad)
-    pieces = _pieces(scene, motion, simulate_slides(scene, texture, count, sliding, rng))
-    return np.stack([vector.values for vector in features.describe_many(pieces)])
+    events = _events(scene, motion, simulate_slides(scene, texture, count, sliding, rng))
+    return np.stack([vector.values for vector in features.extract_many(events)])
 
 
-def _pieces(scene: Scene, motion: Motion, samples: Array) -> Iterator[CutWindow]:
+def _events(scene: Scene, motion: SlideMotion, samples: Array) -> Iterator[CutWindow]:
     stream = find(SENSORS, scene.sensor, 'sensor model').fast
     speed, force, length = motion.speed_m_s, motion.force_n, motion.duration_s
-    for number, felt in enumerate(samples):
-        window = Window(felt.astype(np.float64), stream.rate_hz, stream.channels, 0, speed, force)
+    for number, measured in enumerate(samples):
+        window = Window(measured.astype(np.float64), stream.rate_hz, stream.channels, 0, speed, force)
         yield CutWindow(0, str(number), length, length, {'signal': window}, speed, force, '')

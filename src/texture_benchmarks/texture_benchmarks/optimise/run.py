@@ -1,4 +1,4 @@
-"""How long genetic searches of the papers' size take, what they find, and how far their quick judges can be trusted."""
+"""Time, results and surrogate quality of genetic searches of the papers' size."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from typing import Any
 import numpy as np
 from scipy.stats import spearmanr
 
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.catalogue import find
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import TRAIN, read_grades
 from texture_estimation.roughness.recipe import load_roughness_recipe
-from texture_estimation.search.division import Division
+from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.genetic_search import SearchParams
-from texture_estimation.search.grading import Grading
-from texture_estimation.search.optimise import Optimised, optimise
+from texture_estimation.search.optimise import SearchResult, optimise
+from texture_estimation.search.parallel import threaded_map
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.scans import Scans, Stream
-from texture_estimation.search.spread import over_cores
-from texture_estimation.search.task import Task
-from texture_estimation.search.telling_apart import TellingApart
+from texture_estimation.search.roughness_task import RoughnessTask
+from texture_estimation.search.search_slides import SearchSlides
+from texture_estimation.search.search_task import SearchTask
+from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
 from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
 from texture_simulation.offline import simulate_slides
 from texture_simulation.scene import load_scene
 from texture_simulation.sensors.catalogue import SENSORS
 from texture_simulation.simulated_slide import SimulatedSlide
 
-Draw = Callable[[Mapping[str, Optimised[Any]], Path], tuple[Path, ...]]
+Draw = Callable[[Mapping[str, SearchResult[Any]], Path], tuple[Path, ...]]
 
 GRADES = 'ets_roughness'
 USUAL = SearchParams()
 QUICK = SearchParams(population=5, generations=2, halves=3, finalists=1)
 QUICK_SCANS = 4  # of each surface, speed and force
-# Random individuals, and halves of each, on which a quick judge is compared with the learner itself.
+# Random individuals, and halves of each, on which a quick surrogate is compared with the learner itself.
 COMPARED, QUICK_COMPARED, COMPARED_HALVES = 12, 4, 3
 
 
@@ -55,7 +55,7 @@ class Data:
 
 
 @dataclass(frozen=True)
-class Case:
+class SearchCase:
     """One search: a recipe, its space, the data, and how long it may take on two cores."""
 
     recipe: str
@@ -71,58 +71,70 @@ DATA: Mapping[str, Data] = {
     'roughness': Data('roughness', (0.15,), (2.5,), 0.5, 200),
 }
 FRONT = SearchParams(objective='front')
-CASES: Mapping[str, Case] = {
-    'linear, SVM': Case('ets-linear-svm', 'ets-svm', 'linear', 60.0),
-    'linear, ANN': Case('ets-linear-ann', 'ets-ann', 'linear', 60.0),
-    'linear, SVM, no individual given up': Case('ets-linear-svm', 'ets-svm', 'linear', None, SearchParams(race=False)),
-    'linear, SVM, front': Case('ets-linear-svm', 'ets-svm-points', 'linear', None, FRONT),
-    'linear, ANN, front': Case('ets-linear-ann', 'ets-ann-points', 'linear', None, FRONT),
-    'ten textures, SVM': Case('ets-fine-svm', 'ets-fine-svm', 'fine', 300.0),
-    'ten textures, ANN': Case('ets-fine-ann', 'ets-fine-ann', 'fine', 300.0),
-    'roughness, SVM5': Case('ets-roughness-svm5', 'ets-roughness-svm5', 'roughness', 900.0),
-    'roughness, ANN5': Case('ets-roughness-ann5', 'ets-roughness-ann5', 'roughness', 900.0, SearchParams(finalists=1)),
-    'roughness, ANN1': Case('ets-roughness-ann1', 'ets-roughness-ann1', 'roughness', 900.0),
+CASES: Mapping[str, SearchCase] = {
+    'linear, SVM': SearchCase('ets-linear-svm', 'ets-svm', 'linear', 60.0),
+    'linear, ANN': SearchCase('ets-linear-ann', 'ets-ann', 'linear', 60.0),
+    'linear, SVM, no individual given up': SearchCase(
+        'ets-linear-svm', 'ets-svm', 'linear', None, SearchParams(race=False)
+    ),
+    'linear, SVM, front': SearchCase('ets-linear-svm', 'ets-svm-points', 'linear', None, FRONT),
+    'linear, ANN, front': SearchCase('ets-linear-ann', 'ets-ann-points', 'linear', None, FRONT),
+    'ten textures, SVM': SearchCase('ets-fine-svm', 'ets-fine-svm', 'fine', 300.0),
+    'ten textures, ANN': SearchCase('ets-fine-ann', 'ets-fine-ann', 'fine', 300.0),
+    'roughness, SVM5': SearchCase('ets-roughness-svm5', 'ets-roughness-svm5', 'roughness', 900.0),
+    'roughness, ANN5': SearchCase(
+        'ets-roughness-ann5', 'ets-roughness-ann5', 'roughness', 900.0, SearchParams(finalists=1)
+    ),
+    'roughness, ANN1': SearchCase('ets-roughness-ann1', 'ets-roughness-ann1', 'roughness', 900.0),
 }
 LINEAR = ('linear, SVM', 'linear, ANN')  # the papers' own
 COMPARISONS = (*LINEAR, 'ten textures, ANN')
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Run the searches of the linear experiment once, as large as in the paper."""
-    return _searched('optimise', LINEAR, (), bench, _charts_linear)
+    return _searched('optimise', LINEAR, (), options, _charts_linear)
 
 
-def run_large(bench: Bench) -> BenchResult:
+def run_large(options: BenchmarkOptions) -> BenchmarkResult:
     """Run all searches once, as large as in the papers: half an hour on two cores."""
-    return _searched('optimise-large', tuple(CASES), COMPARISONS, bench, _charts)
+    return _searched('optimise-large', tuple(CASES), COMPARISONS, options, _charts)
 
 
-def _searched(name: str, cases: Sequence[str], comparisons: Sequence[str], bench: Bench, charts: Draw) -> BenchResult:
-    felt = {data: _feel(DATA[data], bench) for data in dict.fromkeys(CASES[case].data for case in cases)}
+def _searched(
+    name: str, cases: Sequence[str], comparisons: Sequence[str], options: BenchmarkOptions, charts: Draw
+) -> BenchmarkResult:
+    measured = {
+        data: _simulate_slides(DATA[data], options) for data in dict.fromkeys(CASES[case].data for case in cases)
+    }
     numbers: dict[str, Any] = {}
-    found: dict[str, Optimised[Any]] = {}
+    found: dict[str, SearchResult[Any]] = {}
     for case in cases:
-        numbers[case], found[case] = run_case(CASES[case], felt[CASES[case].data], bench)
-    compared = {case: _compare(CASES[case], felt[CASES[case].data], bench) for case in comparisons}
-    return BenchResult(
+        numbers[case], found[case] = run_case(CASES[case], measured[CASES[case].data], options)
+    compared = {case: _compare(CASES[case], measured[CASES[case].data], options) for case in comparisons}
+    return BenchmarkResult(
         name=name,
-        measured='time of genetic searches on all cores, the best individuals judged again by the learner itself',
-        data='simulated: ' + '; '.join(f'{data}: {len(one.labels)} scans' for data, one in felt.items()),
-        split=f'{QUICK.halves if bench.quick else USUAL.halves} random halves of the slides, as in the papers',
+        measured='time of genetic searches on all cores, the best individuals evaluated again by the learner itself',
+        data='simulated: ' + '; '.join(f'{data}: {len(one.labels)} scans' for data, one in measured.items()),
+        split=f'{QUICK.halves if options.quick else USUAL.halves} random halves of the slides, as in the papers',
         numbers={'searches': numbers, **({'quick_against_exact': compared} if compared else {})},
-        charts=charts(found, bench.out),
+        charts=charts(found, options.out),
     )
 
 
-def run_case(case: Case, felt: Scans, bench: Bench) -> tuple[dict[str, Any], Optimised[Any]]:
+def run_case(
+    case: SearchCase, measured: SlideArrays, options: BenchmarkOptions
+) -> tuple[dict[str, Any], SearchResult[Any]]:
     """Search once; return the figures and what was found."""
-    params = replace(QUICK, objective=case.params.objective, race=case.params.race) if bench.quick else case.params
-    params = replace(params, seed=bench.seed)
+    params = replace(QUICK, objective=case.params.objective, race=case.params.race) if options.quick else case.params
+    params = replace(params, seed=options.seed)
     space, task = _space_and_task(case)
     load = os.getloadavg()[0]
     began_s, began_cpu_s = time.perf_counter(), time.process_time()
-    with over_cores() as spread:
-        found = optimise(space, Division(felt, params.halves, params.seed), params, task, spread=spread)
+    with threaded_map() as parallel_map:
+        found = optimise(
+            space, SearchSlides(measured, params.halves, params.seed), params, task, parallel_map=parallel_map
+        )
     took_s, cpu_s = time.perf_counter() - began_s, time.process_time() - began_cpu_s
     last = found.found.history[-1]
     best = found.best
@@ -132,9 +144,9 @@ def run_case(case: Case, felt: Scans, bench: Bench) -> tuple[dict[str, Any], Opt
         'limit_s': case.limit_s,
         'load_before': round(load, 1),
         'evaluations': params.population * params.generations,
-        'different_individuals': last.judged,
+        'different_individuals': last.evaluated,
         'halves_judged': last.halves,
-        'halves_of_all': last.judged * params.halves,
+        'halves_of_all': last.evaluated * params.halves,
         'fitness_searched': round(best.searched.fitness, 4),
         'fitness_exact': round(best.fitness, 4),
         'learning': round(float(best.record.learning.mean()), 4),
@@ -143,18 +155,18 @@ def run_case(case: Case, felt: Scans, bench: Bench) -> tuple[dict[str, Any], Opt
     }, found
 
 
-def _space_and_task(case: Case) -> tuple[RecipeSpace[Any], Task[Any]]:
+def _space_and_task(case: SearchCase) -> tuple[RecipeSpace[Any], SearchTask[Any]]:
     if case.data == 'roughness':
-        return RecipeSpace.load(case.space, load_roughness_recipe(case.recipe)), Grading(read_grades(GRADES))
-    return RecipeSpace.load(case.space, load_recipe(case.recipe)), TellingApart()
+        return RecipeSpace.load(case.space, load_roughness_recipe(case.recipe)), RoughnessTask(read_grades(GRADES))
+    return RecipeSpace.load(case.space, load_recipe(case.recipe)), ClassificationTask()
 
 
-def _feel(data: Data, bench: Bench) -> Scans:
+def _simulate_slides(data: Data, options: BenchmarkOptions) -> SlideArrays:
     """Simulate the scans; of the roughness scene those of the textures that the paper trains on."""
     scene = load_scene(data.scene)
     kind = find(SENSORS, scene.sensor, 'sensor model')
     surfaces = read_grades(GRADES).used_for(TRAIN) if data.scene == 'roughness' else tuple(scene.surfaces)
-    count = QUICK_SCANS if bench.quick else data.count
+    count = QUICK_SCANS if options.quick else data.count
     conditions = [(speed, force) for speed in data.speeds_m_s for force in data.forces_n]
     speed, force = np.repeat(np.array(conditions), count, axis=0).T
     samples = [
@@ -163,33 +175,35 @@ def _feel(data: Data, bench: Bench) -> Scans:
             surface,
             len(speed),
             SimulatedSlide(speed, force, data.scan_s),
-            np.random.default_rng([bench.seed, n]),
+            np.random.default_rng([options.seed, n]),
         )
         for n, surface in enumerate(surfaces)
     ]
-    return Scans(
-        {'signal': Stream(np.concatenate(samples).astype(np.float64), kind.fast.rate_hz)},
+    return SlideArrays(
+        {'signal': ArrayStream(np.concatenate(samples).astype(np.float64), kind.fast.rate_hz)},
         np.repeat(surfaces, len(speed)),
         np.tile(speed, len(surfaces)),
         np.tile(force, len(surfaces)),
     )
 
 
-def _compare(case: Case, felt: Scans, bench: Bench) -> dict[str, float]:
-    """Return how a quick judge ranks random individuals, against the learner itself."""
+def _compare(case: SearchCase, measured: SlideArrays, options: BenchmarkOptions) -> dict[str, float]:
+    """Return how a quick surrogate ranks random individuals, against the learner itself."""
     space, task = _space_and_task(case)
-    division = Division(felt, COMPARED_HALVES, bench.seed)
-    features = FeatureCache(felt)
-    rng = np.random.default_rng(bench.seed)
-    compared = QUICK_COMPARED if bench.quick else COMPARED
+    search_slides = SearchSlides(measured, COMPARED_HALVES, options.seed)
+    features = FeatureCache(measured)
+    rng = np.random.default_rng(options.seed)
+    compared = QUICK_COMPARED if options.quick else COMPARED
     fitness = np.empty((2, compared))
     for place in range(compared):
         recipe = space.recipe(space.variables.decode(rng.random(len(space.axes))))
         windows = recipe.training_windows
-        values = features.values(task.described(recipe))
+        values = features.values(task.feature_set_of(recipe))
         for row, quick in enumerate((True, False)):
-            trial = task.trial(recipe, values, division.examples(windows), division.halves(windows), quick=quick)
-            half = trial.start()
+            fitness_function = task.fitness_function(
+                recipe, values, search_slides.examples(windows), search_slides.halves(windows), quick=quick
+            )
+            half = fitness_function.start()
             fitness[row, place] = np.mean([half(number) for number in range(COMPARED_HALVES)])
     return {
         'individuals': compared,
@@ -198,23 +212,25 @@ def _compare(case: Case, felt: Scans, bench: Bench) -> dict[str, float]:
     }
 
 
-def _charts_linear(found: Mapping[str, Optimised[Any]], out: Path) -> tuple[Path, ...]:
-    told = {name: one.found.history for name, one in found.items()}
+def _charts_linear(found: Mapping[str, SearchResult[Any]], out: Path) -> tuple[Path, ...]:
+    reported = {name: one.found.history for name, one in found.items()}
     title = 'Searches of the linear experiment (simulated slides)'
-    return (convergence_chart(told, title, out / 'optimise_linear.png'),)
+    return (convergence_chart(reported, title, out / 'optimise_linear.png'),)
 
 
-def _charts(found: Mapping[str, Optimised[Any]], out: Path) -> tuple[Path, ...]:
+def _charts(found: Mapping[str, SearchResult[Any]], out: Path) -> tuple[Path, ...]:
     single = {name: one.found.history for name, one in found.items() if CASES[name].params.objective == 'accuracy'}
     fronts: dict[str, Sequence[tuple[float, float]]] = {
         name.removesuffix(', front'): [(point.searched.cost, point.fitness) for point in one.finalists]
         for name, one in found.items()
         if CASES[name].params.objective == 'front'
     }
-    told = {name: history for name, history in single.items() if CASES[name].data != 'roughness'}
+    reported = {name: history for name, history in single.items() if CASES[name].data != 'roughness'}
     graded = {name: history for name, history in single.items() if CASES[name].data == 'roughness'}
     return (
-        convergence_chart(told, 'Searches that tell surfaces apart (simulated slides)', out / 'optimise_textures.png'),
+        convergence_chart(
+            reported, 'Searches that distinguish surfaces (simulated slides)', out / 'optimise_textures.png'
+        ),
         convergence_chart(graded, 'Searches that grade roughness (simulated slides)', out / 'optimise_roughness.png'),
         search_front_chart(
             fronts, 'The linear experiment: fitness and computing (simulated slides)', out / 'optimise_front.png'

@@ -15,7 +15,7 @@ PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fin
 
 EXPERIMENTS: Mapping[str, Run] = {
     **{protocol.name: partial(run, protocol) for protocol in PROTOCOLS},
-    'roughness': roughness.run,  # Rispal et al.: grades of textures never felt
+    'roughness': roughness.run,  # Rispal et al.: grades of textures never touched
 }
 
 __all__ = ['EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment']

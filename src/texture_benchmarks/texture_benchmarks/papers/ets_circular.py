@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from texture_benchmarks.papers.check import higher_elsewhere, lower_in, most_errors
+from texture_benchmarks.papers.claim_checks import higher_elsewhere, lower_in, most_errors
 from texture_benchmarks.papers.ets_linear import PEAKS
 from texture_benchmarks.papers.interval import apart
 from texture_benchmarks.papers.protocol import (
@@ -15,9 +15,9 @@ from texture_benchmarks.papers.protocol import (
     Figures,
     Finding,
     Method,
-    Outcomes,
+    MethodResults,
     Protocol,
-    Task,
+    RecognitionTask,
     Visits,
     halves,
 )
@@ -38,7 +38,7 @@ TABLE_2 = (
 )
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: MethodResults) -> list[Finding]:
     """Check what section IV.B.2 tells."""
     circle_ann, circle_svm = outcomes[CIRCLES, 'ets-circular-ann'], outcomes[CIRCLES, 'ets-circular-svm']
     line_ann, line_svm = outcomes[LINES, 'ets-linear-ann'], outcomes[LINES, 'ets-linear-svm']
@@ -82,24 +82,24 @@ PROTOCOL = Protocol(
     scene='ets_circular',
     paper='Roberge et al., "Textures recognition through tactile exploration", sections IV.A and IV.B.2',
     tasks=(
-        Task(
+        RecognitionTask(
             CIRCLES,
             _visits(RADIUS_M),
             (
                 Method('ets-circular-ann', Figures(0.846, 0.811, 0.028)),
                 Method('ets-circular-svm', Figures(0.990, 0.867, 0.052), confusion=TABLE_2),
-                replace(OURS, divisions=FEW),
-                Method('vibration-and-taxels', divisions=FEW),
+                replace(OURS, splits=FEW),
+                Method('vibration-and-taxels', splits=FEW),
             ),
         ),
-        Task(
+        RecognitionTask(
             LINES,
             _visits(0.0),
             (
                 Method('ets-linear-ann', Figures(0.809, 0.715, 0.142), features=PEAKS),
                 Method('ets-linear-svm', Figures(0.963, 0.764, 0.134), features=PEAKS, learner={'kernel_scale': 4.0}),
-                replace(OURS, divisions=FEW),
-                Method('vibration-and-taxels', divisions=FEW),
+                replace(OURS, splits=FEW),
+                Method('vibration-and-taxels', splits=FEW),
             ),
         ),
     ),

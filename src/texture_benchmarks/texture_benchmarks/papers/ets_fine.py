@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from texture_benchmarks.papers.check import at_least, most_errors
+from texture_benchmarks.papers.claim_checks import at_least, most_errors
 from texture_benchmarks.papers.protocol import (
     FEW,
     OURS,
@@ -12,9 +12,9 @@ from texture_benchmarks.papers.protocol import (
     Figures,
     Finding,
     Method,
-    Outcomes,
+    MethodResults,
     Protocol,
-    Task,
+    RecognitionTask,
     Visits,
     halves,
 )
@@ -36,7 +36,7 @@ TABLE_3 = (
 )
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: MethodResults) -> list[Finding]:
     """Check what section V tells."""
     ann, svm = outcomes[TASK, ANN], outcomes[TASK, SVM]
     return [
@@ -52,14 +52,14 @@ PROTOCOL = Protocol(
     scene='ets_fine',
     paper='Roberge et al., "Textures recognition through tactile exploration", section V',
     tasks=(
-        Task(
+        RecognitionTask(
             TASK,
             (Visits('0.125 m/s, 2 N', 200, SimulatedSlide(0.125, 2.0, 0.8)),),
             (
                 Method(ANN, Figures(0.963, 0.949, 0.007)),
                 Method(SVM, Figures(0.960, 0.958, 0.014), confusion=TABLE_3),
-                replace(OURS, divisions=FEW),
-                Method('vibration-and-taxels', divisions=FEW),
+                replace(OURS, splits=FEW),
+                Method('vibration-and-taxels', splits=FEW),
             ),
         ),
     ),

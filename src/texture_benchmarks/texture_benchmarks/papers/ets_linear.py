@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from texture_benchmarks.papers.check import at_least, higher, most_errors
+from texture_benchmarks.papers.claim_checks import at_least, higher, most_errors
 from texture_benchmarks.papers.interval import mean
 from texture_benchmarks.papers.protocol import (
     OURS,
@@ -12,9 +12,9 @@ from texture_benchmarks.papers.protocol import (
     Figures,
     Finding,
     Method,
-    Outcomes,
+    MethodResults,
     Protocol,
-    Task,
+    RecognitionTask,
     Visits,
     halves,
 )
@@ -29,9 +29,9 @@ VISITS = tuple(
 )
 TABLE_1 = ((445, 2, 2, 1, 1), (1, 427, 15, 1, 6), (1, 4, 437, 2, 7), (1, 2, 2, 443, 2))
 ANN, SVM, ANN_VOTE, SVM_VOTE = 'ets-linear-ann', 'ets-linear-svm', 'ets-linear-ann-vote', 'ets-linear-svm-vote'
-# The paper speaks of a larger database when it votes: were the parts dealt out to the halves one by one?
+# The paper speaks of a larger database when it votes: were the parts assigned to the halves one by one?
 ANN_SINGLY, SVM_SINGLY = f'{ANN_VOTE}, parts dealt', f'{SVM_VOTE}, parts dealt'
-TOLD = 'default, told speed and force'
+REPORTED = 'default, told speed and force'
 # By these the noise was set; the recipes' own were chosen on recordings.
 PEAKS = {'spectral_peaks': {'gap_hz': 10.0, 'order': 'intensity'}}
 METHODS = (
@@ -42,12 +42,12 @@ METHODS = (
     Method(ANN_VOTE, label=ANN_SINGLY, singly=True),
     Method(SVM_VOTE, label=SVM_SINGLY, singly=True),
     OURS,
-    replace(OURS, stretch_to_m_s=0.15, also=('force',), label=TOLD),
+    replace(OURS, stretch_to_m_s=0.15, also=('force',), label=REPORTED),
     Method('vibration-and-taxels'),
 )
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: MethodResults) -> list[Finding]:
     """Check what section IV.B.1 tells."""
     ann, svm, ann_vote, svm_vote = (outcomes[TASK, name] for name in (ANN, SVM, ANN_VOTE, SVM_VOTE))
     lift_ann, lift_svm = ann_vote.right() - ann.right(), svm_vote.right() - svm.right()
@@ -57,13 +57,13 @@ def findings(outcomes: Outcomes) -> list[Finding]:
         higher('the vote lifts the SVM (75.0 to 97.3 %)', svm_vote, svm),
         higher('the vote lifts the ANN (78.7 to 84.0 %)', ann_vote, ann),
         Finding(
-            'the vote is worth more to the SVM than to the ANN (22.3 against 5.3 points)',
+            'the vote contributes more to the SVM than to the ANN (22.3 against 5.3 points)',
             f'{100 * lift_svm.mean():+.1f} against {100 * lift_ann.mean():+.1f} points',
             more,
             more.above(),
         ),
         higher(
-            'not of the paper: the vote lifts the SVM, if parts of the slides that are tested were learnt',
+            'not of the paper: the vote lifts the SVM, if parts of the slides that are tested were trained',
             outcomes[TASK, SVM_SINGLY],
             svm,
         ),
@@ -80,7 +80,7 @@ PROTOCOL = Protocol(
     name='ets-linear',
     scene='ets_linear',
     paper='Roberge et al., "Textures recognition through tactile exploration", sections IV.A and IV.B.1',
-    tasks=(Task(TASK, VISITS, METHODS),),
+    tasks=(RecognitionTask(TASK, VISITS, METHODS),),
     divide=halves(20),
     split='20 random halves of each texture',
     anchor=Anchor(TASK, SVM, 0.750, 'section IV.B.1: test, SVM without a vote'),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from texture_benchmarks.result import BenchResult
+from texture_benchmarks.result import BenchmarkResult
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class ExperimentResult(BenchResult):
+class ExperimentResult(BenchmarkResult):
     """The numbers of one experiment; `lines` are the table for people, the paper's figures beside ours."""
 
     lines: tuple[str, ...] = ()

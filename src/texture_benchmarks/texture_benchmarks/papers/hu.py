@@ -1,11 +1,11 @@
-"""Five linens felt along x and along y (Hu et al. 2014)."""
+"""Five linens measured along x and along y (Hu et al. 2014)."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
 
-from texture_benchmarks.papers.check import better_on, higher, most_errors
+from texture_benchmarks.papers.claim_checks import better_on, higher, most_errors
 from texture_benchmarks.papers.protocol import (
     FEW,
     OURS,
@@ -13,9 +13,9 @@ from texture_benchmarks.papers.protocol import (
     Figures,
     Finding,
     Method,
-    Outcomes,
+    MethodResults,
     Protocol,
-    Task,
+    RecognitionTask,
     View,
     Visits,
     drawn,
@@ -34,7 +34,7 @@ BOTH, X_ONLY, Y_ONLY = 'hu-pca-svm', 'hu-pca-svm, x alone', 'hu-pca-svm, y alone
 ALONG_X_AND_Y = (View(), View(turned_rad=math.pi / 2))
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: MethodResults) -> list[Finding]:
     """Check what section 5 tells."""
     both, x_only, y_only = (outcomes[TASK, name] for name in (BOTH, X_ONLY, Y_ONLY))
     return [
@@ -50,20 +50,20 @@ PROTOCOL = Protocol(
     scene='hu',
     paper='Hu et al. 2014, "A finger-shaped tactile sensor for fabric surfaces evaluation", section 5',
     tasks=(
-        Task(
+        RecognitionTask(
             TASK,
             (Visits('25.5 mm/s, 1.5 N', 60, SimulatedSlide(0.0255, 1.5, SLIDE_S), ALONG_X_AND_Y),),
             (
                 Method('hu-pca-svm', Figures(test=0.92), WHOLE, {**PLAIN, 'blocks': 2}, POWER),
                 Method('hu-pca-svm', windows=WHOLE, learner=PLAIN, features=POWER, label=X_ONLY, views=(0,)),
                 Method('hu-pca-svm', windows=WHOLE, learner=PLAIN, features=POWER, label=Y_ONLY, views=(1,)),
-                replace(OURS, divisions=FEW),
+                replace(OURS, splits=FEW),
             ),
         ),
     ),
     divide=drawn(2 / 3, 20),
-    split='20 random draws of 200 of the 300 places to learn from',
-    anchor=Anchor(TASK, BOTH, 0.92, 'table 1', knob='how near linen 4 is to linen 3'),
+    split='20 random draws of 200 of the 300 places for training',
+    anchor=Anchor(TASK, BOTH, 0.92, 'table 1', setting='how near linen 4 is to linen 3'),
     findings=findings,
     quick_count=10,
 )

@@ -41,7 +41,7 @@ def share(right: Array) -> Interval:
     Parameters
     ----------
     right : (n_slides,)
-        1 or 0, or between if a slide was judged several times.
+        1 or 0, or between if a slide was evaluated several times.
     """
     n, p, z2 = len(right), float(np.mean(right)), NORMAL_95**2
     middle = (p + z2 / (2 * n)) / (1 + z2 / n)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from texture_benchmarks.papers.check import higher, more_spread, most_errors, seldom
+from texture_benchmarks.papers.claim_checks import higher, more_spread, most_errors, seldom
 from texture_benchmarks.papers.protocol import (
     OURS,
     Anchor,
     Figures,
     Finding,
     Method,
-    Outcomes,
+    MethodResults,
     Protocol,
-    Task,
+    RecognitionTask,
     Visits,
     folds,
 )
@@ -59,7 +59,7 @@ TABLE_3 = (
 )
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: MethodResults) -> list[Finding]:
     """Check what section VI tells."""
     three, five, amplitude = (outcomes[TASK, name] for name in (THREE, FIVE, AMPLITUDE))
     return [
@@ -81,7 +81,7 @@ PROTOCOL = Protocol(
     scene='jamali',
     paper='Jamali & Sammut 2010, "Material classification by tactile sensing using surface textures", section VI',
     tasks=(
-        Task(
+        RecognitionTask(
             TASK,
             (Visits('1 N', 50, SimulatedSlide(0.05, 1.0, SLIDE_S)),),
             (

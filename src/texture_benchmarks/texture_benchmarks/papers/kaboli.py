@@ -6,20 +6,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from texture_benchmarks.papers.check import at_least, higher, most_errors, no_lower
+from texture_benchmarks.papers.claim_checks import at_least, higher, most_errors, no_lower
 from texture_benchmarks.papers.protocol import (
     OURS,
     Anchor,
     Figures,
     Finding,
     Method,
-    Outcomes,
+    MethodResults,
     Protocol,
+    RecognitionTask,
     Table,
-    Task,
     View,
     Visits,
-    learnt_in,
+    training_in,
 )
 from texture_features.windowing.windows import WindowParams
 from texture_simulation.simulated_slide import SimulatedSlide
@@ -54,20 +54,20 @@ SVM, EM = 'kaboli-svm', 'kaboli-em'
 ROUNDS = (1, 2, 5, 10)
 
 
-def findings(outcomes: Outcomes) -> list[Finding]:
+def findings(outcomes: MethodResults) -> list[Finding]:
     """Check what section V tells."""
     svm = {task: outcomes[task, SVM] for task in TASKS}
     em = {task: outcomes[task, EM] for task in TASKS}
     first, last = (outcomes[ALL, pa(t)] for t in (ROUNDS[0], ROUNDS[-1]))
     return [
-        *(at_least(f'other fingers than those learnt with recognise {task}, SVM ({100 * told:g} %)', svm[task], told)
-          for task, told in zip(TASKS, PAPER_SVM, strict=True)),
+        *(at_least(f'fingers not used in training recognise {task}, SVM ({100 * value:g} %)', svm[task], value)
+          for task, value in zip(TASKS, PAPER_SVM, strict=True)),
         no_lower('shape does not matter: all 20 are told nearly as well as ten of one shape', svm[ALL], svm[SAME]),
         higher('online learning goes on: after ten slides of each object PA knows more than after one', last, first),
         at_least('PA recognises 87 % after ten slides of each object', last, 0.87),
         higher('the SVM is better than PA', svm[ALL], last),
-        *(at_least(f'clusters named by majority recognise {task}, EM ({100 * told:g} %)', em[task], told)
-          for task, told in zip(TASKS, PAPER_EM, strict=True)),
+        *(at_least(f'clusters named by majority recognise {task}, EM ({100 * value:g} %)', em[task], value)
+          for task, value in zip(TASKS, PAPER_EM, strict=True)),
         most_errors(
             'most errors of the SVM are between objects that the paper calls alike',
             svm[ALL],
@@ -133,10 +133,10 @@ PROTOCOL = Protocol(
     scene='kaboli',
     paper='Kaboli et al. 2015, "In-hand object recognition via texture properties", section V',
     tasks=tuple(
-        Task(name, VISITS, _methods(svm, em, table), surfaces)
+        RecognitionTask(name, VISITS, _methods(svm, em, table), surfaces)
         for name, svm, em, table, surfaces in zip(TASKS, PAPER_SVM, PAPER_EM, TABLES, SURFACES, strict=True)
     ),
-    divide=learnt_in(TRAINED),
+    divide=training_in(TRAINED),
     split='learnt: 10 slides with index and middle finger; tested: 20 with thumb and index finger',
     anchor=Anchor(
         ALL,

@@ -61,8 +61,10 @@ def _bars(axes: Any, methods: Mapping[str, tuple[float | None, Interval]]) -> No
     values = 100 * np.array([interval.value for interval in ours])
     reach = 100 * np.array([[i.value - i.low for i in ours], [i.high - i.value for i in ours]])
     axes.errorbar(values, at, xerr=reach, fmt='o', markersize=4, color=COLOURS[0], label='simulated, 95 % interval')
-    told = [(100 * paper, place) for place, (paper, _) in zip(at, methods.values(), strict=True) if paper is not None]
-    axes.plot(*zip(*told, strict=True), 'x', color=COLOURS[5], label='paper') if told else None
+    reported = [
+        (100 * paper, place) for place, (paper, _) in zip(at, methods.values(), strict=True) if paper is not None
+    ]
+    axes.plot(*zip(*reported, strict=True), 'x', color=COLOURS[5], label='paper') if reported else None
     axes.set_yticks(at, list(methods))
     axes.set(ylim=(len(methods) - 0.4, -0.6))
 

@@ -1,4 +1,4 @@
-"""What a paper's experiment was: how each surface was touched, what judged it, how it was tested, what came out."""
+"""What a paper's experiment was: how each surface was touched, what evaluated it, how it was tested, what came out."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_benchmarks.papers.interval import Interval
-from texture_benchmarks.papers.outcome import Outcome
+from texture_benchmarks.papers.method_result import MethodResult
 from texture_estimation.learners.learner import Codes
 from texture_estimation.search.halves import random_halves
 from texture_features.windowing.windows import WindowParams
 from texture_simulation.simulated_slide import SimulatedSlide
 
 Mask = NDArray[np.bool_]
-# (surface and condition of each slide, randomness, whether to hurry) -> which slides are learnt from, by division
-Divide = Callable[[Codes, NDArray[np.str_], np.random.Generator, bool], Mask]
+# (surface and condition of each slide, randomness, whether to hurry) -> which slides are used for training, by split
+Splitter = Callable[[Codes, NDArray[np.str_], np.random.Generator, bool], Mask]
 Table = Sequence[Sequence[float]]
 
 
 @dataclass(frozen=True)
 class View:
-    """One of the ways in which a trial feels a surface; the features of all views of a trial are joined."""
+    """One of the ways in which a trial measures a surface; the features of all views of a trial are joined."""
 
     finger: int = 0
     turned_rad: float = 0.0
@@ -72,7 +72,7 @@ class Method:
     paper
         What the paper got with it.
     windows
-        How slides are cut, learnt from and judged; None: as the recipe says.
+        How slides are cut, trained on and evaluated; None: as the recipe says.
     learner
         Parameters of the learner that this experiment changes.
     features
@@ -84,10 +84,10 @@ class Method:
     views
         Which views of a slide it is given; () for all.
     singly
-        Whether the windows are dealt out to learn from one by one, half of them, instead of slide by slide: all slides
+        Whether the windows are assigned for training one by one, half of them, instead of slide by slide: all slides
         are then tested though parts of each are learnt. A fault on trial, to see what it would give.
-    divisions
-        It is tried on so many of the divisions; 0 for all.
+    splits
+        It is tried on so many of the splits; 0 for all.
     confusion : (n_surfaces, n_surfaces) or (n_surfaces, n_surfaces + 1)
         The paper's table; the last column, if there is one more, counts what is unclassified.
     """
@@ -102,7 +102,7 @@ class Method:
     label: str = ''
     views: tuple[int, ...] = ()
     singly: bool = False
-    divisions: int = 0
+    splits: int = 0
     confusion: Table | None = None
 
     @property
@@ -113,11 +113,11 @@ class Method:
 
 # Decisions do not depend on the calibration, which takes most of the time: two parts will do.
 OURS = Method('default', learner={'folds': 2})
-FEW = 5  # divisions: enough for a method that stands beside the paper's, where it takes long
+FEW = 5  # splits: enough for a method that stands beside the paper's, where it takes long
 
 
 @dataclass(frozen=True)
-class Task:
+class RecognitionTask:
     """Surfaces to tell apart, how they are touched, and what tries to.
 
     Parameters
@@ -127,7 +127,7 @@ class Task:
     visits
         How each surface is touched.
     methods
-        What tries to tell them apart.
+        What tries to distinguish them.
     surfaces
         Names; () for all of the scene.
     """
@@ -160,7 +160,7 @@ class Finding:
     holds: bool | None
 
 
-Outcomes = Mapping[tuple[str, str], Outcome]  # (task, method) -> what came out
+MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what came out
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Anchor:
 
     Parameters
     ----------
-    knob
+    setting
         What of the scene was set by it.
     experiment
         Whose figure it is, if not of the same experiment.
@@ -181,7 +181,7 @@ class Anchor:
     method: str
     test: float
     source: str
-    knob: str = 'noise of the fast channels'
+    setting: str = 'noise of the fast channels'
     experiment: str = ''
     shortfall: str = ''
 
@@ -197,9 +197,9 @@ class Protocol:
     paper
         Who did it.
     tasks
-        What was to be told apart, by what.
+        What was to be distinguished, by what.
     divide, split
-        Which slides are learnt from, and that in words.
+        Which slides are used for training, and that in words.
     anchor
         What the scene's noise was set by.
     findings
@@ -211,15 +211,15 @@ class Protocol:
     name: str
     scene: str
     paper: str
-    tasks: tuple[Task, ...]
-    divide: Divide
+    tasks: tuple[RecognitionTask, ...]
+    divide: Splitter
     split: str
     anchor: Anchor
-    findings: Callable[[Outcomes], Sequence[Finding]]
+    findings: Callable[[MethodResults], Sequence[Finding]]
     quick_count: int = 8
 
 
-def halves(count: int) -> Divide:
+def halves(count: int) -> Splitter:
     """Return what draws random halves, each surface halved."""
 
     def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
@@ -228,38 +228,38 @@ def halves(count: int) -> Divide:
     return divide
 
 
-def folds(count: int, repeats: int) -> Divide:
-    """Return what holds out each part of the slides in turn, each surface dealt out at random, several times."""
+def folds(count: int, repeats: int) -> Splitter:
+    """Return what holds out each part of the slides in turn, each surface assigned at random, several times."""
 
     def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
-        learnt = []
+        trained_on = []
         for _ in range(1 if quick else repeats):
             part = np.empty(len(codes), dtype=np.intp)
             for code in np.unique(codes):
                 rows = np.flatnonzero(codes == code)
                 part[rows] = rng.permutation(len(rows)) % count
-            learnt += [part != held for held in range(2 if quick else count)]
-        return np.stack(learnt)
+            trained_on += [part != held for held in range(2 if quick else count)]
+        return np.stack(trained_on)
 
     return divide
 
 
-def drawn(share: float, count: int) -> Divide:
-    """Return what draws so large a share of all slides to learn from, whatever their surface."""
+def drawn(share: float, count: int) -> Splitter:
+    """Return what draws so large a share of all slides for training, whatever their surface."""
 
     def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
         ranks = np.stack([rng.permutation(len(codes)) for _ in range(2 if quick else count)])
-        learnt: Mask = ranks < round(share * len(codes))
-        return learnt
+        trained_on: Mask = ranks < round(share * len(codes))
+        return trained_on
 
     return divide
 
 
-def learnt_in(condition: str) -> Divide:
-    """Return what learns from the slides of one condition and tests on all others."""
+def training_in(condition: str) -> Splitter:
+    """Return what is trained on the slides of one condition and tests on all others."""
 
     def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
-        learnt: Mask = (conditions == condition)[None, :]
-        return learnt
+        trained_on: Mask = (conditions == condition)[None, :]
+        return trained_on
 
     return divide

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.papers.check import percent
+from texture_benchmarks.papers.claim_checks import percent
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
-from texture_benchmarks.papers.outcome import Outcome
+from texture_benchmarks.papers.method_result import MethodResult
 from texture_benchmarks.papers.paper_charts import accuracy_chart, confusions_chart
-from texture_benchmarks.papers.protocol import Finding, Method, Outcomes, Protocol, Table, Task
+from texture_benchmarks.papers.protocol import Finding, Method, MethodResults, Protocol, RecognitionTask, Table
 from texture_benchmarks.papers.trial import NONE, TunedRecipes, outcomes, searched
 from texture_core.arrays import AnyArray
 from texture_simulation.scene import load_scene
 
 TUNED = '-tuned'
-SEARCHED = '; recipes that were searched for: the first alone, whose slides to learn from the search was given'
+SEARCHED = '; recipes that were searched for: the first alone, whose slides for training the search was given'
 VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 
 
@@ -50,23 +50,23 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
     )  # fmt: skip
 
 
-def _slides(outcome: Outcome) -> int:
+def _slides(outcome: MethodResult) -> int:
     return len(outcome.codes) // len(outcome.surfaces)
 
 
-def _difficulty(protocol: Protocol, found: Outcomes) -> dict[str, Any]:
+def _difficulty(protocol: Protocol, found: MethodResults) -> dict[str, Any]:
     anchor = protocol.anchor
     outcome = found.get((anchor.task, anchor.method)) if not anchor.experiment else None
     return {
         'set_by': f'{anchor.experiment or protocol.name}: {anchor.method}, {anchor.task}: {anchor.source}',
         'paper': anchor.test,
         'here': outcome and outcome.test.as_json(),
-        'knob': anchor.knob,
+        'knob': anchor.setting,
         'shortfall': anchor.shortfall,
     }
 
 
-def _figures(method: Method, outcome: Outcome) -> dict[str, Any]:
+def _figures(method: Method, outcome: MethodResult) -> dict[str, Any]:
     paper = {name: getattr(method.paper, name) for name in ('learning', 'test', 'unclassified')}
     return {
         'paper': {name: value for name, value in paper.items() if value is not None},
@@ -89,7 +89,7 @@ def _as_json(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _charts(protocol: Protocol, found: Outcomes, name: str, out: Path) -> tuple[Path, ...]:
+def _charts(protocol: Protocol, found: MethodResults, name: str, out: Path) -> tuple[Path, ...]:
     stem = f'experiment_{name.replace("-", "_")}'
     panels = {
         task.name: {m.name: (m.paper.test, found[task.name, m.name].test) for m in task.methods}
@@ -114,7 +114,7 @@ def _charts(protocol: Protocol, found: Outcomes, name: str, out: Path) -> tuple[
     return tuple(charts)
 
 
-def _lines(protocol: Protocol, found: Outcomes, checked: Sequence[Finding]) -> Iterator[str]:
+def _lines(protocol: Protocol, found: MethodResults, checked: Sequence[Finding]) -> Iterator[str]:
     yield (
         f'{"%":38}{"paper: learning":>16}{"test":>7}{"unclassified":>14}   '
         f'{"simulated: learning":>20}{"test":>22}{"unclassified":>14}'
@@ -126,15 +126,15 @@ def _lines(protocol: Protocol, found: Outcomes, checked: Sequence[Finding]) -> I
     anchor = protocol.anchor
     where = f'{anchor.task} of {anchor.experiment}' if anchor.experiment else anchor.task
     yield (
-        f'difficulty: {anchor.knob}, set once so that {anchor.method} ({where}) recognises {100 * anchor.test:.1f} % '
+        f'difficulty: {anchor.setting}, set so that {anchor.method} ({where}) recognises {100 * anchor.test:.1f} % '
         f'({anchor.source}){f"; {anchor.shortfall}" if anchor.shortfall else ""}'
     )
     yield 'findings of the paper:'
     for finding in checked:
         interval = finding.interval.times(100.0)
         yield f'  {VERDICTS[finding.holds]:14} {finding.claim}'
-        told = f'{interval.value:+.1f} points ({interval.low:+.1f} to {interval.high:+.1f})'
-        yield f'  {"":14} here {finding.here}; decided by {told}'
+        reported = f'{interval.value:+.1f} points ({interval.low:+.1f} to {interval.high:+.1f})'
+        yield f'  {"":14} here {finding.here}; decided by {reported}'
     for task in protocol.tasks:
         for method in task.methods:
             if method.confusion is not None:
@@ -152,7 +152,7 @@ def _tuning_lines(tuned: TunedRecipes, out: Path) -> Iterator[str]:
         )
 
 
-def _row(method: Method, outcome: Outcome) -> str:
+def _row(method: Method, outcome: MethodResult) -> str:
     paper = method.paper
     return (
         f'  {method.name:36}{_share(paper.learning):>16}{_share(paper.test):>7}{_share(paper.unclassified):>14}   '
@@ -160,7 +160,7 @@ def _row(method: Method, outcome: Outcome) -> str:
     )
 
 
-def _plain(outcome: Outcome) -> str:
+def _plain(outcome: MethodResult) -> str:
     return percent(outcome.test).replace(' %', '')
 
 
@@ -168,7 +168,7 @@ def _share(value: float | None) -> str:
     return '–' if value is None else f'{100 * value:.1f}'
 
 
-def _confusion_lines(task: Task, method: Method, outcome: Outcome) -> Iterator[str]:
+def _confusion_lines(task: RecognitionTask, method: Method, outcome: MethodResult) -> Iterator[str]:
     yield f'{method.name}, {task.name}: % of each surface taken for each, paper | simulated (last: none)'
     width = max(map(len, outcome.surfaces))
     for name, theirs, ours in zip(outcome.surfaces, shares_of(method.confusion), outcome.confusion, strict=True):

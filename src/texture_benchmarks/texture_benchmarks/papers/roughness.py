@@ -1,4 +1,4 @@
-"""Grades of textures never felt (Rispal, Rana & Duchaine), on simulated surfaces with the paper's grades and choice."""
+"""Roughness of unseen textures (Rispal, Rana & Duchaine), on simulated surfaces with the paper's grades."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
 from texture_benchmarks.papers.roughness_answers import Answers
 from texture_benchmarks.papers.roughness_charts import Series, coverage_chart, grades_chart
 from texture_benchmarks.papers.roughness_report import lines
-from texture_benchmarks.papers.roughness_scans import FORCE_N, SPEED_M_S, USED_S, Felt, Setup
-from texture_benchmarks.papers.roughness_tuning import TARGET_S, Tuned, tune
+from texture_benchmarks.papers.roughness_slides import FORCE_N, SPEED_M_S, USED_S, Setup, SimulatedTextures
+from texture_benchmarks.papers.roughness_tuning import TARGET_S, TunedRegressor, tune
 from texture_benchmarks.roughness.grade_latency import times_us
 from texture_estimation.roughness.grades import TEST, TRAIN, read_grades
 from texture_estimation.roughness.model import RoughnessModel
@@ -28,7 +28,7 @@ SCENE, GRADES = 'roughness', 'ets_roughness'
 SCANS, QUICK_SCANS = 200, 12
 OTHER_SCANS, QUICK_OTHER_SCANS = 50, 4
 SPLITS, QUICK_SPLITS = 20, 2
-QUICK_STEP = 8  # between the textures that the paper's heads have left out
+QUICK_STEP = 8  # between the textures that the paper's regressors have left out
 OURS = 'roughness'
 RECIPES = {'ANN1': 'ets-roughness-ann1', 'ANN5': 'ets-roughness-ann5', 'SVM5': 'ets-roughness-svm5', 'ours': OURS}
 # The paper's Table II: mean absolute error of textures learnt and not learnt, and standard deviation within a texture.
@@ -70,7 +70,7 @@ def run(experiment: Experiment) -> ExperimentResult:
         'one_person': ONE_PERSON,
         'targets': TARGETS,
         'always_the_middle': {part: float(np.abs(3.0 - one.true).mean()) for part, one in answers['ours'].items()},
-        'heads': {name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()},
+        'regressors': {name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()},
         'calibration': {name: model.card['calibration'] for name, model in models.items()},
         'other_conditions_unseen': {
             name: _other_conditions(setup, models[name], recipe, test) for name, recipe in recipes.items()
@@ -86,13 +86,13 @@ def run(experiment: Experiment) -> ExperimentResult:
         name='roughness',
         measured=(
             f'mean absolute error in grades of single windows of {USED_S} s, {SPEED_M_S} m/s, {FORCE_N} N; '
-            'windows to which a head gives no grade are counted apart'
+            'windows to which a regressor gives no grade are counted apart'
         ),
         data=(
             f'simulated: {len(setup.textures)} surfaces whose shape is guessed from the descriptions in the paper, '
             f"{setup.scans} scans each; grades: the paper's Table I, by people on the real textures"
         ),
-        split=f"by texture, the paper's: {len(train)} learnt, {len(test)} never felt",
+        split=f"by texture, the paper's: {len(train)} learnt, {len(test)} never touched",
         numbers=numbers,
         charts=_charts(setup, answers, numbers['ours_other_splits'], experiment),
         lines=tuple(lines(numbers, setup.grades)),
@@ -106,7 +106,7 @@ def _by_texture(parts: Mapping[str, Answers]) -> dict[str, dict[str, float]]:
 def _setup(experiment: Experiment) -> Setup:
     many = not experiment.quick
     return Setup(
-        Felt(load_scene(SCENE), experiment.seed),
+        SimulatedTextures(load_scene(SCENE), experiment.seed),
         read_grades(GRADES),
         SCANS if many else QUICK_SCANS,
         OTHER_SCANS if many else QUICK_OTHER_SCANS,
@@ -116,9 +116,9 @@ def _setup(experiment: Experiment) -> Setup:
     )
 
 
-def _tuned(setup: Setup, recipes: Mapping[str, RoughnessRecipe], experiment: Experiment) -> dict[str, Tuned]:
-    """Return the paper's heads after its search, and write their recipes; ours has nothing that is searched for."""
-    scans = setup.felt.scans(setup.grades.used_for(TRAIN), setup.scans, SPEED_M_S, FORCE_N)
+def _tuned(setup: Setup, recipes: Mapping[str, RoughnessRecipe], experiment: Experiment) -> dict[str, TunedRegressor]:
+    """Return the paper's regressors after its search, and write their recipes; ours has no search."""
+    scans = setup.simulated.scans(setup.grades.used_for(TRAIN), setup.scans, SPEED_M_S, FORCE_N)
     tuned = {name: tune(recipes[name], scans, setup.grades, experiment.seed, quick=experiment.quick) for name in PAPER}
     for name, one in tuned.items():
         one.write(experiment.out / f'{RECIPES[name]}.yaml')
@@ -126,7 +126,7 @@ def _tuned(setup: Setup, recipes: Mapping[str, RoughnessRecipe], experiment: Exp
 
 
 def _leave_one_out(setup: Setup, recipe: RoughnessRecipe) -> Answers:
-    """Return what is said of each texture by a model of all the others; in a hurry, of some by the paper's heads."""
+    """Return the grades of each texture by a model of all others; a quick run skips some of the paper's."""
     examples = _thinned(setup.examples(recipe, setup.textures), setup.other_scans)
     parts = []
     for texture in setup.textures[:: QUICK_STEP if setup.quick and recipe.name != OURS else 1]:
@@ -155,15 +155,15 @@ def _other_conditions(
 
 
 def _skids(setup: Setup, model: RoughnessModel, textures: Sequence[str]) -> dict[str, Any]:
-    """Return how many windows are refused, with skids and without, and what the grades are worth that are left."""
+    """Return how many windows are refused, with skids and without, and what the grades contribute that are left."""
     scene = load_scene(SCENE)
-    skidding = Felt(replace(scene, effects={**scene.effects, 'skids': Skids(SKIDS_PER_S)}), setup.seed)
+    skidding = SimulatedTextures(replace(scene, effects={**scene.effects, 'skids': Skids(SKIDS_PER_S)}), setup.seed)
     said: dict[str, Any] = {'per_s': SKIDS_PER_S}
-    for name, felt in (('with', skidding), ('without', setup.felt)):
-        one = replace(setup, felt=felt)
+    for name, simulated in (('with', skidding), ('without', setup.simulated)):
+        one = replace(setup, simulated=simulated)
         answers = one.ask(model, one.examples(model.recipe, textures, SPEED_M_S, FORCE_N))
-        vectors = model.recipe.feature_set.describe_many(
-            piece for texture in textures for piece in felt.pieces(texture, setup.scans, SPEED_M_S, FORCE_N)
+        vectors = model.recipe.feature_set.extract_many(
+            event for texture in textures for event in simulated.events(texture, setup.scans, SPEED_M_S, FORCE_N)
         )
         refused = np.array([bool(model.checks.refusal(vector)) for vector in vectors])
         errors = np.abs(answers.grades - answers.true)
@@ -185,8 +185,8 @@ def _other_splits(setup: Setup, recipe: RoughnessRecipe) -> dict[str, Any]:
     n_train = len(setup.grades.used_for(TRAIN))
     found, errors, shares = [], [], []
     for _ in range(setup.splits):
-        learnt = rng.permutation(setup.textures)[:n_train]
-        known = np.isin(examples.labels, learnt)
+        trained_on = rng.permutation(setup.textures)[:n_train]
+        known = np.isin(examples.labels, trained_on)
         said = setup.ask(train_grades(recipe, _rows(examples, known), setup.grades), _rows(examples, ~known))
         miss = np.abs(said.grades - said.true)
         found.append([float((miss <= norm.ppf(0.5 + share / 2.0) * said.stds).mean()) for share in NOMINAL])
@@ -203,7 +203,7 @@ def _other_splits(setup: Setup, recipe: RoughnessRecipe) -> dict[str, Any]:
 
 
 def _latency(setup: Setup, model: RoughnessModel, texture: str, count: int) -> dict[str, float]:
-    windows = list(setup.felt.pieces(texture, setup.other_scans, SPEED_M_S, FORCE_N))
+    windows = list(setup.simulated.events(texture, setup.other_scans, SPEED_M_S, FORCE_N))
     median, p99 = np.percentile(times_us(model, windows, count), (50, 99))
     return {'median': float(median), 'p99': float(p99)}
 

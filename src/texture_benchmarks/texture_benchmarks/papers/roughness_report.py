@@ -45,7 +45,7 @@ def _errors(numbers: Mapping[str, Any]) -> Iterator[str]:
         f'  {"":8}{"paper: learnt":>14}{"unseen":>14}{"here: learnt":>16}{"unseen":>14}{"no grade":>10}{"left out":>10}'
         '   90 % intervals hold: unseen, left out'
     )
-    for name, parts in numbers['heads'].items():
+    for name, parts in numbers['regressors'].items():
         paper = numbers['paper'].get(name, {})
         unseen, left = parts['unseen'], parts['left_out']
         said = [pair(paper.get(part), paper.get(f'std_{part}')) for part, _ in PARTS]
@@ -58,9 +58,9 @@ def _errors(numbers: Mapping[str, Any]) -> Iterator[str]:
     middle = numbers['always_the_middle']
     yield f'  always 3{"":28}{middle["seen"]:9.2f}{middle["unseen"]:14.2f}{"":17}{middle["left_out"]:10.2f}'
     yield f'  one person against the others, in another study: {numbers["one_person"]}'
-    errors = {name: parts['unseen']['error_of_the_mean'] for name, parts in numbers['heads'].items()}
-    told = ', '.join(f'{name} {number(error)}' for name, error in errors.items())
-    yield f'  standard error of the unseen mean, ten textures being ten opinions: {told}'
+    errors = {name: parts['unseen']['error_of_the_mean'] for name, parts in numbers['regressors'].items()}
+    reported = ', '.join(f'{name} {number(error)}' for name, error in errors.items())
+    yield f'  standard error of the unseen mean, ten textures being ten opinions: {reported}'
 
 
 def _textures(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:

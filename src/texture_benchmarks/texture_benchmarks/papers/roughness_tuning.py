@@ -1,22 +1,22 @@
-"""The paper's search for the parameters of its heads, on the textures that are learnt."""
+"""The paper's search for the parameters of its regressors, on the textures that are learnt."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from texture_benchmarks.papers import tuning
-from texture_benchmarks.papers.tuning import Tuned as TunedRecipe
+from texture_benchmarks.papers.tuning import TunedRecipe
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.recipe import RoughnessRecipe
-from texture_estimation.search.grading import Grading
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.scans import Scans
+from texture_estimation.search.roughness_task import RoughnessTask
+from texture_estimation.search.slide_arrays import SlideArrays
 
 TARGET_S = 15 * 60.0
 
 
-class Tuned(TunedRecipe[RoughnessRecipe]):
-    """A recipe of a head that was searched for, and what it took."""
+class TunedRegressor(TunedRecipe[RoughnessRecipe]):
+    """A recipe of a regressor that was searched for, and what it took."""
 
     def figures(self) -> dict[str, Any]:
         """Return what the search took, and the errors of the best; its score falls by a quarter for each grade off."""
@@ -25,10 +25,10 @@ class Tuned(TunedRecipe[RoughnessRecipe]):
         return {**figures, **errors}
 
 
-def tune(recipe: RoughnessRecipe, scans: Scans, grades: Grades, seed: int, *, quick: bool) -> Tuned:
+def tune(recipe: RoughnessRecipe, scans: SlideArrays, grades: Grades, seed: int, *, quick: bool) -> TunedRegressor:
     """Return the best recipe of the search space that is named like this one.
 
-    As in the paper, each half holds windows of every texture: the search is not told how a texture never felt fares.
+    As in the paper, each half holds windows of every texture: the search is not told how a texture never touched fares.
     """
-    found = tuning.tune(RecipeSpace.load(recipe.name, recipe), scans, Grading(grades), seed, quick=quick)
-    return Tuned(found.found, found.seconds, found.cpu_seconds, found.scans)
+    found = tuning.tune(RecipeSpace.load(recipe.name, recipe), scans, RoughnessTask(grades), seed, quick=quick)
+    return TunedRegressor(found.found, found.seconds, found.cpu_seconds, found.scans)

@@ -1,4 +1,4 @@
-"""Run a protocol: feel the slides, search for parameters if wanted, learn from some slides, judge the others."""
+"""Run a protocol: feel the slides, search for parameters if wanted, train on some slides, evaluate the others."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.papers.gather import Slides, gather
-from texture_benchmarks.papers.outcome import Outcome
-from texture_benchmarks.papers.protocol import Mask, Method, Outcomes, Protocol, Task
-from texture_benchmarks.papers.tuning import Tuned, tune
+from texture_benchmarks.papers.method_result import MethodResult
+from texture_benchmarks.papers.protocol import Mask, Method, MethodResults, Protocol, RecognitionTask
+from texture_benchmarks.papers.simulated_trials import Slides, gather
+from texture_benchmarks.papers.tuning import TunedRecipe, tune
 from texture_core.errors import InvalidParameter
 from texture_estimation.learners.learner import Codes
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.fitness import decided_by_slide
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.telling_apart import TellingApart
 from texture_evaluation.optimise import OF_RECIPES
 from texture_features.feature_set import InputFeatures
-from texture_features.windowing.stretch import Stretched
+from texture_features.windowing.time_stretch import Stretched
 from texture_simulation.scene import Scene
 
 FAST, SLOW = 'signal', 'signal_static'
-TunedRecipes = Mapping[tuple[str, str], Tuned[Recipe]]  # by task and recipe
+TunedRecipes = Mapping[tuple[str, str], TunedRecipe[Recipe]]  # by task and recipe
 NONE: TunedRecipes = {}
 
 
-def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE) -> Outcomes:
+def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE) -> MethodResults:
     """Return what comes out of each method in each task."""
     return {
         (task.name, method): outcome
@@ -39,23 +39,23 @@ def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned:
 
 
 def of_task(
-    protocol: Protocol, task: Task, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE
-) -> Iterator[tuple[str, Outcome]]:
+    protocol: Protocol, task: RecognitionTask, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE
+) -> Iterator[tuple[str, MethodResult]]:
     """Yield what comes out of each method in one task.
 
-    One with a recipe that was searched for is tried on the first division alone: in the others it would be tested on
+    One with a recipe that was searched for is tried on the first split alone: in the others it would be tested on
     slides that the search has seen.
     """
-    slides, learnt = _felt(protocol, task, scene, seed, quick=quick)
+    slides, trained_on = _measured(protocol, task, scene, seed, quick=quick)
     for method in task.methods:
         found = tuned.get((task.name, method.recipe))
         recipe = found.recipe if found else recipe_of(method)
-        divisions = learnt[:1] if found else learnt[: method.divisions or None]
-        yield method.name, judge(recipe, slides, divisions, method.views, singly=method.singly)
+        splits = trained_on[:1] if found else trained_on[: method.splits or None]
+        yield method.name, evaluate_method(recipe, slides, splits, method.views, singly=method.singly)
 
 
 def searched(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> TunedRecipes:
-    """Return the recipes for which the paper has a genetic search, found on what the first division learns from.
+    """Return the recipes for which the paper has a genetic search, found on what the first split is trained on.
 
     Raises
     ------
@@ -74,14 +74,16 @@ def searched(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> Tun
         )
     found = {}
     for key, (task, method) in methods.items():
-        slides, learnt = _felt(protocol, task, scene, seed, quick=quick)
+        slides, trained_on = _measured(protocol, task, scene, seed, quick=quick)
         space = RecipeSpace.load(OF_RECIPES[method.recipe], recipe_of(method))
-        found[key] = tune(space, slides.views[0].of(learnt[0]), TellingApart(), seed, quick=quick)
+        found[key] = tune(space, slides.views[0].of(trained_on[0]), ClassificationTask(), seed, quick=quick)
     return found
 
 
-def _felt(protocol: Protocol, task: Task, scene: Scene, seed: int, *, quick: bool) -> tuple[Slides, Mask]:
-    """Return the slides of a task, and which of them each division learns from."""
+def _measured(
+    protocol: Protocol, task: RecognitionTask, scene: Scene, seed: int, *, quick: bool
+) -> tuple[Slides, Mask]:
+    """Return the slides of a task, and which of them each split is trained on."""
     task = reduced(task, protocol.quick_count) if quick else task
     slow = any(SLOW in recipe_of(method).feature_set.topics for method in task.methods)
     slides = gather(scene, task, seed, slow=slow)
@@ -124,36 +126,38 @@ def _with_parameters(feature: Any, parameters: Mapping[str, Any]) -> Any:
     return replace(feature, **parameters)
 
 
-def judge(recipe: Recipe, slides: Slides, learnt: Mask, views: Sequence[int] = (), *, singly: bool = False) -> Outcome:
-    """Learn from the slides of each division and judge all.
+def evaluate_method(
+    recipe: Recipe, slides: Slides, trained_on: Mask, views: Sequence[int] = (), *, singly: bool = False
+) -> MethodResult:
+    """Learn from the slides of each split and evaluate all.
 
     Parameters
     ----------
     recipe
-        What learns and judges.
+        What learns and classifies.
     slides
-        What was felt.
-    learnt : (n_divisions, n_slides)
-        Which are learnt from.
+        What was measured.
+    trained_on : (n_divisions, n_slides)
+        Which are used for training.
     views
         Which views of the slides are used; () for all.
     singly
         See `Method`.
     """
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
-    taught, owner = slides.describe(to_learn, views)
-    asked, slide = slides.describe(recipe.feature_set, views)
+    trained, owner = slides.extract(to_learn, views)
+    asked, slide = slides.extract(recipe.feature_set, views)
     windows = recipe.feature_set.windows
-    decided = np.empty(learnt.shape, dtype=np.intp)
-    rows_of = _halves_of_windows(owner, len(learnt)) if singly else learnt[:, owner]
+    decided = np.empty(trained_on.shape, dtype=np.intp)
+    rows_of = _halves_of_windows(owner, len(trained_on)) if singly else trained_on[:, owner]
     began = time.perf_counter()
     for number, rows in enumerate(rows_of):
-        fitted = recipe.learner.fit(taught[rows], slides.codes[owner[rows]], owner[rows])
-        scores = recipe.learner.array_form(fitted.parts)(asked)
+        fitted = recipe.learner.fit(trained[rows], slides.codes[owner[rows]], owner[rows])
+        scores = recipe.learner.predictor(fitted.parameters)(asked)
         decided[number], _ = decided_by_slide(scores, slide, recipe.evidence, windows.hop_s / windows.length_s)
-    taken_s = (time.perf_counter() - began) / len(learnt)
-    known = np.zeros_like(learnt) if singly else learnt
-    return Outcome(slides.surfaces, slides.codes, slides.conditions, decided, known, taken_s, fitted.note)
+    taken_s = (time.perf_counter() - began) / len(trained_on)
+    known = np.zeros_like(trained_on) if singly else trained_on
+    return MethodResult(slides.surfaces, slides.codes, slides.conditions, decided, known, taken_s, fitted.note)
 
 
 def _halves_of_windows(owner: Codes, count: int) -> Mask:
@@ -161,7 +165,7 @@ def _halves_of_windows(owner: Codes, count: int) -> Mask:
     return np.stack([rng.permutation(len(owner)) < len(owner) // 2 for _ in range(count)])
 
 
-def reduced(task: Task, count: int) -> Task:
+def reduced(task: RecognitionTask, count: int) -> RecognitionTask:
     """Return the task with fewer slides: so many over each surface, as equally as may be among the visits."""
     each = max(1, count // len(task.visits))
     visits = tuple(replace(visit, count=min(visit.count, each)) for visit in task.visits)

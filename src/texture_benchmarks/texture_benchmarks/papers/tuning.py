@@ -10,23 +10,23 @@ from typing import Any, Generic
 import yaml
 
 from texture_core.errors import InvalidParameter
-from texture_estimation.search.division import Division
 from texture_estimation.search.genetic_search import SearchParams
-from texture_estimation.search.optimise import Optimised, optimise
+from texture_estimation.search.optimise import SearchResult, optimise
+from texture_estimation.search.parallel import threaded_map
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.scans import Scans
-from texture_estimation.search.spread import over_cores
-from texture_estimation.search.task import R, Task
+from texture_estimation.search.search_slides import SearchSlides
+from texture_estimation.search.search_task import R, SearchTask
+from texture_estimation.search.slide_arrays import SlideArrays
 
 FULL = SearchParams()  # 20 individuals, 30 generations, 20 halves: the paper's
 QUICK = SearchParams(population=4, generations=2, halves=2, finalists=1)
 
 
 @dataclass(frozen=True, eq=False)
-class Tuned(Generic[R]):
+class TunedRecipe(Generic[R]):
     """A recipe that was searched for, and what it took."""
 
-    found: Optimised[R]
+    found: SearchResult[R]
     seconds: float
     cpu_seconds: float
     scans: int
@@ -44,7 +44,7 @@ class Tuned(Generic[R]):
             'cpu_seconds': round(self.cpu_seconds, 1),  # of all cores: what a busy machine would have needed alone
             'scans': self.scans,
             'generations': len(history),
-            'individuals_tried': history[-1].judged,
+            'individuals_tried': history[-1].evaluated,
             'halves_judged': history[-1].halves,
             'learning': float(record.learning.mean()),
             'test': float(record.test.mean()),
@@ -61,10 +61,10 @@ class Tuned(Generic[R]):
         return path
 
 
-def tune(space: RecipeSpace[R], scans: Scans, task: Task[R], seed: int, *, quick: bool) -> Tuned[R]:
+def tune(space: RecipeSpace[R], scans: SlideArrays, task: SearchTask[R], seed: int, *, quick: bool) -> TunedRecipe[R]:
     """Return the best recipe of a space on these scans, and what it took to find it."""
     params = replace(QUICK if quick else FULL, seed=seed)
     began, cpu_began = time.perf_counter(), time.process_time()
-    with over_cores() as spread:
-        found = optimise(space, Division(scans, params.halves, seed), params, task, spread=spread)
-    return Tuned(found, time.perf_counter() - began, time.process_time() - cpu_began, len(scans.labels))
+    with threaded_map() as parallel_map:
+        found = optimise(space, SearchSlides(scans, params.halves, seed), params, task, parallel_map=parallel_map)
+    return TunedRecipe(found, time.perf_counter() - began, time.process_time() - cpu_began, len(scans.labels))

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from texture_benchmarks.recipes.trial import LENGTH_S, Division, Recorded
+from texture_benchmarks.recipes.trial import LENGTH_S, SlideSignals, Split
 from texture_core.arrays import AnyArray, Array
 from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
 
 ABSENT = 'not measured: aeon is not installed (pip install aeon)'
-# Of the ridge, tried on a fifth of the slides to learn from; the transform's values have unit variance.
+# Of the ridge, tried on a fifth of the slides for training; the transform's values have unit variance.
 ALPHAS = (10.0, 1000.0, 100_000.0)
 VOTING_WINDOWS = round(5.0 / LENGTH_S)  # and no more, as in the figures published with the data
 TIMED = 200
@@ -34,27 +34,28 @@ def installed() -> bool:
 
 
 def try_minirocket(
-    recorded: Sequence[Recorded], divisions: Sequence[Division], seed: int, length_s: float = LENGTH_S, every: int = 1
+    slide_signals: Sequence[SlideSignals], folds: Sequence[Split], seed: int, length_s: float = LENGTH_S, every: int = 1
 ) -> dict[str, Any]:
     """Return the figures of MiniRocket on the vibration, the vote being one window, one vote.
 
     Parameters
     ----------
-    recorded, divisions
-        Slides, and which of them are learnt from and tested on.
+    slide_signals, folds
+        Slides, and which of them are used for training and tested on.
     seed
         Of its kernels.
     length_s
         Of the windows, which begin LENGTH_S apart.
     every
-        Of the windows of the slides to learn from, every so many-th is learnt from: the time grows with the square.
+        Of the windows of the slides for training, every so many-th is used for training: the time grows with the
+        square.
     """
     transform = import_module('aeon.transformations.collection.convolution_based').MiniRocket
-    windows = _cut(recorded, length_s)
+    windows = _cut(slide_signals, length_s)
     right, voted, taken = [], [], []
-    for learnt, tested in divisions:
+    for training, tested in folds:
         start = time.process_time()
-        rows = np.flatnonzero(np.isin(windows.slides, list(learnt)))[::every]
+        rows = np.flatnonzero(np.isin(windows.slides, list(training)))[::every]
         held = np.isin(windows.slides, list(tested))
         rocket = transform(random_state=seed).fit(windows.samples[rows])
         ridge = _Ridge.fit(rocket.transform(windows.samples[rows]), windows.labels[rows], windows.slides[rows])
@@ -79,13 +80,13 @@ class _Windows:
     slides: AnyArray
 
 
-def _cut(recorded: Sequence[Recorded], length_s: float) -> _Windows:
+def _cut(slide_signals: Sequence[SlideSignals], length_s: float) -> _Windows:
     params = WindowParams(length_s=length_s, hop_s=LENGTH_S)
     found = [
-        (piece.windows['signal'].samples[:, 0], item.slide.surface, item.slide.name)
-        for item in recorded
-        for piece in cut_recording({'signal': item.signals['signal']}, item.states, params)
-        if isinstance(piece, CutWindow)
+        (event.windows['signal'].samples[:, 0], item.slide.surface, item.slide.name)
+        for item in slide_signals
+        for event in cut_recording({'signal': item.signals['signal']}, item.states, params)
+        if isinstance(event, CutWindow)
     ]
     samples, labels, slides = zip(*found, strict=True)
     return _Windows(np.stack(samples)[:, None].astype(np.float32), np.array(labels), np.array(slides))

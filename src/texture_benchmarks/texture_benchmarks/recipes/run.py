@@ -12,28 +12,28 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from texture_benchmarks.forked import each_on_a_core
+from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.recipes import minirocket
 from texture_benchmarks.recipes.table import recipe_table
 from texture_benchmarks.recipes.trial import (
     LENGTH_S,
-    Division,
-    Recorded,
+    SlideSignals,
+    Split,
+    chronological_split,
     comparable,
-    describe_all,
-    division_by_time,
-    divisions_by,
+    evaluate_extracted,
     every,
+    extract_all,
     latency_us,
-    random_divisions,
-    read_recorded,
-    try_described,
+    random_splits,
+    read_slide_signals,
+    splits_by,
 )
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData
 from texture_core.resources import folder
-from texture_estimation.model import Model
+from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import front_chart
 from texture_evaluation.train import with_channels
@@ -44,8 +44,8 @@ DATA = {
     'biotac20': 'BioTac, 20 materials × 40 slides of 6 s (github dexrob/BioTac_slide_20_50, Gao et al. 2020)',
     'ntp21': 'MEMS array of 9 taxels, 21 textures × 4 speeds × 4 forces, one slide each (github LIMB-UCF/NTP)',
 }
-RATE_HZ, FOLDS, LAST_LEARNT = 1000.0, 5, 30
-QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_LEARNT = ('material01', 'material02', 'material03'), '1-6', 2, 4
+RATE_HZ, FOLDS, LAST_TRAINED = 1000.0, 5, 30
+QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_TRAINED = ('material01', 'material02', 'material03'), '1-6', 2, 4
 QUICK_FASTER_M_S = 0.05
 QUICK_RECIPES = ('default', 'ets-linear-svm-vote', 'kaboli-pa', 'jamali-naive-bayes-5, overlapping')
 NEAREST = {'ties': 'nearest'}
@@ -53,9 +53,9 @@ OVERLAPPING_S = 0.25  # apart, by half
 LATER = 'by time'
 SPLITS: Mapping[str, str] = {
     'random': f'{FOLDS} folds by slide',
-    LATER: f'learnt from slides 1-{LAST_LEARNT} of each surface, tested on the later ones',
-    'one force out': 'each in turn is tested and not learnt from',
-    'one speed out': 'each in turn is tested and not learnt from',
+    LATER: f'trained on slides 1-{LAST_TRAINED} of each surface, tested on the later ones',
+    'one force out': 'each in turn is tested and held out',
+    'one speed out': 'each in turn is tested and held out',
 }
 MINIROCKET = 'MiniRocket'
 SLOW = re.compile('-ann|MiniRocket')
@@ -84,7 +84,7 @@ class Variant:
     learner
         Settings of its learner.
     apart_s
-        How far apart the windows learnt from begin; those tested stay as they are.
+        How far apart the training windows begin; those tested stay as they are.
     """
 
     learner: Mapping[str, Any] = field(default_factory=dict)
@@ -101,7 +101,7 @@ VARIANTS: Mapping[str, Variant] = {
     'hu-pca-svm, 99 % of the variance': Variant({'variance': 0.99, 'gamma': 1.0, 'c': 10.0}),
     'jamali-naive-bayes-5, overlapping': Variant(apart_s=OVERLAPPING_S),
 }
-# They describe what only an array of taxels feels.
+# They describe what only an array of taxels measures.
 NEEDS_ARRAY = frozenset({'any-speed'})
 # What is tried on one kind of data alone: windows overlap where the published figures are.
 PLACES: Mapping[str, str] = {
@@ -112,11 +112,11 @@ PLACES: Mapping[str, str] = {
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Slides of one data set as all recipes get them, and how they are divided into those learnt from and tested.
+    """Slides of one data set as all recipes get them, and how they are divided into those trained on and tested.
 
     Parameters
     ----------
-    recorded
+    slide_signals
         All slides.
     splits
         Divisions by the name of the split.
@@ -126,8 +126,8 @@ class Setting:
         Whether recipes may use speed and force.
     """
 
-    recorded: Sequence[Recorded]
-    splits: Mapping[str, Sequence[Division]]
+    slide_signals: Sequence[SlideSignals]
+    splits: Mapping[str, Sequence[Split]]
     rate_hz: float
     of_motion: bool
 
@@ -136,165 +136,168 @@ class Setting:
         recipe = load_recipe(name.partition(', ')[0])
         learner: Any = recipe.learner
         recipe = replace(recipe, learner=replace(learner, **VARIANTS.get(name, SHIPPED).learner))
-        whole = set(recipe.feature_set.topics) <= set(self.recorded[0].signals)
+        whole = set(recipe.feature_set.topics) <= set(self.slide_signals[0].signals)
         return comparable(with_channels(recipe, 'all' if whole else 'fast'), self.rate_hz, of_motion=self.of_motion)
 
 
-class _Job(NamedTuple):
+class _RecipeJob(NamedTuple):
     setting: str
     recipes: tuple[str, ...]
 
 
-class _Tried(NamedTuple):
-    """The figures of one recipe by split, and the model of the last division; None for what is no recipe of ours."""
+class _RecipeFigures(NamedTuple):
+    """The figures of one recipe by split, and the model of the last split; None for what is no recipe of ours."""
 
     figures: dict[str, dict[str, Any]]
-    model: Model | None
+    model: TextureModel | None
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Try all shipped recipes, and variants of some, on all recorded data sets that are there."""
-    numbers = _numbers(_settings(bench), (*_shipped(bench), *(() if bench.quick else VARIANTS)), bench)
-    bench.out.mkdir(parents=True, exist_ok=True)
-    (bench.out / 'recipes.md').write_text(recipe_table(numbers), encoding='utf-8')
-    return result_of('recipes', numbers, bench)
+    numbers = _numbers(_settings(options), (*_shipped(options), *(() if options.quick else VARIANTS)), options)
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / 'recipes.md').write_text(recipe_table(numbers), encoding='utf-8')
+    return result_of('recipes', numbers, options)
 
 
-def run_later(bench: Bench) -> BenchResult:
+def run_later(options: BenchmarkOptions) -> BenchmarkResult:
     """Try the shipped ones on the vibration of later slides alone, in a sixth of the time."""
-    setting = biotac20_settings(bench)[VIBRATION]
+    setting = biotac20_settings(options)[VIBRATION]
     later = replace(setting, splits={LATER: setting.splits[LATER]})
-    return result_of('recipes_later', _numbers({VIBRATION: later}, _shipped(bench), bench), bench)
+    return result_of('recipes_later', _numbers({VIBRATION: later}, _shipped(options), options), options)
 
 
-def _shipped(bench: Bench) -> Sequence[str]:
-    if bench.quick:
+def _shipped(options: BenchmarkOptions) -> Sequence[str]:
+    if options.quick:
         return QUICK_RECIPES
     return sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 
 
-def _numbers(settings: Mapping[str, Setting], names: Sequence[str], bench: Bench) -> dict[str, Any]:
+def _numbers(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> dict[str, Any]:
     numbers: dict[str, Any] = {name: {split: {} for split in setting.splits} for name, setting in settings.items()}
-    jobs = _jobs(settings, names, bench)
-    for job, tried in zip(jobs, each_on_a_core(partial(_try, settings, bench.seed), jobs), strict=True):
+    jobs = _jobs(settings, names, options)
+    for job, tried in zip(jobs, map_forked(partial(_try, settings, options.seed), jobs), strict=True):
         for name, (of_splits, model) in tried.items():
             for split, figures in of_splits.items():
                 numbers[job.setting][split][name] = figures
             if model:
                 setting = settings[job.setting]
-                latency = latency_us(setting.recipe(name), model, setting.recorded)
+                latency = latency_us(setting.recipe(name), model, setting.slide_signals)
                 for figures in of_splits.values():
                     figures['latency_us'] = latency
     return numbers
 
 
-def result_of(name: str, numbers: Mapping[str, Any], bench: Bench) -> BenchResult:
+def result_of(name: str, numbers: Mapping[str, Any], options: BenchmarkOptions) -> BenchmarkResult:
     """Draw the chart of the figures by setting, split and recipe, and return all as a result."""
     sets = {setting.partition(',')[0] for setting in numbers}
     splits = {split for of_setting in numbers.values() for split in of_setting}
-    return BenchResult(
+    return BenchmarkResult(
         name=name,
         measured=(
             'share of single windows recognised; share of slides after so much sliding; share unclassified; mean '
             'computing time of a training (s); time from window to estimate (µs). Windows of '
-            f'{LENGTH_S} s that do not overlap, learnt from as tested; recipes that vote over shorter parts keep '
-            f'those, and learn from parts {LENGTH_S} s apart; recipes named "overlapping" learn from windows '
+            f'{LENGTH_S} s that do not overlap, trained on as tested; recipes that vote over shorter parts keep '
+            f'those, and train on parts {LENGTH_S} s apart; recipes named "overlapping" train on windows '
             f'{OVERLAPPING_S} s apart. Recipes as shipped, but on biotac20 without speed, force '
             'and stretching: there they belong to the session and not to the surface'
         ),
         data='; '.join(text for name, text in DATA.items() if name in sets),
         split='; '.join(f'{split}: {text}' for split, text in SPLITS.items() if split in splits),
-        numbers={'references': REFERENCES, 'MiniRocket': _note(bench), **numbers},
-        charts=(_chart(numbers, bench.out / f'{name}.png'),),
+        numbers={'references': REFERENCES, 'MiniRocket': _note(options), **numbers},
+        charts=(_chart(numbers, options.out / f'{name}.png'),),
     )
 
 
-def _settings(bench: Bench) -> dict[str, Setting]:
-    builders: Mapping[str, Callable[[Bench], dict[str, Setting]]] = {'biotac20': biotac20_settings, 'ntp21': _ntp21}
-    present = [name for name in builders if bench.data and (bench.data / name).is_dir()]
+def _settings(options: BenchmarkOptions) -> dict[str, Setting]:
+    builders: Mapping[str, Callable[[BenchmarkOptions], dict[str, Setting]]] = {
+        'biotac20': biotac20_settings,
+        'ntp21': _ntp21,
+    }
+    present = [name for name in builders if options.data and (options.data / name).is_dir()]
     if not present:
         raise InvalidData(
-            f"no recorded data in '{bench.data or 'no folder'}'; give the folder of biotac20/ with --data"
+            f"no recorded data in '{options.data or 'no folder'}'; give the folder of biotac20/ with --data"
         )
     settings: dict[str, Setting] = {}
     for name in present:
-        settings |= builders[name](bench)
+        settings |= builders[name](options)
     return settings
 
 
-def biotac20_settings(bench: Bench) -> dict[str, Setting]:
+def biotac20_settings(options: BenchmarkOptions) -> dict[str, Setting]:
     """Return the vibration alone and all channels of the BioTac's slides."""
-    some = (QUICK_SLIDES, QUICK_MATERIALS) if bench.quick else ()
-    with imported(bench, 'biotac20', *some) as bags:
-        recorded = read_recorded(bags)
-    slides = [item.slide for item in recorded]
-    by_time = {LATER: division_by_time(slides, QUICK_LAST_LEARNT if bench.quick else LAST_LEARNT)}
-    rng = np.random.default_rng(bench.seed)
-    at_random = {'random': random_divisions(slides, QUICK_FOLDS if bench.quick else FOLDS, rng)}
-    vibration = [item.at_rate('signal', RATE_HZ) for item in recorded]
+    some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
+    with imported(options, 'biotac20', *some) as bags:
+        slide_signals = read_slide_signals(bags)
+    slides = [item.slide for item in slide_signals]
+    by_time = {LATER: chronological_split(slides, QUICK_LAST_TRAINED if options.quick else LAST_TRAINED)}
+    rng = np.random.default_rng(options.seed)
+    at_random = {'random': random_splits(slides, QUICK_FOLDS if options.quick else FOLDS, rng)}
+    vibration = [item.at_rate('signal', RATE_HZ) for item in slide_signals]
     return {
         VIBRATION: Setting(vibration, {**at_random, **by_time}, RATE_HZ, of_motion=False),
-        ALL_CHANNELS: Setting(recorded, by_time, 2200.0, of_motion=False),
+        ALL_CHANNELS: Setting(slide_signals, by_time, 2200.0, of_motion=False),
     }
 
 
-def _ntp21(bench: Bench) -> dict[str, Setting]:
-    with imported(bench, 'ntp21') as bags:
-        recorded = read_recorded(bags[:3] if bench.quick else bags)
-    if bench.quick:  # fast slides are the short ones
-        recorded = [item for item in recorded if item.states[0].speed_m_s > QUICK_FASTER_M_S]
-    first = {item.slide.name: item.states[0] for item in recorded}
+def _ntp21(options: BenchmarkOptions) -> dict[str, Setting]:
+    with imported(options, 'ntp21') as bags:
+        slide_signals = read_slide_signals(bags[:3] if options.quick else bags)
+    if options.quick:  # fast slides are the short ones
+        slide_signals = [item for item in slide_signals if item.states[0].speed_m_s > QUICK_FASTER_M_S]
+    first = {item.slide.name: item.states[0] for item in slide_signals}
     splits = {
-        'one force out': divisions_by({name: state.force_n for name, state in first.items()}),
-        'one speed out': divisions_by({name: round(state.speed_m_s, 3) for name, state in first.items()}),
+        'one force out': splits_by({name: state.force_n for name, state in first.items()}),
+        'one speed out': splits_by({name: round(state.speed_m_s, 3) for name, state in first.items()}),
     }
-    if bench.quick:
-        splits = {name: divisions[:1] for name, divisions in splits.items()}
-    rate_hz = recorded[0].signals['signal'][0].sampling_rate_hz
-    return {ARRAY: Setting(recorded, splits, rate_hz, of_motion=True)}
+    if options.quick:
+        splits = {name: folds[:1] for name, folds in splits.items()}
+    rate_hz = slide_signals[0].signals['signal'][0].sampling_rate_hz
+    return {ARRAY: Setting(slide_signals, splits, rate_hz, of_motion=True)}
 
 
-def _jobs(settings: Mapping[str, Setting], names: Sequence[str], bench: Bench) -> list[_Job]:
+def _jobs(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> list[_RecipeJob]:
     """Return what is tried; recipes with the same windows and features together: they are described once."""
     groups: dict[tuple[str, FeatureSet, float], list[str]] = {}
     for setting, name in product(settings, names):
         if PLACES.get(name, setting) == setting:
             apart_s = VARIANTS.get(name, SHIPPED).apart_s
             groups.setdefault((setting, settings[setting].recipe(name).feature_set, apart_s), []).append(name)
-    jobs = [_Job(setting, tuple(group)) for (setting, *_), group in groups.items()]
-    if not bench.quick and minirocket.installed() and VIBRATION in settings:
-        jobs.append(_Job(VIBRATION, (MINIROCKET,)))
+    jobs = [_RecipeJob(setting, tuple(group)) for (setting, *_), group in groups.items()]
+    if not options.quick and minirocket.installed() and VIBRATION in settings:
+        jobs.append(_RecipeJob(VIBRATION, (MINIROCKET,)))
     # What takes long first, so that no core waits at the end.
     trainings = {name: sum(map(len, setting.splits.values())) for name, setting in settings.items()}
     return sorted(jobs, key=lambda job: (not any(map(SLOW.search, job.recipes)), -trainings[job.setting]))
 
 
-def _try(settings: Mapping[str, Setting], seed: int, job: _Job) -> dict[str, _Tried]:
+def _try(settings: Mapping[str, Setting], seed: int, job: _RecipeJob) -> dict[str, _RecipeFigures]:
     setting = settings[job.setting]
     if job.recipes == (MINIROCKET,):
         figures = {
-            name: minirocket.try_minirocket(setting.recorded, divisions, seed)
-            for name, divisions in setting.splits.items()
+            name: minirocket.try_minirocket(setting.slide_signals, folds, seed)
+            for name, folds in setting.splits.items()
         }
-        return {MINIROCKET: _Tried(figures, None)}
+        return {MINIROCKET: _RecipeFigures(figures, None)}
     recipes = {name: setting.recipe(name) for name in job.recipes}
     first = recipes[job.recipes[0]]
     apart_s = VARIANTS.get(job.recipes[0], SHIPPED).apart_s
-    lessons = describe_all(every(apart_s, first), setting.recorded) if apart_s < LENGTH_S else None
-    described = describe_all(first, setting.recorded)
+    added_slides = extract_all(every(apart_s, first), setting.slide_signals) if apart_s < LENGTH_S else None
+    extracted = extract_all(first, setting.slide_signals)
     tried = {}
     for name, recipe in recipes.items():
         outcomes = {
-            split: try_described(recipe, described, divisions, lessons, apart_s)
-            for split, divisions in setting.splits.items()
+            split: evaluate_extracted(recipe, extracted, folds, added_slides, apart_s)
+            for split, folds in setting.splits.items()
         }
         *_, last = outcomes.values()
-        tried[name] = _Tried({split: outcome.numbers() for split, outcome in outcomes.items()}, last.model)
+        tried[name] = _RecipeFigures({split: outcome.numbers() for split, outcome in outcomes.items()}, last.model)
     return tried
 
 
-def _note(bench: Bench) -> str:
-    if bench.quick:
+def _note(options: BenchmarkOptions) -> str:
+    if options.quick:
         return 'not measured in a quick run'
     return 'measured' if minirocket.installed() else minirocket.ABSENT
 

@@ -1,4 +1,4 @@
-"""Recipes side by side on the same recorded slides: cut, described, learnt and judged by the code of the robot."""
+"""Recipes side by side on the same recorded slides: cut, described, learnt and evaluated by the code of the robot."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from texture_core.exploration import ExplorationState
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.classification.training import train
-from texture_estimation.evidence import Evidence
-from texture_estimation.model import Model
+from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_evaluation import metrics
-from texture_evaluation.evaluate import judge
+from texture_evaluation.evaluate import run_model
 from texture_evaluation.metrics import SlideResult
 from texture_features.feature import Feature
 from texture_features.feature_set import InputFeatures
@@ -31,32 +31,32 @@ from texture_features.features.force import Force
 from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.speed import Speed
 from texture_features.labelled_features import LabelledFeatures
-from texture_features.windowing.stretch import Stretched
-from texture_features.windowing.windows import Piece, WindowParams, cut_recording
-from texture_recordings.slides import STREAMS, Slide, find_slides, read_slides
+from texture_features.windowing.time_stretch import Stretched
+from texture_features.windowing.windows import WindowEvent, WindowParams, cut_recording
+from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, read_slides
 
-# Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and learns from
+# Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and is trained on
 # windows this far apart.
 LENGTH_S = 0.5
 TIMED_SLIDES = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class SlideSignals:
     """One slide in memory."""
 
-    slide: Slide
+    slide: LabelledSlide
     signals: Mapping[str, Sequence[TactileSignal]]
     states: Sequence[ExplorationState]
-    _cut: dict[tuple[WindowParams, tuple[str, ...]], list[Piece]] = dataclasses.field(
+    _cut: dict[tuple[WindowParams, tuple[str, ...]], list[WindowEvent]] = dataclasses.field(
         default_factory=dict, init=False, repr=False
     )
 
-    def at_rate(self, topic: str, rate_hz: float) -> Recorded:
+    def at_rate(self, topic: str, rate_hz: float) -> SlideSignals:
         """Return the slide with one topic brought to another rate, stretch by stretch between losses."""
         return dataclasses.replace(self, signals={topic: _at_rate(self.signals[topic], rate_hz)})
 
-    def cut(self, recipe: Recipe) -> list[Piece]:
+    def cut(self, recipe: Recipe) -> list[WindowEvent]:
         """Return the windows that a recipe asks for, and the end."""
         features = recipe.feature_set
         missing = [topic for topic in features.topics if topic not in self.signals]
@@ -71,22 +71,22 @@ class Recorded:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """How a recipe did on slides it had not seen, over all the divisions tried.
+class RecipeResult:
+    """How a recipe did on slides it had not seen, over all the splits tried.
 
     Parameters
     ----------
     results
-        What was said of each slide when it was not learnt from.
+        What was said of each slide when it was held out.
     train_s
         Computing time of each training, from described windows to a model.
     model
-        Of the last division.
+        Of the last split.
     """
 
     results: Sequence[SlideResult]
     train_s: Sequence[float]
-    model: Model
+    model: TextureModel
 
     def numbers(self) -> dict[str, Any]:
         """Return the figures of one cell of the table."""
@@ -100,11 +100,11 @@ class Outcome:
         }
 
 
-Described = Mapping[Slide, Sequence[FeatureVector]]
-Division = tuple[frozenset[str], frozenset[str]]  # names of the slides learnt from, and tested on
+Described = Mapping[LabelledSlide, Sequence[FeatureVector]]
+Split = tuple[frozenset[str], frozenset[str]]  # names of the training slides, and tested on
 
 
-def read_recorded(bags: Iterable[str | Path], streams: Sequence[str] = STREAMS) -> list[Recorded]:
+def read_slide_signals(bags: Iterable[str | Path], streams: Sequence[str] = STREAMS) -> list[SlideSignals]:
     """Return the labelled slides of bags with all messages of some streams."""
     return [_recorded(*read) for read in read_slides(find_slides(bags), streams)]
 
@@ -141,104 +141,104 @@ def every(hop_s: float, recipe: Recipe) -> Recipe:
     return dataclasses.replace(recipe, feature_set=feature_set)
 
 
-def try_recipe(recipe: Recipe, recorded: Sequence[Recorded], divisions: Sequence[Division]) -> Outcome:
-    """Train and test a recipe on each division of the slides."""
-    return try_described(recipe, describe_all(recipe, recorded), divisions)
+def try_recipe(recipe: Recipe, slide_signals: Sequence[SlideSignals], folds: Sequence[Split]) -> RecipeResult:
+    """Train and test a recipe on each split of the slides."""
+    return evaluate_extracted(recipe, extract_all(recipe, slide_signals), folds)
 
 
-def describe_all(recipe: Recipe, recorded: Sequence[Recorded]) -> Described:
+def extract_all(recipe: Recipe, slide_signals: Sequence[SlideSignals]) -> Described:
     """Return the features of all windows of all slides."""
-    return {item.slide: describe(recipe, item) for item in recorded}
+    return {item.slide: extract_features(recipe, item) for item in slide_signals}
 
 
-def try_described(
+def evaluate_extracted(
     recipe: Recipe,
-    described: Described,
-    divisions: Sequence[Division],
-    lessons: Described | None = None,
+    extracted: Described,
+    folds: Sequence[Split],
+    added_slides: Described | None = None,
     apart_s: float = LENGTH_S,
-) -> Outcome:
-    """Train and test a recipe on each division of slides that it has described.
+) -> RecipeResult:
+    """Train and test a recipe on each split of slides that it has described.
 
     Parameters
     ----------
-    recipe, described, divisions
+    recipe, extracted, folds
         What to learn, from which slides, and which to test it on.
-    lessons
-        The same slides in the windows to learn from, where these are others than those to test.
+    added_slides
+        The same slides in the windows for training, where these are others than those to test.
     apart_s
-        How far apart the windows learnt from begin at least.
+        How far apart the training windows begin at least.
     """
     results: list[SlideResult] = []
     taken: list[float] = []
-    for learnt, tested in divisions:
-        windows = (described if lessons is None else lessons).items()
-        examples = examples_of({slide: vectors for slide, vectors in windows if slide.name in learnt}, apart_s)
+    for training, tested in folds:
+        windows = (extracted if added_slides is None else added_slides).items()
+        examples = examples_of({slide: vectors for slide, vectors in windows if slide.name in training}, apart_s)
         start = time.process_time()
         model = train(recipe, examples)
         taken.append(time.process_time() - start)
-        results += [_judged(model, slide, vectors) for slide, vectors in described.items() if slide.name in tested]
-    return Outcome([result for result in results if result.estimates], taken, model)
+        results += [_evaluated(model, slide, vectors) for slide, vectors in extracted.items() if slide.name in tested]
+    return RecipeResult([result for result in results if result.estimates], taken, model)
 
 
-def describe(recipe: Recipe, item: Recorded) -> list[FeatureVector]:
+def extract_features(recipe: Recipe, item: SlideSignals) -> list[FeatureVector]:
     """Return the features of all windows of a slide, named after it."""
-    vectors = recipe.feature_set.describe_many(item.cut(recipe))
+    vectors = recipe.feature_set.extract_many(item.cut(recipe))
     return [dataclasses.replace(vector, exploration_id=item.slide.name) for vector in vectors if not vector.last]
 
 
-def examples_of(described: Described, apart_s: float = LENGTH_S) -> LabelledFeatures:
+def examples_of(extracted: Described, apart_s: float = LENGTH_S) -> LabelledFeatures:
     """Return windows that begin at least so far apart, of all slides."""
-    chosen = [vector for vectors in described.values() for vector in _apart(vectors, apart_s)]
+    chosen = [vector for vectors in extracted.values() for vector in _apart(vectors, apart_s)]
     if not chosen:
-        raise InvalidData('no slide to learn from has a whole window; record longer slides')
-    examples = LabelledFeatures.from_vectors(chosen, {slide.name: slide.surface for slide in described})
+        raise InvalidData('no slide for training has a whole window; record longer slides')
+    examples = LabelledFeatures.from_vectors(chosen, {slide.name: slide.surface for slide in extracted})
     return dataclasses.replace(examples, hop_s=max(apart_s, examples.hop_s))
 
 
-def latency_us(recipe: Recipe, model: Model, recorded: Sequence[Recorded]) -> dict[str, float]:
+def latency_us(recipe: Recipe, model: TextureModel, slide_signals: Sequence[SlideSignals]) -> dict[str, float]:
     """Return median and 99th percentile of the computing time of windows one by one; the first slide warms up.
 
     By the clock of the processor, which other work on the machine lengthens little.
     """
-    cut = [item.cut(recipe) for item in recorded[:: max(1, len(recorded) // TIMED_SLIDES)]]
-    taken = [judge(model, pieces, time.process_time)[2][:-1] for pieces in (cut[0], *cut)][1:]
+    cut = [item.cut(recipe) for item in slide_signals[:: max(1, len(slide_signals) // TIMED_SLIDES)]]
+    taken = [run_model(model, events, time.process_time)[2][:-1] for events in (cut[0], *cut)][1:]
     median, p99 = np.percentile(np.concatenate(taken), (50, 99))
     return {'median': round(float(median), 1), 'p99': round(float(p99), 1)}
 
 
-def random_divisions(slides: Sequence[Slide], count: int, rng: np.random.Generator) -> list[Division]:
-    """Return divisions in which each slide is tested once; each surface is dealt out at random."""
+def random_splits(slides: Sequence[LabelledSlide], count: int, rng: np.random.Generator) -> list[Split]:
+    """Return splits in which each slide is tested once; each surface is assigned at random."""
     part: dict[str, int] = {}
     for _, group in groupby(sorted(slides, key=lambda slide: slide.surface), key=lambda slide: slide.surface):
         own = list(group)
         part |= {slide.name: int(k) % count for slide, k in zip(own, rng.permutation(len(own)), strict=True)}
-    return [_divided(part, held) for held in range(count)]
+    return [_split(part, held) for held in range(count)]
 
 
-def division_by_time(slides: Sequence[Slide], last_learnt: int) -> list[Division]:
-    """Return the one division in which the first slides of each surface are learnt and the later ones tested."""
-    return [_divided({slide.name: int(slide.number > last_learnt) for slide in slides}, 1)]
+def chronological_split(slides: Sequence[LabelledSlide], last_training: int) -> list[Split]:
+    """Return the one split in which the first slides of each surface are learnt and the later ones tested."""
+    return [_split({slide.name: int(slide.number > last_training) for slide in slides}, 1)]
 
 
-def divisions_by(values: Mapping[str, float]) -> list[Division]:
-    """Return one division for each value that slides have, by name: those that have it are tested."""
+def splits_by(values: Mapping[str, float]) -> list[Split]:
+    """Return one split for each value that slides have, by name: those that have it are tested."""
     order = sorted(set(values.values()))
-    return [_divided({name: order.index(value) for name, value in values.items()}, held) for held in range(len(order))]
+    return [_split({name: order.index(value) for name, value in values.items()}, held) for held in range(len(order))]
 
 
-def _divided(part: Mapping[str, int], held: int) -> Division:
+def _split(part: Mapping[str, int], held: int) -> Split:
     tested = frozenset(name for name, own in part.items() if own == held)
     return frozenset(part) - tested, tested
 
 
-def _recorded(slide: Slide, messages: Sequence[tuple[str, int, Any]]) -> Recorded:
+def _recorded(slide: LabelledSlide, messages: Sequence[tuple[str, int, Any]]) -> SlideSignals:
     states = [value for _, _, value in messages if isinstance(value, ExplorationState)]
     signals: dict[str, list[TactileSignal]] = {}
     for topic, _, value in messages:
         if isinstance(value, TactileSignal):
             signals.setdefault(topic, []).append(value)
-    return Recorded(slide, signals, states)
+    return SlideSignals(slide, signals, states)
 
 
 def _at_rate(batches: Sequence[TactileSignal], rate_hz: float) -> list[TactileSignal]:
@@ -286,8 +286,8 @@ def _apart(vectors: Sequence[FeatureVector], apart_s: float) -> list[FeatureVect
     return kept
 
 
-def _judged(model: Model, slide: Slide, vectors: Sequence[FeatureVector]) -> SlideResult:
-    evidence = Evidence(model)
+def _evaluated(model: TextureModel, slide: LabelledSlide, vectors: Sequence[FeatureVector]) -> SlideResult:
+    evidence = EvidenceAccumulator(model)
     estimates = [evidence.update(vector) for vector in vectors]
     alone = model.decide(np.stack([vector.values for vector in vectors])) if vectors else []
     return SlideResult(slide.surface, alone, estimates)

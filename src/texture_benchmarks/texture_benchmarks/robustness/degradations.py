@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter, lfilter_zi
 
-from texture_benchmarks.robustness.retime import retimed
+from texture_benchmarks.robustness.speed_resampling import at_other_speed
 from texture_core.arrays import Array
 
 BURST_S = 0.01  # samples are lost by the packet
@@ -34,7 +34,7 @@ class Degradation:
     loses
         Whether samples become NaN: windows that hold one are not cut, and count as not recognised.
     of_windows
-        Whether the strength is the length of the tested windows, of that taught, and the samples stay as they are.
+        Whether the strength is the length of the tested windows, of that trained, and the samples stay as they are.
     of_the_world
         Whether it happens before sampling, so that the samples of the sensor are changed and not those of a lower rate.
     """
@@ -108,7 +108,7 @@ def _clipped(samples: Array, _rate_hz: float, strength: float, _rng: np.random.G
 
 def _hurried(samples: Array, _rate_hz: float, strength: float, _rng: np.random.Generator) -> Array:
     """Return the way at another speed: less of it in the same time, or all of it in less."""
-    return samples if strength == 1.0 else retimed(samples, 1.0, strength)[: len(samples)]
+    return samples if strength == 1.0 else at_other_speed(samples, 1.0, strength)[: len(samples)]
 
 
 def _unchanged(samples: Array, _rate_hz: float, _strength: float, _rng: np.random.Generator) -> Array:
@@ -130,13 +130,13 @@ DEGRADATIONS: Mapping[str, Degradation] = {
     ),
     'clipping': Degradation(_clipped, (math.inf, 4.0, 3.0, 2.0, 1.5, 1.0, 0.5, 0.2), f'limit, {_OF_RMS}'),
     'shorter windows': Degradation(
-        _unchanged, (1.0, 0.9, 0.8, 0.6, 0.5, 0.4, 0.2, 0.1), 'length of the window, of that taught', of_windows=True
+        _unchanged, (1.0, 0.9, 0.8, 0.6, 0.5, 0.4, 0.2, 0.1), 'length of the window, of that trained', of_windows=True
     ),
-    'slower than taught': Degradation(
-        _hurried, (1.0, 0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5), 'speed, of that taught', of_the_world=True
+    'slower than trained': Degradation(
+        _hurried, (1.0, 0.98, 0.95, 0.9, 0.8, 0.7, 0.6, 0.5), 'speed, of that trained', of_the_world=True
     ),
-    'faster than taught': Degradation(
-        _hurried, (1.0, 1.02, 1.05, 1.1, 1.25, 1.5, 1.75, 2.0), 'speed, of that taught', of_the_world=True
+    'faster than trained': Degradation(
+        _hurried, (1.0, 1.02, 1.05, 1.1, 1.25, 1.5, 1.75, 2.0), 'speed, of that trained', of_the_world=True
     ),
 }
 

@@ -1,4 +1,4 @@
-"""Where each recipe breaks down, as one thing degrades in slides that were learnt in good order."""
+"""Where each recipe breaks down, as one thing degrades in slides of the training in good order."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import numpy as np
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.recipes.run import (
     DATA,
-    LAST_LEARNT,
+    LAST_TRAINED,
     NEEDS_ARRAY,
-    QUICK_LAST_LEARNT,
+    QUICK_LAST_TRAINED,
     QUICK_MATERIALS,
     QUICK_SLIDES,
     RATE_HZ,
 )
-from texture_benchmarks.recipes.trial import Recorded, comparable, read_recorded
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.recipes.trial import SlideSignals, comparable, read_slide_signals
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.robustness.chart import KEPT, Curve, Panel, robustness_chart, robustness_tables
 from texture_benchmarks.robustness.degradations import DEGRADATIONS, Degradation, breakdown
 from texture_benchmarks.robustness.scenes import (
@@ -29,11 +29,11 @@ from texture_benchmarks.robustness.scenes import (
     SCENE,
     SLIDE_S,
     SPEED_M_S,
-    Condition,
-    Felt,
-    felt_slides,
+    ShiftedCondition,
+    TouchConditions,
+    simulate_slide_signals,
 )
-from texture_benchmarks.robustness.trial import TOPIC, Count, Pupils, degraded
+from texture_benchmarks.robustness.trial import TOPIC, Count, TrainedModels, degraded
 from texture_core.resources import folder
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.train import with_channels
@@ -58,7 +58,7 @@ Effect = TypeVar('Effect')
 
 @dataclass(frozen=True)
 class _Size:
-    """How much is learnt from and tested.
+    """How much is used for training and tested.
 
     Parameters
     ----------
@@ -66,20 +66,20 @@ class _Size:
         Names.
     materials, slides
         Read; all if empty.
-    last_learnt
+    last_training
         Later slides are tested.
     every_slide, every_strength, every_effect
         One in so many is tested.
     early, later
-        For `LATER`: numbers of the slides of each surface that are learnt from, and of those tested, in groups.
+        For `LATER`: numbers of the slides of each surface that are used for training, and of those tested, in groups.
     simulated
-        Slides of each surface to learn from, and to test on.
+        Slides of each surface for training, and to test on.
     """
 
     recipes: Sequence[str]
     materials: Sequence[str]
     slides: str
-    last_learnt: int
+    last_training: int
     every_slide: int
     every_strength: int
     every_effect: int
@@ -92,7 +92,7 @@ WHOLE = _Size(
     recipes=RECIPES,
     materials=(),
     slides='',
-    last_learnt=LAST_LEARNT,
+    last_training=LAST_TRAINED,
     every_slide=4,
     every_strength=1,
     every_effect=1,
@@ -104,7 +104,7 @@ QUICK = _Size(
     recipes=('peaks-naive-bayes', 'kaboli-pa'),
     materials=QUICK_MATERIALS,
     slides=QUICK_SLIDES,
-    last_learnt=QUICK_LAST_LEARNT,
+    last_training=QUICK_LAST_TRAINED,
     every_slide=1,
     every_strength=3,
     every_effect=5,
@@ -114,21 +114,26 @@ QUICK = _Size(
 )
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train recipes on clean slides and test them on degraded ones."""
-    size = QUICK if bench.quick else WHOLE
-    with imported(bench, 'biotac20', size.slides, size.materials) as bags:
-        recorded = read_recorded(bags, (TOPIC,))
+    size = QUICK if options.quick else WHOLE
+    with imported(options, 'biotac20', size.slides, size.materials) as bags:
+        slide_signals = read_slide_signals(bags, (TOPIC,))
     recipes = [_recipe(name) for name in size.recipes]
-    vibration = [item.at_rate(TOPIC, RATE_HZ) for item in recorded]
-    pupils = Pupils.taught(recipes, [item for item in vibration if item.slide.number <= size.last_learnt])
-    slides = [item for item in recorded if item.slide.number > size.last_learnt][:: size.every_slide]
+    vibration = [item.at_rate(TOPIC, RATE_HZ) for item in slide_signals]
+    trained_models = TrainedModels.trained(
+        recipes, [item for item in vibration if item.slide.number <= size.last_training]
+    )
+    slides = [item for item in slide_signals if item.slide.number > size.last_training][:: size.every_slide]
     panels = {
-        **{name: _degraded(pupils, slides, each, size, bench.seed) for name, each in _some(DEGRADATIONS, size)},
+        **{
+            name: _degraded(trained_models, slides, each, size, options.seed)
+            for name, each in _some(DEGRADATIONS, size)
+        },
         LATER: _later(recipes, vibration, size),
-        **_simulated(recipes, size, bench.seed),
+        **_simulated(recipes, size, options.seed),
     }
-    return _result(bench, panels, len(slides), size)
+    return _result(options, panels, len(slides), size)
 
 
 def _some(effects: Mapping[str, Effect], size: _Size) -> list[tuple[str, Effect]]:
@@ -140,48 +145,52 @@ def _recipe(name: str) -> Recipe:
     return comparable(with_channels(load_recipe(name), 'fast'), RATE_HZ, of_motion=False)
 
 
-def _degraded(pupils: Pupils, slides: Sequence[Recorded], degradation: Degradation, size: _Size, seed: int) -> Panel:
+def _degraded(
+    trained_models: TrainedModels, slides: Sequence[SlideSignals], degradation: Degradation, size: _Size, seed: int
+) -> Panel:
     """Return how recipes do on slides that are made worse."""
 
     def score(strength: float) -> Mapping[str, Count]:
         rng = np.random.default_rng(seed)
         worse = [degraded(item, degradation, strength, RATE_HZ, rng) for item in slides]
-        return pupils.counts(worse, strength if degradation.of_windows else 1.0)
+        return trained_models.counts(worse, strength if degradation.of_windows else 1.0)
 
     strengths = degradation.strengths[:: size.every_strength]
     return _panel(degradation.axis, strengths, score, 'recorded', of_all=degradation.loses)
 
 
-def _later(recipes: Sequence[Recipe], recorded: Sequence[Recorded], size: _Size) -> Panel:
+def _later(recipes: Sequence[Recipe], slide_signals: Sequence[SlideSignals], size: _Size) -> Panel:
     """Return how recipes that learnt at the beginning of the session do further and further on."""
-    pupils = Pupils.taught(recipes, [item for item in recorded if item.slide.number in size.early])
+    trained_models = TrainedModels.trained(recipes, [item for item in slide_signals if item.slide.number in size.early])
     groups = {max(0.0, float(np.mean(group)) - max(size.early)): group for group in size.later}
 
     def score(since: float) -> Mapping[str, Count]:
-        return pupils.counts([item for item in recorded if item.slide.number in groups[since]])
+        return trained_models.counts([item for item in slide_signals if item.slide.number in groups[since]])
 
     return _panel('slides since the last one learnt', tuple(groups), score, 'recorded')
 
 
 def _simulated(recipes: Sequence[Recipe], size: _Size, seed: int) -> dict[str, Panel]:
-    """Return how recipes do where a scene is felt otherwise than it was learnt."""
+    """Return how recipes do where a scene is measured otherwise than it was trained."""
     to_learn, to_test = size.simulated
-    pupils: dict[Callable[[], Felt], Pupils] = {}
+    trained_models: dict[Callable[[], TouchConditions], TrainedModels] = {}
     panels = {}
     for name, condition in _some(CONDITIONS, size):
-        if condition.taught not in pupils:
-            slides = felt_slides(condition.taught(), to_learn, np.random.default_rng([seed, 0]))
-            pupils[condition.taught] = Pupils.taught(recipes, slides)
-        score = partial(_felt_otherwise, pupils[condition.taught], condition, to_test, seed)
+        if condition.trained not in trained_models:
+            slides = simulate_slide_signals(condition.trained(), to_learn, np.random.default_rng([seed, 0]))
+            trained_models[condition.trained] = TrainedModels.trained(recipes, slides)
+        score = partial(_counts_under_shift, trained_models[condition.trained], condition, to_test, seed)
         panels[name] = _panel(condition.axis, condition.strengths[:: size.every_strength], score, 'simulated')
     return panels
 
 
-def _felt_otherwise(
-    pupils: Pupils, condition: Condition, count: int, seed: int, strength: float
+def _counts_under_shift(
+    trained_models: TrainedModels, condition: ShiftedCondition, count: int, seed: int, strength: float
 ) -> Mapping[str, Count]:
     """Return what is recognised of slides that touch the same places at every strength."""
-    return pupils.counts(felt_slides(condition.felt(strength), count, np.random.default_rng([seed, 1])))
+    return trained_models.counts(
+        simulate_slide_signals(condition.touch_conditions(strength), count, np.random.default_rng([seed, 1]))
+    )
 
 
 def _panel(axis: str, strengths: Sequence[float], score: Score, slides: str, *, of_all: bool = False) -> Panel:
@@ -195,10 +204,10 @@ def _panel(axis: str, strengths: Sequence[float], score: Score, slides: str, *, 
     return Panel(axis, strengths, curves, slides)
 
 
-def _result(bench: Bench, panels: Mapping[str, Panel], tested: int, size: _Size) -> BenchResult:
-    bench.out.mkdir(parents=True, exist_ok=True)
-    (bench.out / 'robustness.md').write_text(robustness_tables(panels), encoding='utf-8')
-    return BenchResult(
+def _result(options: BenchmarkOptions, panels: Mapping[str, Panel], tested: int, size: _Size) -> BenchmarkResult:
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / 'robustness.md').write_text(robustness_tables(panels), encoding='utf-8')
+    return BenchmarkResult(
         name='robustness',
         measured=(
             'share of single windows recognised as one thing degrades in the tested slides only, by its strength; '
@@ -210,13 +219,15 @@ def _result(bench: Bench, panels: Mapping[str, Panel], tested: int, size: _Size)
             f'capacitive fingertip at 1 kHz, {SPEED_M_S} m/s, {FORCE_N} N'
         ),
         split=(
-            f'recorded: learnt from slides 1-{LAST_LEARNT} of each material, tested on {tested} of the later ones; '
-            f'{LATER}: learnt from slides {_listed(size.early)}, tested on {"; ".join(map(_listed, size.later))}. '
+            f'recorded: trained on slides 1-{LAST_TRAINED} of each material, tested on {tested} of the later ones; '
+            f'{LATER}: trained on slides {_listed(size.early)}, tested on {"; ".join(map(_listed, size.later))}. '
             f'Simulated: {size.simulated[0]} slides of {SLIDE_S} s a surface learnt, {size.simulated[1]} others tested'
         ),
         numbers={effect: _numbers(panel) for effect, panel in panels.items()},
         charts=tuple(
-            robustness_chart(effect, panel, _families(panel), bench.out / f'robustness_{effect.replace(" ", "_")}.png')
+            robustness_chart(
+                effect, panel, _families(panel), options.out / f'robustness_{effect.replace(" ", "_")}.png'
+            )
             for effect, panel in panels.items()
         ),
     )

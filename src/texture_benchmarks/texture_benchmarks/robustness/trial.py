@@ -1,4 +1,4 @@
-"""Recipes that learnt from the same clean slides, and how many windows of other slides they recognise."""
+"""Recipes that trained on the same clean slides, and how many windows of other slides they recognise."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from texture_benchmarks.recipes.trial import Recorded, describe, describe_all, examples_of
+from texture_benchmarks.recipes.trial import SlideSignals, examples_of, extract_all, extract_features
 from texture_benchmarks.robustness.degradations import Degradation
 from texture_core.arrays import Array
 from texture_core.signal import TactileSignal
 from texture_estimation.classification.training import train
-from texture_estimation.model import Model
+from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_features.feature_set import FeatureSet
 
 TOPIC = 'signal'
-AT_ONCE = 512  # windows judged together: many for speed, few enough for the memory
+AT_ONCE = 512  # windows evaluated together: many for speed, few enough for the memory
 
 
 class Count(NamedTuple):
@@ -31,27 +31,29 @@ class Count(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Pupils:
-    """Models of several recipes that learnt from the same slides; recipes of the same features describe them once."""
+class TrainedModels:
+    """Models of several recipes that trained on the same slides; recipes of the same features describe them once."""
 
-    models: Sequence[Model]
+    models: Sequence[TextureModel]
 
     @classmethod
-    def taught(cls, recipes: Iterable[Recipe], slides: Sequence[Recorded]) -> Pupils:
+    def trained(cls, recipes: Iterable[Recipe], slides: Sequence[SlideSignals]) -> TrainedModels:
         """Train each recipe on all slides."""
         models = []
         for group in _sharing({recipe.name: recipe for recipe in recipes}):
-            described = describe_all(group[0], slides)
-            models += [train(recipe, examples_of(described)) for recipe in group]
+            extracted = extract_all(group[0], slides)
+            models += [train(recipe, examples_of(extracted)) for recipe in group]
         return cls(models)
 
-    def counts(self, slides: Sequence[Recorded], length: float = 1.0) -> dict[str, Count]:
-        """Return what each recipe recognises, by its name, in windows `length` times as long as those taught."""
+    def counts(self, slides: Sequence[SlideSignals], length: float = 1.0) -> dict[str, Count]:
+        """Return what each recipe recognises, by its name, in windows `length` times as long as those trained."""
         models = {model.recipe.name: model for model in self.models}
         found: dict[str, Count] = {}
         for group in _sharing({name: with_windows(model.recipe, length) for name, model in models.items()}):
-            described = [(item.slide.surface, vector.values) for item in slides for vector in describe(group[0], item)]
-            found |= {recipe.name: _count(models[recipe.name], described) for recipe in group}
+            extracted = [
+                (item.slide.surface, vector.values) for item in slides for vector in extract_features(group[0], item)
+            ]
+            found |= {recipe.name: _count(models[recipe.name], extracted) for recipe in group}
         return found
 
 
@@ -64,15 +66,15 @@ def with_windows(recipe: Recipe, length: float) -> Recipe:
 
 
 def degraded(
-    item: Recorded, degradation: Degradation, strength: float, rate_hz: float, rng: np.random.Generator
-) -> Recorded:
+    item: SlideSignals, degradation: Degradation, strength: float, rate_hz: float, rng: np.random.Generator
+) -> SlideSignals:
     """Return the vibration of a slide at a rate, as bad as the strength says."""
     whole = item.at_rate(TOPIC, _native_hz(item) if degradation.of_the_world else rate_hz)
     signals = [_changed(run, degradation, strength, rng) for run in whole.signals[TOPIC]]
     return dataclasses.replace(item, signals={TOPIC: signals}).at_rate(TOPIC, rate_hz)
 
 
-def _native_hz(item: Recorded) -> float:
+def _native_hz(item: SlideSignals) -> float:
     return item.signals[TOPIC][0].sampling_rate_hz
 
 
@@ -89,9 +91,9 @@ def _sharing(recipes: Mapping[str, Recipe]) -> list[list[Recipe]]:
     return list(groups.values())
 
 
-def _count(model: Model, described: Sequence[tuple[str, Array]]) -> Count:
+def _count(model: TextureModel, extracted: Sequence[tuple[str, Array]]) -> Count:
     right = 0
-    for first in range(0, len(described), AT_ONCE):
-        surfaces, values = zip(*described[first : first + AT_ONCE], strict=True)
+    for first in range(0, len(extracted), AT_ONCE):
+        surfaces, values = zip(*extracted[first : first + AT_ONCE], strict=True)
         right += sum(map(eq, model.decide(np.stack(values)), surfaces))
-    return Count(right, len(described))
+    return Count(right, len(extracted))

@@ -50,11 +50,11 @@ class Graph:
         kind, qos, name = TOPICS[topic]
         return self.node.create_publisher(kind, name, qos)
 
-    def listen(self, topic: str, heard: Callable[[Any], None]) -> None:
-        """Call `heard` with the data class of each message of a topic, or the message itself of /diagnostics."""
+    def listen(self, topic: str, received: Callable[[Any], None]) -> None:
+        """Call `received` with the data class of each message of a topic, or the message itself of /diagnostics."""
         kind, qos, name = TOPICS[topic]
         convert = from_msg if kind.__module__.startswith('texture_msgs') else (lambda message: message)
-        self.node.create_subscription(kind, name, lambda message: heard(convert(message)), qos)
+        self.node.create_subscription(kind, name, lambda message: received(convert(message)), qos)
 
     def wait_until(self, condition: Callable[[], bool], deadline_s: float, what: str) -> None:
         """Take messages until the condition holds.

@@ -20,7 +20,7 @@ from texture_core.exploration import ExplorationState
 from texture_core.node_process import NodeProcess
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.model import load_model
-from texture_features.windowing.stream import INDEX_TOLERANCE
+from texture_features.windowing.sample_buffer import INDEX_TOLERANCE
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import load_scene
 
@@ -34,7 +34,7 @@ DOMAIN = 83  # of its own: what else runs on the machine must not listen
 
 
 @dataclass(frozen=True, eq=False)
-class Live:
+class LiveLatency:
     """What was measured over one long slide.
 
     Parameters
@@ -64,7 +64,7 @@ class Live:
         }
 
 
-def measure(model_path: Path, seed: int, slide_s: float) -> Live:
+def measure(model_path: Path, seed: int, slide_s: float) -> LiveLatency:
     """Stream one long simulated slide through feature extractor and classifier, and time the estimates."""
     model = load_model(model_path)
     states, signals = simulate_exploration(
@@ -72,7 +72,7 @@ def measure(model_path: Path, seed: int, slide_s: float) -> Live:
         start_ns=0, exploration_id='long', rng=np.random.default_rng(seed),
     )  # fmt: skip
     batches = {topic: rebatch(signals[topic]) for topic in signals}
-    heard: list[tuple[float, TextureEstimate]] = []
+    received: list[tuple[float, TextureEstimate]] = []
     nodes = (
         NodeProcess(
             'texture_features', 'feature_extractor', {'recipe': str(model_path.with_suffix('.json'))}, domain_id=DOMAIN
@@ -80,7 +80,7 @@ def measure(model_path: Path, seed: int, slide_s: float) -> Live:
         NodeProcess('texture_estimation', 'classifier', {'model': str(model_path)}, domain_id=DOMAIN),
     )
     with Graph(DOMAIN) as graph, nodes[0], nodes[1]:
-        graph.listen('texture', lambda estimate: heard.append((time.perf_counter(), estimate)))
+        graph.listen('texture', lambda estimate: received.append((time.perf_counter(), estimate)))
         streamer = Streamer(graph, _plan(states, batches))
         topics = ('exploration', *model.recipe.feature_set.topics)
         graph.wait_until(
@@ -94,7 +94,9 @@ def measure(model_path: Path, seed: int, slide_s: float) -> Live:
         graph.spin(SETTLE_S)
         before, began = [node.cpu_s() for node in nodes], time.monotonic()
         streamer.start()
-        graph.wait_until(lambda: bool(heard) and heard[-1][1].final, slide_s + READY_WITHIN_S, 'the final estimate')
+        graph.wait_until(
+            lambda: bool(received) and received[-1][1].final, slide_s + READY_WITHIN_S, 'the final estimate'
+        )
         lasted_s = time.monotonic() - began
         cpu = {n.name: (n.cpu_s() - used) / lasted_s for n, used in zip(nodes, before, strict=True)}
         streamer.join()
@@ -103,24 +105,24 @@ def measure(model_path: Path, seed: int, slide_s: float) -> Live:
     sent = {topic: _sent_at(streamer, topic) for topic in model.recipe.feature_set.topics}
     found = [
         at_s - max(sent[topic][_last_batch(batches[topic], estimate, windows.length_s)] for topic in sent)
-        for at_s, estimate in heard
+        for at_s, estimate in received
         if not estimate.final
     ]
-    return Live(np.array(found), expected, cpu)
+    return LiveLatency(np.array(found), expected, cpu)
 
 
 def driver_cpu() -> float:
     """Return the share of one core that the sensor node uses, reading an emulated TSF-85."""
     with tempfile.TemporaryDirectory() as folder:
         device = str(Path(folder) / 'tsf85')
-        heard: list[TactileSignal] = []
+        received: list[TactileSignal] = []
         with (
             Graph(DOMAIN) as graph,
-            NodeProcess('texture_simulation', 'bench', {'sensor_link': device, 'finger_port': 0}, domain_id=DOMAIN),
+            NodeProcess('texture_simulation', 'emulator', {'sensor_link': device, 'finger_port': 0}, domain_id=DOMAIN),
             NodeProcess('texture_drivers', 'sensor', {'device': device}, domain_id=DOMAIN) as sensor,
         ):
-            graph.listen('signal', heard.append)
-            graph.wait_until(lambda: len(heard) > 100, READY_WITHIN_S, 'the signal of the sensor node')
+            graph.listen('signal', received.append)
+            graph.wait_until(lambda: len(received) > 100, READY_WITHIN_S, 'the signal of the sensor node')
             before, began = sensor.cpu_s(), time.monotonic()
             graph.spin(DRIVER_S)
             return (sensor.cpu_s() - before) / (time.monotonic() - began)

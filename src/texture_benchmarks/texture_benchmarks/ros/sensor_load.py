@@ -22,7 +22,7 @@ DOMAIN = 82  # of its own: what else runs on the machine must not listen
 
 
 @dataclass(frozen=True)
-class Load:
+class SensorLoad:
     """What one sensor node did over a while.
 
     Parameters
@@ -49,7 +49,7 @@ class Load:
     cpu: float
 
 
-def measure(rigs: Mapping[str, Rig], sensors: Mapping[str, str], seconds: float) -> Mapping[str, Load]:
+def measure(rigs: Mapping[str, Rig], sensors: Mapping[str, str], seconds: float) -> Mapping[str, SensorLoad]:
     """Return the load of one node on each rig, all at the same time.
 
     Parameters
@@ -61,19 +61,19 @@ def measure(rigs: Mapping[str, Rig], sensors: Mapping[str, str], seconds: float)
     seconds
         How long to measure.
     """
-    heard = {name: _Heard() for name in rigs}
+    received = {name: _SensorReports() for name in rigs}
     with Graph(DOMAIN) as graph, ExitStack() as stack:
-        graph.listen('diagnostics', lambda array: [heard[s.name.split('/')[1]].note(s.values) for s in array.status])
+        graph.listen('diagnostics', lambda array: [received[s.name.split('/')[1]].note(s.values) for s in array.status])
         nodes = {}
         for name, rig in rigs.items():
             topic = f'/{name}/{rig.case.topic}'
-            graph.node.create_subscription(msg.TactileSignal, topic, heard[name].count, SENSOR_QOS, raw=True)
+            graph.node.create_subscription(msg.TactileSignal, topic, received[name].count, SENSOR_QOS, raw=True)
             given = {'sensor': sensors[name], 'device': str(rig.link), 'config': rig.case.config}
             node = NodeProcess('texture_drivers', 'sensor', given, namespace=f'/{name}', domain_id=DOMAIN)
             nodes[name] = stack.enter_context(node)
-        graph.wait_until(lambda: all(item.streams for item in heard.values()), READY_WITHIN_S, 'the sensors')
+        graph.wait_until(lambda: all(item.streams for item in received.values()), READY_WITHIN_S, 'the sensors')
         graph.spin(SETTLE_S)
-        for item in heard.values():
+        for item in received.values():
             item.restart()
         cpu_s, unsent = _used(nodes), {name: rig.device.dropped_bytes for name, rig in rigs.items()}
         began_s = time.monotonic()
@@ -81,7 +81,7 @@ def measure(rigs: Mapping[str, Rig], sensors: Mapping[str, str], seconds: float)
         lasted_s = time.monotonic() - began_s
         used_s = _used(nodes)
         return {
-            name: heard[name].load((used_s[name] - cpu_s[name]) / lasted_s, rig.device.dropped_bytes - unsent[name])
+            name: received[name].load((used_s[name] - cpu_s[name]) / lasted_s, rig.device.dropped_bytes - unsent[name])
             for name, rig in rigs.items()
         }
 
@@ -90,7 +90,7 @@ def _used(nodes: Mapping[str, NodeProcess]) -> dict[str, float]:
     return {name: node.cpu_s() for name, node in nodes.items()}
 
 
-class _Heard:
+class _SensorReports:
     """What has come from one sensor node."""
 
     def __init__(self) -> None:
@@ -110,9 +110,9 @@ class _Heard:
     def count(self, _message: bytes) -> None:
         self._messages += 1
 
-    def load(self, cpu: float, unsent_bytes: int) -> Load:
+    def load(self, cpu: float, unsent_bytes: int) -> SensorLoad:
         """Return what happened from the first report to the last."""
         (first_s, first), (last_s, last) = self._reports[0], self._reports[-1]
         new = {name: int(last[name]) - int(first[name]) for name in ('samples', 'lost')}
         seconds = last_s - first_s
-        return Load(seconds, new['samples'] / seconds, new['lost'], unsent_bytes, self._messages, cpu)
+        return SensorLoad(seconds, new['samples'] / seconds, new['lost'], unsent_bytes, self._messages, cpu)

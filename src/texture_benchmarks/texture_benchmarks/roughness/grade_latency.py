@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.roughness.evidence import RoughnessEvidence
+from texture_estimation.roughness.evidence import RoughnessAccumulator
 from texture_estimation.roughness.model import RoughnessModel
 from texture_features.windowing.windows import CutWindow
 
@@ -20,11 +20,11 @@ def times_us(model: RoughnessModel, windows: Sequence[CutWindow], count: int) ->
 
     It is the time of the core, not of the clock: what other programs take does not count.
     """
-    evidence, taken_us = RoughnessEvidence(model), []
+    evidence, taken_us = RoughnessAccumulator(model), []
     for number in range(WARM_UP + count):
         # each a slide of its own: nothing follows a grade that is final
         window = windows[number % len(windows)]
         began = time.thread_time()
-        evidence.update(model.recipe.feature_set.describe(window))
+        evidence.update(model.recipe.feature_set.extract(window))
         taken_us.append(1e6 * (time.thread_time() - began))
     return np.array(taken_us[WARM_UP:])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from texture_benchmarks.papers.roughness_scans import FORCE_N, SPEED_M_S, USED_S, Felt
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.papers.roughness_slides import FORCE_N, SPEED_M_S, USED_S, SimulatedTextures
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.roughness.grade_latency import times_us
 from texture_estimation.roughness.grades import TEST, TRAIN, read_grades
 from texture_estimation.roughness.recipe import load_roughness_recipe
@@ -19,26 +19,28 @@ TIMED, QUICK_TIMED = 5000, 200
 TARGET_US = 200.0
 
 
-def run(bench: Bench) -> BenchResult:
-    """Train on simulated scans, then time windows of textures never felt, one by one."""
+def run(options: BenchmarkOptions) -> BenchmarkResult:
+    """Train on simulated scans, then time windows of textures never touched, one by one."""
     grades = read_grades('ets_roughness')
-    felt = Felt(load_scene('roughness'), bench.seed)
-    count = QUICK_SCANS if bench.quick else SCANS
-    windows = [piece for texture in grades.used_for(TEST) for piece in felt.pieces(texture, count, SPEED_M_S, FORCE_N)]
+    simulated = SimulatedTextures(load_scene('roughness'), options.seed)
+    count = QUICK_SCANS if options.quick else SCANS
+    windows = [
+        event for texture in grades.used_for(TEST) for event in simulated.events(texture, count, SPEED_M_S, FORCE_N)
+    ]
     times = {}
-    for name, recipe_name in list(RECIPES.items())[: 1 if bench.quick else None]:
+    for name, recipe_name in list(RECIPES.items())[: 1 if options.quick else None]:
         recipe = load_roughness_recipe(recipe_name)
-        examples = felt.describe(recipe.feature_set, grades.used_for(TRAIN), count, SPEED_M_S, FORCE_N)
+        examples = simulated.extract(recipe.feature_set, grades.used_for(TRAIN), count, SPEED_M_S, FORCE_N)
         model = train_grades(recipe, examples, grades)
-        times[name] = times_us(model, windows, QUICK_TIMED if bench.quick else TIMED)
+        times[name] = times_us(model, windows, QUICK_TIMED if options.quick else TIMED)
     chart = histogram_chart(
         times,
         'From the samples of a window to the grade, in one process (simulated)',
         'time (µs)',
-        bench.out / 'roughness-latency.png',
+        options.out / 'roughness-latency.png',
     )
     percentiles = {name: np.percentile(values, (50, 99)).tolist() for name, values in times.items()}
-    return BenchResult(
+    return BenchmarkResult(
         name='roughness-latency',
         measured=(
             f'computing time of a core: features, checks, head and evidence for windows of {USED_S} s at 1 kHz, '

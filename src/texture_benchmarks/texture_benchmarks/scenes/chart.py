@@ -1,4 +1,4 @@
-"""Charts of what simulated scenes cost, and of what their terms are worth."""
+"""Charts of what simulated scenes cost, and of what their terms contribute."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.scenes.costs import MANY, Load, ScanCost
-from texture_benchmarks.scenes.trial import Ablation, Worth
+from texture_benchmarks.scenes.costs import MANY, DeviceLoad, ScanCost
+from texture_benchmarks.scenes.trial import Ablation, TermEffect
 from texture_evaluation.charts import COLOURS, chart
 
 COLUMNS = 3
@@ -18,7 +18,7 @@ COLUMNS = 3
 def ablation_chart(ablations: Sequence[Ablation], path: str | Path) -> Path:
     """Draw for each scene what happens when a term is removed; a panel a scene."""
     rows = -(-len(ablations) // COLUMNS)
-    most = max(len(ablation.worths) for ablation in ablations)
+    most = max(len(ablation.term_effects) for ablation in ablations)
     with chart(
         path, (13.0, 1.0 + rows * (0.9 + 0.42 * most)), 'What changes when a term of a simulated scene is removed'
     ) as figure:
@@ -35,7 +35,7 @@ def ablation_chart(ablations: Sequence[Ablation], path: str | Path) -> Path:
 def cost_chart(
     costs: Mapping[tuple[str, bool], ScanCost],
     target_ms: Mapping[bool, float],
-    loads: Mapping[str, Load],
+    loads: Mapping[str, DeviceLoad],
     target_cpu: float,
     path: str | Path,
 ) -> Path:
@@ -63,11 +63,26 @@ def cost_chart(
 
 
 def _ablation(axes: Any, ablation: Ablation) -> None:
-    places = np.arange(len(ablation.worths))
+    places = np.arange(len(ablation.term_effects))
     series = (
-        ('if the world had no such term', [worth.easier for worth in ablation.worths], COLOURS[0], -0.16),
-        ('if only what is learnt from had none', [worth.unprepared for worth in ablation.worths], COLOURS[1], 0.16),
-        ("by the paper's method, if the world had none", [worth.paper for worth in ablation.worths], COLOURS[2], 0.0),
+        (
+            'if the world had no such term',
+            [term_effect.easier for term_effect in ablation.term_effects],
+            COLOURS[0],
+            -0.16,
+        ),
+        (
+            'if only what is used for training had none',
+            [term_effect.unprepared for term_effect in ablation.term_effects],
+            COLOURS[1],
+            0.16,
+        ),
+        (
+            "by the paper's method, if the world had none",
+            [term_effect.paper for term_effect in ablation.term_effects],
+            COLOURS[2],
+            0.0,
+        ),
     )
     for label, differences, colour, shift in series:
         known = [(place + shift, item) for place, item in zip(places, differences, strict=True) if item]
@@ -82,13 +97,13 @@ def _ablation(axes: Any, ablation: Ablation) -> None:
             label=label,
         )
     axes.axvline(0.0, color='black', linewidth=0.8)
-    axes.set_yticks(places, [_named(worth) for worth in ablation.worths])
+    axes.set_yticks(places, [_named(term_effect) for term_effect in ablation.term_effects])
     axes.set_ylim(len(places) - 0.5, -0.5)
     axes.set(xlabel='change of accuracy (percentage points)')
     axes.set_title(f'{ablation.scene}: {100 * ablation.accuracy:.0f} % right, {ablation.slide_us:.0f} µs a slide')
 
 
-def _named(worth: Worth) -> str:
+def _named(term_effect: TermEffect) -> str:
     """Return the term, marked unless it decides, with what it adds to the time of a slide."""
-    mark = '' if worth.verdict == 'decides' else f' ({worth.verdict})'
-    return f'{worth.term.replace("_", " ")}{mark}\ncosts {worth.cost_us:.0f} µs'
+    mark = '' if term_effect.verdict == 'decides' else f' ({term_effect.verdict})'
+    return f'{term_effect.term.replace("_", " ")}{mark}\ncosts {term_effect.cost_us:.0f} µs'

@@ -42,7 +42,7 @@ class ScanCost:
 
 
 @dataclass(frozen=True)
-class Load:
+class DeviceLoad:
     """What an emulated device costs in real time.
 
     Parameters
@@ -77,7 +77,7 @@ def stuck_surfaces(scene: Scene) -> Mapping[bool, list[str]]:
     return {kind: [name for name, value in sticks.items() if value is kind] for kind in (False, True)}
 
 
-def live_load(name: str, surface: str, seconds: float) -> Load:
+def live_load(name: str, surface: str, seconds: float) -> DeviceLoad:
     """Return what the emulated device of a scene costs while a finger slides over a surface in real time."""
     scene = load_scene(name)
     stream = SENSORS[scene.sensor].fast
@@ -92,7 +92,7 @@ def live_load(name: str, surface: str, seconds: float) -> Load:
             used_s, lasted_s = time.process_time() - cpu_s, time.monotonic() - began_s
             after = bench.counts
             steps, skipped = (after[key] - before[key] for key in ('samples', 'skipped samples'))
-            return Load(
+            return DeviceLoad(
                 cpu=used_s / lasted_s,
                 rate_hz=stream.rate_hz,
                 channels=len(stream.channels),

@@ -1,4 +1,4 @@
-"""What each effect of a scene is worth to the method of its paper: the experiment with it, and without."""
+"""What each effect of a scene contributes to the method of its paper: the experiment with it, and without."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from texture_benchmarks.papers import ets_linear, jamali
 from texture_benchmarks.papers.protocol import Protocol, folds, halves
 from texture_benchmarks.papers.trial import of_task
-from texture_benchmarks.scenes.trial import TOUCHINGS, Ablation, completed, difference, variants
+from texture_benchmarks.scenes.trial import TOUCH_PROTOCOLS, Ablation, completed, difference, variants
 from texture_simulation.scene import Scene, load_scene
 
 
@@ -34,9 +34,9 @@ def with_paper(ablation: Ablation, repeats: int, seed: int, *, quick: bool = Fal
     paper = PAPERS.get(ablation.scene)
     if not paper:
         return ablation
-    touching = TOUCHINGS[ablation.scene]
-    scene = completed(load_scene(ablation.scene), touching)
-    worlds = {term: world for term, world in variants(scene, touching).items() if term in scene.effects}
+    touch_protocol = TOUCH_PROTOCOLS[ablation.scene]
+    scene = completed(load_scene(ablation.scene), touch_protocol)
+    worlds = {term: world for term, world in variants(scene, touch_protocol).items() if term in scene.effects}
     right = np.array(
         [
             [_right(paper, world, seed + number, quick=quick) for world in (scene, *worlds.values())]
@@ -44,8 +44,8 @@ def with_paper(ablation: Ablation, repeats: int, seed: int, *, quick: bool = Fal
         ]
     )
     changes = {term: difference(column) for term, column in zip(worlds, (right[:, 1:] - right[:, :1]).T, strict=True)}
-    worths = [replace(worth, paper=changes.get(worth.term)) for worth in ablation.worths]
-    return replace(ablation, worths=worths, paper=float(right[:, 0].mean()))
+    term_effects = [replace(term_effect, paper=changes.get(term_effect.term)) for term_effect in ablation.term_effects]
+    return replace(ablation, term_effects=term_effects, paper=float(right[:, 0].mean()))
 
 
 def _right(paper: Paper, scene: Scene, seed: int, *, quick: bool) -> float:

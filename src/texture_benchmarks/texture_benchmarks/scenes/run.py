@@ -1,4 +1,4 @@
-"""What simulated scenes cost, and what each of their terms is worth."""
+"""What simulated scenes cost, and what each of their terms contributes."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.scenes.chart import ablation_chart, cost_chart
-from texture_benchmarks.scenes.costs import MANY, SCAN_S, Load, ScanCost, live_load, scan_cost, stuck_surfaces
+from texture_benchmarks.scenes.costs import MANY, SCAN_S, DeviceLoad, ScanCost, live_load, scan_cost, stuck_surfaces
 from texture_benchmarks.scenes.paper_ablation import with_paper
 from texture_benchmarks.scenes.tables import added_table, cost_table, term_table
 from texture_benchmarks.scenes.trial import (
     CONFIDENCE,
     HOST,
-    TOUCHINGS,
+    TOUCH_PROTOCOLS,
     Ablation,
-    Difference,
+    MeanDifference,
     ablate,
     completed,
     timed,
@@ -30,11 +30,11 @@ from texture_simulation.scene import Scene, load_scene
 
 TARGET_MS = {False: 1.0, True: 10.0}  # without and with stick-slip
 TARGET_CPU = 0.25
-# Dear scenes are felt less often: stick-slip costs ten times as much, eight channels five times.
+# Dear scenes are measured less often: stick-slip costs ten times as much, eight channels five times.
 FEWER: Mapping[str, int] = {'sticky': 5, 'jamali': 3}
 # Of each kind of sensor, and of stick-slip, a surface for the emulated device.
 DRIVEN: Mapping[str, str] = {
-    'bench': 'ridge_2mm_deep',
+    'twelve_textures': 'ridge_2mm_deep',
     'ets_linear': 'ridge_2a',
     'jamali': 'carpet_1',
     'kaboli': 'rough_star',
@@ -46,10 +46,10 @@ Weighed = tuple[Sequence[Ablation], Sequence[Ablation]]  # the terms of the scen
 
 
 @dataclass(frozen=True)
-class Size:
+class SceneBenchmarkSize:
     """How much is measured."""
 
-    scenes: tuple[str, ...] = tuple(TOUCHINGS)
+    scenes: tuple[str, ...] = tuple(TOUCH_PROTOCOLS)
     slides: int = 240
     repeats: int = 5
     paper_repeats: int = 3
@@ -60,8 +60,8 @@ class Size:
     timed_repeats: int = 5
 
 
-WHOLE = Size()
-QUICK = Size(
+WHOLE = SceneBenchmarkSize()
+QUICK = SceneBenchmarkSize(
     ('ets_linear', 'sticky'),
     slides=32,
     repeats=2,
@@ -74,28 +74,30 @@ QUICK = Size(
 )
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Time slides and emulated devices, remove each term of each scene in turn, and add what none of them names."""
-    size = QUICK if bench.quick else WHOLE
+    size = QUICK if options.quick else WHOLE
     costs = _costs(size)
     loads = {name: live_load(name, surface, size.live_s) for name, surface in DRIVEN.items() if name in size.scenes}
     ablations = [
-        with_paper(_ablation(name, size, bench.seed), size.paper_repeats, 1000 + bench.seed, quick=bench.quick)
+        with_paper(_ablation(name, size, options.seed), size.paper_repeats, 1000 + options.seed, quick=options.quick)
         for name in size.scenes
     ]
-    return _report(bench, size, costs, loads, (ablations, _added(size, bench.seed)))
+    return _report(options, size, costs, loads, (ablations, _added(size, options.seed)))
 
 
-def _report(bench: Bench, size: Size, costs: Costs, loads: Mapping[str, Load], weighed: Weighed) -> BenchResult:
+def _report(
+    options: BenchmarkOptions, size: SceneBenchmarkSize, costs: Costs, loads: Mapping[str, DeviceLoad], weighed: Weighed
+) -> BenchmarkResult:
     """Draw what was measured, write it as tables, and return it."""
     ablations, added = weighed
     charts = (
-        cost_chart(costs, TARGET_MS, loads, TARGET_CPU, bench.out / 'scenes_cost.png'),
-        ablation_chart([*ablations, _together(added)], bench.out / 'scenes_ablation.png'),
+        cost_chart(costs, TARGET_MS, loads, TARGET_CPU, options.out / 'scenes_cost.png'),
+        ablation_chart([*ablations, _together(added)], options.out / 'scenes_ablation.png'),
     )
     tables = (cost_table(costs, TARGET_MS, loads), added_table(added), term_table(ablations))
-    (bench.out / 'scenes.md').write_text('\n'.join(tables), encoding='utf-8')
-    return BenchResult(
+    (options.out / 'scenes.md').write_text('\n'.join(tables), encoding='utf-8')
+    return BenchmarkResult(
         name='scenes',
         measured=f'ms of computing for a slide of {SCAN_S} s with all channels, alone and as one of {size.many} at '
         'once, median over surfaces; computing time of emulated devices in real time, in share of one core, with '
@@ -113,16 +115,16 @@ def _report(bench: Bench, size: Size, costs: Costs, loads: Mapping[str, Load], w
             'live': {name: asdict(load) for name, load in loads.items()},
             'terms': {ablation.scene: _terms(ablation) for ablation in ablations},
             'added': {
-                worth.term: {'strength': asdict(EFFECTS[worth.term]()), **_terms(ablation)}
+                term_effect.term: {'strength': asdict(EFFECTS[term_effect.term]()), **_terms(ablation)}
                 for ablation in added
-                for worth in ablation.worths
+                for term_effect in ablation.term_effects
             },
         },
         charts=charts,
     )
 
 
-def _costs(size: Size) -> dict[tuple[str, bool], ScanCost]:
+def _costs(size: SceneBenchmarkSize) -> dict[tuple[str, bool], ScanCost]:
     """Return the costs by scene and whether the skin sticks and slips."""
     costs = {}
     for name in size.scenes:
@@ -133,32 +135,32 @@ def _costs(size: Size) -> dict[tuple[str, bool], ScanCost]:
     return costs
 
 
-def _ablation(name: str, size: Size, seed: int) -> Ablation:
-    return _weighed(completed(load_scene(name), TOUCHINGS[name]), size, seed)
+def _ablation(name: str, size: SceneBenchmarkSize, seed: int) -> Ablation:
+    return _weighed(completed(load_scene(name), TOUCH_PROTOCOLS[name]), size, seed)
 
 
-def _added(size: Size, seed: int) -> list[Ablation]:
+def _added(size: SceneBenchmarkSize, seed: int) -> list[Ablation]:
     """Return the worth of each effect that no scene names, in a scene that has no other of them."""
     return [_weighed(scene, size, seed, (name,)) for name, scene in with_one_more(load_scene(HOST)).items()]
 
 
-def _weighed(scene: Scene, size: Size, seed: int, terms: Sequence[str] = ()) -> Ablation:
-    touching = TOUCHINGS[scene.name]
+def _weighed(scene: Scene, size: SceneBenchmarkSize, seed: int, terms: Sequence[str] = ()) -> Ablation:
+    touch_protocol = TOUCH_PROTOCOLS[scene.name]
     slides = size.slides // FEWER.get(scene.name, 1)
-    done = ablate(scene, touching, slides, size.repeats, seed, terms=terms)
-    return timed(done, scene, touching, size.timed, size.timed_repeats)
+    done = ablate(scene, touch_protocol, slides, size.repeats, seed, terms=terms)
+    return timed(done, scene, touch_protocol, size.timed, size.timed_repeats)
 
 
 def _together(added: Sequence[Ablation]) -> Ablation:
     """Return scenes with one more effect each as one: accuracy and time are those without any of them."""
-    worths = list(itertools.chain.from_iterable(ablation.worths for ablation in added))
-    pairs = list(zip(added, worths, strict=True))
+    term_effects = list(itertools.chain.from_iterable(ablation.term_effects for ablation in added))
+    pairs = list(zip(added, term_effects, strict=True))
     return Ablation(
         f'{HOST}, with one of',
-        float(np.mean([ablation.accuracy + worth.easier.mean for ablation, worth in pairs])),
+        float(np.mean([ablation.accuracy + term_effect.easier.mean for ablation, term_effect in pairs])),
         added[0].tested,
-        worths,
-        float(np.median([ablation.slide_us - worth.cost_us for ablation, worth in pairs])),
+        term_effects,
+        float(np.median([ablation.slide_us - term_effect.cost_us for ablation, term_effect in pairs])),
     )
 
 
@@ -167,21 +169,21 @@ def _kind(name: str, sticks: bool) -> str:
 
 
 def _terms(ablation: Ablation) -> dict[str, Any]:
-    worths = {
-        worth.term: {
-            'accuracy_without': _numbers(worth.easier),
-            'accuracy_learnt_without': _numbers(worth.unprepared),
-            'decisions_changed': _numbers(worth.changed),
-            **({'paper_without': _numbers(worth.paper)} if worth.paper else {}),
-            'cost_us': round(worth.cost_us, 1),
-            'verdict': worth.verdict,
+    term_effects = {
+        term_effect.term: {
+            'accuracy_without': _numbers(term_effect.easier),
+            'accuracy_learnt_without': _numbers(term_effect.unprepared),
+            'decisions_changed': _numbers(term_effect.changed),
+            **({'paper_without': _numbers(term_effect.paper)} if term_effect.paper else {}),
+            'cost_us': round(term_effect.cost_us, 1),
+            'verdict': term_effect.verdict,
         }
-        for worth in ablation.worths
+        for term_effect in ablation.term_effects
     }
     whole = {'accuracy': round(ablation.accuracy, 4), 'tested': ablation.tested, 'slide_us': round(ablation.slide_us)}
     paper = {'paper_accuracy': round(ablation.paper, 4)} if ablation.paper is not None else {}
-    return {**whole, **paper, **worths}
+    return {**whole, **paper, **term_effects}
 
 
-def _numbers(difference: Difference) -> dict[str, float]:
+def _numbers(difference: MeanDifference) -> dict[str, float]:
     return {'change': round(difference.mean, 4), 'half_interval': round(difference.half, 4)}

@@ -1,15 +1,15 @@
-"""Tables of what simulated scenes cost, and of what their terms are worth, as markdown."""
+"""Tables of what simulated scenes cost, and of what their terms contribute, as markdown."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from texture_benchmarks.scenes.costs import Load, ScanCost
-from texture_benchmarks.scenes.trial import Ablation, Difference
+from texture_benchmarks.scenes.costs import DeviceLoad, ScanCost
+from texture_benchmarks.scenes.trial import Ablation, MeanDifference
 
 
 def cost_table(
-    costs: Mapping[tuple[str, bool], ScanCost], target_ms: Mapping[bool, float], loads: Mapping[str, Load]
+    costs: Mapping[tuple[str, bool], ScanCost], target_ms: Mapping[bool, float], loads: Mapping[str, DeviceLoad]
 ) -> str:
     """Return what a slide of each scene costs, and its emulated device."""
     rows = []
@@ -19,8 +19,8 @@ def cost_table(
         kind = f'`{name}`, stick-slip' if sticks else f'`{name}`'
         times = (f'{value:.2f}' for value in (cost.together_ms, cost.worst_ms, cost.alone_ms))
         rows.append((kind, *times, f'{target_ms[sticks]:g}', device))
-    heads = ('scene', 'each of many at once (ms)', 'dearest surface (ms)', 'alone (ms)', 'allowed (ms)')
-    return _table((*heads, 'device in real time (% of a core)'), rows)
+    regressors = ('scene', 'each of many at once (ms)', 'dearest surface (ms)', 'alone (ms)', 'allowed (ms)')
+    return _table((*regressors, 'device in real time (% of a core)'), rows)
 
 
 def term_table(ablations: Sequence[Ablation]) -> str:
@@ -28,44 +28,44 @@ def term_table(ablations: Sequence[Ablation]) -> str:
     rows = [
         (
             f'`{ablation.scene}`',
-            worth.term.replace('_', ' '),
-            f'{worth.cost_us:.0f}',
-            _points(worth.easier),
-            _points(worth.unprepared),
-            _points(worth.paper) if worth.paper else '',
-            worth.verdict,
+            term_effect.term.replace('_', ' '),
+            f'{term_effect.cost_us:.0f}',
+            _points(term_effect.easier),
+            _points(term_effect.unprepared),
+            _points(term_effect.paper) if term_effect.paper else '',
+            term_effect.verdict,
         )
         for ablation in ablations
-        for worth in ablation.worths
+        for term_effect in ablation.term_effects
     ]
-    heads = ('scene', 'term', 'costs (µs a slide)', 'change if nowhere (points)', 'change if not learnt from (points)')
-    return _table((*heads, "the paper's method, if nowhere", 'verdict'), rows)
+    regressors = ('scene', 'term', 'costs (µs a slide)', 'change if nowhere (points)', 'change if held out (points)')
+    return _table((*regressors, "the paper's method, if nowhere", 'verdict'), rows)
 
 
 def added_table(added: Sequence[Ablation]) -> str:
-    """Return for each effect put into a scene what it costs, and how well surfaces are then told apart."""
+    """Return for each effect put into a scene what it costs, and how well surfaces are then distinguished."""
     rows = []
     for ablation in added:
-        for worth in ablation.worths:
-            known, strange = (_points(difference) for difference in (_less(worth.easier), worth.unprepared))
-            rows.append((f'`{worth.term}`', f'{worth.cost_us:.0f}', known, strange, worth.verdict))
-    heads = (
+        for term_effect in ablation.term_effects:
+            known, novel = (_points(difference) for difference in (_less(term_effect.easier), term_effect.unprepared))
+            rows.append((f'`{term_effect.term}`', f'{term_effect.cost_us:.0f}', known, novel, term_effect.verdict))
+    regressors = (
         'effect',
         'costs (µs a slide)',
         'change if met and learnt (points)',
         'further change if not learnt (points)',
     )
-    return _table((*heads, 'verdict'), rows)
+    return _table((*regressors, 'verdict'), rows)
 
 
-def _less(difference: Difference) -> Difference:
-    return Difference(-difference.mean, difference.half)
+def _less(difference: MeanDifference) -> MeanDifference:
+    return MeanDifference(-difference.mean, difference.half)
 
 
-def _points(difference: Difference) -> str:
+def _points(difference: MeanDifference) -> str:
     return f'{100 * difference.mean:+.1f} ± {100 * difference.half:.1f}'
 
 
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = (heads, ['---'] * len(heads), *rows)
+def _table(regressors: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = (regressors, ['---'] * len(regressors), *rows)
     return ''.join(f'| {" | ".join(line)} |\n' for line in lines)

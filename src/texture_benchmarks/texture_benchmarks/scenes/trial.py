@@ -1,4 +1,4 @@
-"""What each term of a simulated scene is worth: its slides felt and recognised with the term, and without it."""
+"""Ablation of the terms of a simulated scene: recognition with each term and without it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Touching:
+class TouchProtocol:
     """How the surfaces of a scene are touched, as in its experiment.
 
     Parameters
@@ -50,12 +50,12 @@ class Touching:
     duration_s, radius_m
         Of each slide.
     turned_rad
-        A surface is felt once in each of these directions, and all are judged together.
+        A surface is measured once in each of these directions, and all are evaluated together.
     slow
         Whether the slow channels are used, too.
     tested_forces_n
         Other forces for the test; as in learning if empty.
-    learnt_by, tested_by
+    training_by, tested_by
         Individuals of the sensor.
     """
 
@@ -67,29 +67,29 @@ class Touching:
     turned_rad: Sequence[float] = (0.0,)
     slow: bool = False
     tested_forces_n: Sequence[float] = ()
-    learnt_by: Sequence[int] = (0,)
+    training_by: Sequence[int] = (0,)
     tested_by: Sequence[int] = (0,)
 
 
 RIGHT = np.pi / 2
 # The papers' conditions; slides of 2 and 3 s are cut to 1 s. On the bench, one learns as the demo does, and then
 # presses as one likes.
-TOUCHINGS: Mapping[str, Touching] = {
-    'bench': Touching((0.1,), (2.0,), tested_forces_n=(0.5, 2.0, 5.0)),
-    'ets_linear': Touching((0.10, 0.15, 0.20), (1.0, 2.5, 5.0)),
-    'ets_circular': Touching((0.1,), (2.5,), (RIGHT, np.pi / 3, np.pi / 4, 0.0), radius_m=0.02),
-    'ets_fine': Touching((0.125,), (2.0,), duration_s=0.8),
-    'roughness': Touching((0.10, 0.15, 0.20), (1.0, 2.5, 5.0), duration_s=0.7),
-    'jamali': Touching((0.05,), (1.0,), duration_s=1.0),
-    'kaboli': Touching((0.05,), (1.0,), duration_s=1.0, slow=True, learnt_by=(1, 2), tested_by=(0, 1)),
-    'hu': Touching((0.0255,), (1.5,), duration_s=1.0, turned_rad=(0.0, RIGHT)),
-    'sticky': Touching((0.02, 0.05), (1.0, 2.0)),
+TOUCH_PROTOCOLS: Mapping[str, TouchProtocol] = {
+    'twelve_textures': TouchProtocol((0.1,), (2.0,), tested_forces_n=(0.5, 2.0, 5.0)),
+    'ets_linear': TouchProtocol((0.10, 0.15, 0.20), (1.0, 2.5, 5.0)),
+    'ets_circular': TouchProtocol((0.1,), (2.5,), (RIGHT, np.pi / 3, np.pi / 4, 0.0), radius_m=0.02),
+    'ets_fine': TouchProtocol((0.125,), (2.0,), duration_s=0.8),
+    'roughness': TouchProtocol((0.10, 0.15, 0.20), (1.0, 2.5, 5.0), duration_s=0.7),
+    'jamali': TouchProtocol((0.05,), (1.0,), duration_s=1.0),
+    'kaboli': TouchProtocol((0.05,), (1.0,), duration_s=1.0, slow=True, training_by=(1, 2), tested_by=(0, 1)),
+    'hu': TouchProtocol((0.0255,), (1.5,), duration_s=1.0, turned_rad=(0.0, RIGHT)),
+    'sticky': TouchProtocol((0.02, 0.05), (1.0, 2.0)),
 }
 
 
 # Effects that left the scenes because they change no decision there; they are put back to be measured.
-LEFT: Mapping[str, Mapping[str, Any]] = {
-    'bench': {'slide_error': SlideError(0.01, 0.04), 'unevenness': Unevenness(0.15)},
+REMOVED_EFFECTS: Mapping[str, Mapping[str, Any]] = {
+    'twelve_textures': {'slide_error': SlideError(0.01, 0.04), 'unevenness': Unevenness(0.15)},
     'ets_circular': {'patch_growth': PatchGrowth(), 'force_gain': ForceGain(), 'unevenness': Unevenness(0.15)},
     'ets_fine': {'patch_growth': PatchGrowth(), 'force_gain': ForceGain(), 'unevenness': Unevenness(0.1)},
     'jamali': {'patch_growth': PatchGrowth()},
@@ -110,12 +110,12 @@ LEFT: Mapping[str, Mapping[str, Any]] = {
 
 
 # Effects that no scene names: each is put into `HOST` by itself, as strong as the catalogue has it, to be measured.
-HOST = 'bench'
+HOST = 'twelve_textures'
 ADDED = ('skids', 'motor_vibration', 'skin', 'mains_hum', 'drift', 'dropouts', 'quantisation')
 
 
 @dataclass(frozen=True, eq=False)
-class Felt:
+class SlideFeatures:
     """Features of slides, (n, n_features), and the number of the surface of each, (n,)."""
 
     values: Array
@@ -123,7 +123,7 @@ class Felt:
 
 
 @dataclass(frozen=True, eq=False)
-class Difference:
+class MeanDifference:
     """A mean difference over repetitions, in shares, and its half interval of 95 %."""
 
     mean: float
@@ -141,7 +141,7 @@ class Difference:
 
 
 @dataclass(frozen=True, eq=False)
-class Worth:
+class TermEffect:
     """What happens when a term is removed.
 
     Parameters
@@ -162,10 +162,10 @@ class Worth:
     """
 
     term: str
-    easier: Difference
-    unprepared: Difference
-    changed: Difference
-    paper: Difference | None = None
+    easier: MeanDifference
+    unprepared: MeanDifference
+    changed: MeanDifference
+    paper: MeanDifference | None = None
     cost_us: float = 0.0
 
     @property
@@ -186,10 +186,10 @@ class Ablation:
     scene
         Name.
     accuracy, paper
-        With which its surfaces are told apart, and by the paper's method, if known.
+        With which its surfaces are distinguished, and by the paper's method, if known.
     tested
         How many slides.
-    worths
+    term_effects
         Of its terms.
     slide_us
         Computing time of a slide.
@@ -198,26 +198,26 @@ class Ablation:
     scene: str
     accuracy: float
     tested: int
-    worths: Sequence[Worth] = field(default=())
+    term_effects: Sequence[TermEffect] = field(default=())
     slide_us: float = 0.0
     paper: float | None = None
 
 
-def completed(scene: Scene, touching: Touching) -> Scene:
-    """Return a scene with what has left it for changing no decision (`LEFT`)."""
-    for name, effect in LEFT.get(scene.name, {}).items():
-        contact = _grown(scene.contact, effect, touching, -1)
+def completed(scene: Scene, touch_protocol: TouchProtocol) -> Scene:
+    """Return a scene with what has left it for changing no decision (`REMOVED_EFFECTS`)."""
+    for name, effect in REMOVED_EFFECTS.get(scene.name, {}).items():
+        contact = _grown(scene.contact, effect, touch_protocol, -1)
         scene = replace(scene, effects={**scene.effects, name: effect}, contact=contact)
     return scene
 
 
-def variants(scene: Scene, touching: Touching) -> dict[str, Scene]:
+def variants(scene: Scene, touch_protocol: TouchProtocol) -> dict[str, Scene]:
     """Return the scene without each of its effects, with a contact of a point, and without friction.
 
     What grows with the force stays as large as at the mean force: a term that only sets a constant is none.
     """
     made = {
-        name: replace(_without(scene, name), contact=_grown(scene.contact, effect, touching, 1))
+        name: replace(_without(scene, name), contact=_grown(scene.contact, effect, touch_protocol, 1))
         for name, effect in scene.effects.items()
     }
     made[PATCH] = replace(scene, contact=replace(scene.contact, blur_m=MIN_BLUR_M))
@@ -234,11 +234,11 @@ def _without(scene: Scene, name: str) -> Scene:
     return scene.without(name)
 
 
-def _grown(contact: Contact, effect: Any, touching: Touching, sign: int) -> Contact:
+def _grown(contact: Contact, effect: Any, touch_protocol: TouchProtocol, sign: int) -> Contact:
     """Return the contact with the growth of an effect at the mean force in it (sign 1), or taken out of it (-1)."""
     if not isinstance(effect, GrowthEffect):
         return contact
-    force_n = np.array([np.mean(touching.forces_n)])
+    force_n = np.array([np.mean(touch_protocol.forces_n)])
     blur, gain = (float(np.max(growth(force_n))) ** sign for growth in (effect.blur_growth, effect.gain_growth))
     return replace(contact, blur_m=contact.blur_m * blur, stiffness_n_m=contact.stiffness_n_m * gain)
 
@@ -249,16 +249,16 @@ def with_one_more(scene: Scene) -> dict[str, Scene]:
 
 
 def ablate(
-    scene: Scene, touching: Touching, slides: int, repeats: int, seed: int, *, terms: Collection[str] = ()
+    scene: Scene, touch_protocol: TouchProtocol, slides: int, repeats: int, seed: int, *, terms: Collection[str] = ()
 ) -> Ablation:
-    """Return the worth of each term of a scene.
+    """Return the effect of each term of a scene.
 
     Parameters
     ----------
-    scene, touching
+    scene, touch_protocol
         What is touched, and how.
     slides
-        To learn from, and as many to test, about: as many of each surface.
+        To train on, and as many to test, about: as many of each surface.
     repeats
         How often all is done anew.
     seed
@@ -266,45 +266,52 @@ def ablate(
     terms
         Those to remove, one at a time; all if empty.
     """
-    others = {term: other for term, other in variants(scene, touching).items() if not terms or term in terms}
-    rows = [_repeat(scene, others, touching, slides, [seed, number]) for number in range(repeats)]
+    others = {term: other for term, other in variants(scene, touch_protocol).items() if not terms or term in terms}
+    rows = [_repeat(scene, others, touch_protocol, slides, [seed, number]) for number in range(repeats)]
     accuracy = float(np.mean([row.right for row in rows]))
-    worths = [_worth(term, rows) for term in others]
-    return Ablation(scene.name, accuracy, repeats * rows[0].tested, worths)
+    term_effects = [_term_effect(term, rows) for term in others]
+    return Ablation(scene.name, accuracy, repeats * rows[0].tested, term_effects)
 
 
-def scan_s(scene: Scene, touching: Touching, count: int) -> float:
+def scan_s(scene: Scene, touch_protocol: TouchProtocol, count: int) -> float:
     """Return the computing time of a slide, mean over all surfaces, `count` slides of each at once."""
     rng = np.random.default_rng(0)
     began = time.thread_time()
     for surface in scene.surfaces:
-        simulate_slide_streams(scene, surface, count, _sliding(touching, count, 0.0), rng)
+        simulate_slide_streams(scene, surface, count, _sliding(touch_protocol, count, 0.0), rng)
     return (time.thread_time() - began) / (count * len(scene.surfaces))
 
 
-def timed(ablation: Ablation, scene: Scene, touching: Touching, count: int, repeats: int) -> Ablation:
+def timed(ablation: Ablation, scene: Scene, touch_protocol: TouchProtocol, count: int, repeats: int) -> Ablation:
     """Return the same with the time that each term takes: medians of measurements taken in turn."""
-    others = variants(scene, touching)
-    compared = [scene, *(others[worth.term] for worth in ablation.worths)]
+    others = variants(scene, touch_protocol)
+    compared = [scene, *(others[term_effect.term] for term_effect in ablation.term_effects)]
     for made in compared:
-        scan_s(made, touching, count)  # makes what is made once
-    taken_us = 1e6 * np.array([[scan_s(made, touching, count) for made in compared] for _ in range(repeats)])
+        scan_s(made, touch_protocol, count)  # makes what is made once
+    taken_us = 1e6 * np.array([[scan_s(made, touch_protocol, count) for made in compared] for _ in range(repeats)])
     costs_us = np.median(taken_us[:, :1] - taken_us, axis=0)[1:]
-    worths = [replace(worth, cost_us=float(cost)) for worth, cost in zip(ablation.worths, costs_us, strict=True)]
-    return replace(ablation, worths=worths, slide_us=float(np.median(taken_us[:, 0])))
+    term_effects = [
+        replace(term_effect, cost_us=float(cost))
+        for term_effect, cost in zip(ablation.term_effects, costs_us, strict=True)
+    ]
+    return replace(ablation, term_effects=term_effects, slide_us=float(np.median(taken_us[:, 0])))
 
 
-def feel(scene: Scene, touching: Touching, count: int, seed: Sequence[int], fingers: Sequence[int]) -> Felt:
-    """Return `count` slides over each surface, dealt out to the fingers; their randomness follows from the seed."""
+def simulate_features(
+    scene: Scene, touch_protocol: TouchProtocol, count: int, seed: Sequence[int], fingers: Sequence[int]
+) -> SlideFeatures:
+    """Return `count` slides over each surface, assigned to the fingers; their randomness follows from the seed."""
     values = [
-        np.concatenate([_described(scene, name, touching, count, ([*seed, finger], finger)) for finger in fingers])
+        np.concatenate(
+            [_extracted(scene, name, touch_protocol, count, ([*seed, finger], finger)) for finger in fingers]
+        )
         for name in scene.surfaces
     ]
     codes = np.repeat(np.arange(len(values)), [len(part) for part in values])
-    return Felt(np.concatenate(values), codes)
+    return SlideFeatures(np.concatenate(values), codes)
 
 
-def describe(samples: Samples, rate_hz: float) -> Array:
+def extract_features(samples: Samples, rate_hz: float) -> Array:
     """Return the logarithm of the power in bands of each channel, (n, n_channels · BANDS)."""
     n_samples = samples.shape[1]
     spectrum = np.fft.rfft(samples * np.hanning(n_samples)[:, None], axis=1)
@@ -327,24 +334,26 @@ class _Row:
     differences: Mapping[str, tuple[float, float, float]]
 
 
-def _repeat(scene: Scene, others: Mapping[str, Scene], touching: Touching, slides: int, seed: list[int]) -> _Row:
+def _repeat(
+    scene: Scene, others: Mapping[str, Scene], touch_protocol: TouchProtocol, slides: int, seed: list[int]
+) -> _Row:
     count = max(2, round(slides / len(scene.surfaces)))
 
-    def learnt(of: Scene, part: int) -> Felt:
-        each = max(1, count // len(touching.learnt_by))
-        return feel(of, touching, each, [*seed, part], touching.learnt_by)
+    def training_features(of: Scene, part: int) -> SlideFeatures:
+        each = max(1, count // len(touch_protocol.training_by))
+        return simulate_features(of, touch_protocol, each, [*seed, part], touch_protocol.training_by)
 
-    def tested(of: Scene) -> Felt:
-        each = max(1, count // len(touching.tested_by))
-        pressed = replace(touching, forces_n=touching.tested_forces_n or touching.forces_n)
-        return feel(of, pressed, each, [*seed, 2], touching.tested_by)
+    def tested(of: Scene) -> SlideFeatures:
+        each = max(1, count // len(touch_protocol.tested_by))
+        pressed = replace(touch_protocol, forces_n=touch_protocol.tested_forces_n or touch_protocol.forces_n)
+        return simulate_features(of, pressed, each, [*seed, 2], touch_protocol.tested_by)
 
-    judge, test = _learner(learnt(scene, 0)), tested(scene)
-    answers, again = judge(test.values), _learner(learnt(scene, 1))(test.values)
+    predict, test = _learner(training_features(scene, 0)), tested(scene)
+    answers, again = predict(test.values), _learner(training_features(scene, 1))(test.values)
     right, usual = float(np.mean(answers == test.codes)), float(np.mean(answers != again))
     differences = {}
     for term, other in others.items():
-        own = _learner(learnt(other, 0))
+        own = _learner(training_features(other, 0))
         alone = tested(other)
         easier = float(np.mean(own(alone.values) == alone.codes)) - right
         unprepared = own(test.values)
@@ -356,49 +365,55 @@ def _repeat(scene: Scene, others: Mapping[str, Scene], touching: Touching, slide
     return _Row(right, len(test.codes), differences)
 
 
-def _worth(term: str, rows: Sequence[_Row]) -> Worth:
+def _term_effect(term: str, rows: Sequence[_Row]) -> TermEffect:
     easier, unprepared, changed = zip(*(row.differences[term] for row in rows), strict=True)
-    return Worth(term, difference(easier), difference(unprepared), difference(changed))
+    return TermEffect(term, difference(easier), difference(unprepared), difference(changed))
 
 
-def difference(values: Sequence[float] | Array) -> Difference:
+def difference(values: Sequence[float] | Array) -> MeanDifference:
     """Return the mean of differences, one of each repetition, with its interval."""
     mean = float(np.mean(values))
     if len(values) < 2:
-        return Difference(mean, np.inf)
+        return MeanDifference(mean, np.inf)
     spread = float(np.std(values, ddof=1)) / np.sqrt(len(values))
-    return Difference(mean, float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1)) * spread)
+    return MeanDifference(mean, float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1)) * spread)
 
 
-def _learner(felt: Felt) -> Callable[[Array], NDArray[np.intp]]:
+def _learner(measured: SlideFeatures) -> Callable[[Array], NDArray[np.intp]]:
     """Return what a linear discriminant with a shrunk covariance makes of examples."""
-    middle, scale = felt.values.mean(axis=0), np.maximum(felt.values.std(axis=0), 1e-9)
+    middle, scale = measured.values.mean(axis=0), np.maximum(measured.values.std(axis=0), 1e-9)
     learner = LinearDiscriminantAnalysis(solver='lsqr', shrinkage='auto')
-    learner.fit((felt.values - middle) / scale, felt.codes)
+    learner.fit((measured.values - middle) / scale, measured.codes)
 
-    def judge(values: Array) -> NDArray[np.intp]:
+    def predict(values: Array) -> NDArray[np.intp]:
         return np.asarray(learner.predict((values - middle) / scale))
 
-    return judge
+    return predict
 
 
-def _described(scene: Scene, surface: str, touching: Touching, count: int, who: tuple[Sequence[int], int]) -> Array:
+def _extracted(
+    scene: Scene, surface: str, touch_protocol: TouchProtocol, count: int, who: tuple[Sequence[int], int]
+) -> Array:
     """Return the features of slides over one surface, (count, n_features), by a finger with a seed."""
     seed, finger = who
     rng = np.random.default_rng([*seed, zlib.crc32(surface.encode())])
     fast, *others = SENSORS[scene.sensor].streams
     parts = []
-    for turned_rad in touching.turned_rad:
-        sliding = _sliding(touching, count, turned_rad)
-        felt = simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=touching.slow)
-        parts.append(describe(felt[fast.topic], fast.rate_hz))
-        for stream in others if touching.slow else ():
-            parts += [felt[stream.topic].mean(axis=1), np.log10(felt[stream.topic].std(axis=1) + 1.0)]
+    for turned_rad in touch_protocol.turned_rad:
+        sliding = _sliding(touch_protocol, count, turned_rad)
+        measured = simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=touch_protocol.slow)
+        parts.append(extract_features(measured[fast.topic], fast.rate_hz))
+        for stream in others if touch_protocol.slow else ():
+            parts += [measured[stream.topic].mean(axis=1), np.log10(measured[stream.topic].std(axis=1) + 1.0)]
     return np.concatenate(parts, axis=1)
 
 
-def _sliding(touching: Touching, count: int, turned_rad: float) -> SimulatedSlide:
+def _sliding(touch_protocol: TouchProtocol, count: int, turned_rad: float) -> SimulatedSlide:
     """Return slides that meet all conditions in turn."""
-    conditions = list(itertools.product(touching.speeds_m_s, touching.forces_n, touching.directions_rad))
+    conditions = list(
+        itertools.product(touch_protocol.speeds_m_s, touch_protocol.forces_n, touch_protocol.directions_rad)
+    )
     rows = np.array([conditions[number % len(conditions)] for number in range(count)])
-    return SimulatedSlide(rows[:, 0], rows[:, 1], touching.duration_s, rows[:, 2] + turned_rad, touching.radius_m)
+    return SimulatedSlide(
+        rows[:, 0], rows[:, 1], touch_protocol.duration_s, rows[:, 2] + turned_rad, touch_protocol.radius_m
+    )

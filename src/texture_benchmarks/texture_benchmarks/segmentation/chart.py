@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.segmentation.trial import Trial
+from texture_benchmarks.segmentation.trial import SegmentationTrial
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class DetectedSlides:
     """A vibration as recorded, (n_samples,), and the stretches in which it was found to slide, s."""
 
     samples: Array
@@ -23,7 +23,7 @@ class Found:
     spans: Sequence[tuple[float, float]]
 
 
-def error_strength_chart(trials: Mapping[str, Sequence[Trial]], target_s: float, path: str | Path) -> Path:
+def error_strength_chart(trials: Mapping[str, Sequence[SegmentationTrial]], target_s: float, path: str | Path) -> Path:
     """Draw the errors of start and end against how much stronger the vibration is than the noise, a colour a scene."""
     with chart(path, (9.0, 4.2), 'Start and end of sliding, found from the signal alone (simulated)') as figure:
         for axes, name in zip(figure.subplots(1, 2, sharex=True, sharey=True), ('start', 'end'), strict=True):
@@ -38,7 +38,7 @@ def error_strength_chart(trials: Mapping[str, Sequence[Trial]], target_s: float,
     return Path(path)
 
 
-def found_chart(recordings: Mapping[str, Found], title: str, path: str | Path) -> Path:
+def found_chart(recordings: Mapping[str, DetectedSlides], title: str, path: str | Path) -> Path:
     """Draw recordings below each other, with the stretches of sliding shaded."""
     with chart(path, (9.0, 0.6 + 1.1 * len(recordings)), title) as figure:
         rows = figure.subplots(len(recordings), 1, sharex=True, squeeze=False)[:, 0]

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.result import Bench, BenchResult
-from texture_benchmarks.segmentation.chart import Found, error_strength_chart, found_chart
-from texture_benchmarks.segmentation.trial import Trial, try_slide
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
+from texture_benchmarks.segmentation.chart import DetectedSlides, error_strength_chart, found_chart
+from texture_benchmarks.segmentation.trial import SegmentationTrial, try_slide
 from texture_core.arrays import Samples
-from texture_features.segmentation.cell_power import cell_power, rest_power
-from texture_features.segmentation.segments import SegmentParams, find_sliding
+from texture_features.segmentation.cell_power import baseline_power, cell_power
+from texture_features.segmentation.segments import SegmentationParams, find_sliding
 from texture_recordings.bags import read_bag
 from texture_recordings.importers.biotac20 import import_biotac20
 from texture_simulation.scene import load_scene
@@ -30,20 +30,20 @@ SHOWN_SLIDE = '5'
 SLOW_SMOOTH_S, SLOW_BRIDGE_S = 0.2, 0.5
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Find simulated slides, and some that were recorded."""
-    rng = np.random.default_rng(bench.seed)
-    scenes, speeds = (SCENES[2:4], SPEEDS_M_S[2:3]) if bench.quick else (SCENES, SPEEDS_M_S)
-    trials = {name: _trials(name, speeds, 1 if bench.quick else REPEATS, rng) for name in scenes}
-    charts = [error_strength_chart(trials, TARGET_S, bench.out / 'segmentation.png')]
-    source = bench.data / 'biotac20' if bench.data else None
+    rng = np.random.default_rng(options.seed)
+    scenes, speeds = (SCENES[2:4], SPEEDS_M_S[2:3]) if options.quick else (SCENES, SPEEDS_M_S)
+    trials = {name: _trials(name, speeds, 1 if options.quick else REPEATS, rng) for name in scenes}
+    charts = [error_strength_chart(trials, TARGET_S, options.out / 'segmentation.png')]
+    source = options.data / 'biotac20' if options.data else None
     if source is not None and source.is_dir():
         title = (
             f'BioTac, recorded slide {SHOWN_SLIDE} of {len(MATERIALS)} materials: PAC (counts) and the sliding found'
         )
-        charts.append(found_chart(_recordings(source), title, bench.out / 'segmentation_recorded.png'))
+        charts.append(found_chart(_recordings(source), title, options.out / 'segmentation_recorded.png'))
     everything = [trial for listed in trials.values() for trial in listed]
-    return BenchResult(
+    return BenchmarkResult(
         name='segmentation',
         measured='share of slides found as exactly one, and errors of start and end of steady sliding against the true '
         f'phases, ms (median and 95 % of their sizes); strong: at least {STRONG:g} times the power of the noise',
@@ -65,7 +65,7 @@ def run(bench: Bench) -> BenchResult:
     )
 
 
-def _trials(name: str, speeds: Sequence[float], repeats: int, rng: np.random.Generator) -> list[Trial]:
+def _trials(name: str, speeds: Sequence[float], repeats: int, rng: np.random.Generator) -> list[SegmentationTrial]:
     scene = load_scene(name)
     return [
         try_slide(scene, surface, speed, SLIDE_S, rng)
@@ -75,7 +75,7 @@ def _trials(name: str, speeds: Sequence[float], repeats: int, rng: np.random.Gen
     ]
 
 
-def _numbers(trials: Sequence[Trial]) -> Mapping[str, Any]:
+def _numbers(trials: Sequence[SegmentationTrial]) -> Mapping[str, Any]:
     once = [trial for trial in trials if trial.found == 1]
     numbers: dict[str, Any] = {'slides': len(trials), 'found': round(len(once) / max(len(trials), 1), 3)}
     for name in ('start', 'end'):
@@ -86,7 +86,7 @@ def _numbers(trials: Sequence[Trial]) -> Mapping[str, Any]:
     return numbers
 
 
-def _recordings(source: Path) -> dict[str, Found]:
+def _recordings(source: Path) -> dict[str, DetectedSlides]:
     """Return one recorded slide of some materials.
 
     They lie in contact from end to end: the load tells nothing, and the noise is taken from the quietest of them.
@@ -94,15 +94,15 @@ def _recordings(source: Path) -> dict[str, Found]:
     with tempfile.TemporaryDirectory() as folder:
         bags = import_biotac20(source, Path(folder), slides=SHOWN_SLIDE, materials=MATERIALS)
         signals = {bag.name: _vibration(bag) for bag in bags}
-    params = SegmentParams(senses='force', smooth_s=SLOW_SMOOTH_S, bridge_s=SLOW_BRIDGE_S)
+    params = SegmentationParams(quantity='force', smooth_s=SLOW_SMOOTH_S, max_gap_s=SLOW_BRIDGE_S)
     rest = min(
-        (rest_power(cell_power(*signal, params.cell_s, params.smooth_s)[1]) for signal in signals.values()),
+        (baseline_power(cell_power(*signal, params.cell_s, params.smooth_s)[1]) for signal in signals.values()),
         key=lambda power: float(power.sum()),
     )
     found = {}
     for name, (fast, rate_hz) in signals.items():
         spans = find_sliding(fast, rate_hz, params, rest=rest)
-        found[name] = Found(fast[:, 0], rate_hz, [(span.start_s, span.end_s) for span in spans])
+        found[name] = DetectedSlides(fast[:, 0], rate_hz, [(span.start_s, span.end_s) for span in spans])
     return found
 
 

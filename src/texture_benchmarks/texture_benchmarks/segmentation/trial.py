@@ -9,19 +9,20 @@ import numpy as np
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_features.segmentation.cell_power import cell_power, rest_power
-from texture_features.segmentation.segments import SegmentParams
+from texture_features.segmentation.cell_power import baseline_power, cell_power
+from texture_features.segmentation.segments import SegmentationParams
 from texture_features.segmentation.slide_segmenter import segment_recording
 from texture_simulation.offline import simulate_exploration
 from texture_simulation.scene import Scene
 
 FORCE_N = 2.0
-# What the vibration channel of a sensor model feels; see `texture_features.segmentation.cell_power.SENSES`.
-SENSES = {'tsf85': 'change', 'tsf85_3x4': 'change', 'biotac': 'force', 'daq': 'force', 'pvdf': 'force'}
+# What the vibration channel of a sensor model measures; see
+# `texture_features.segmentation.cell_power.MEASURED_QUANTITIES`.
+MEASURED_QUANTITIES = {'tsf85': 'change', 'tsf85_3x4': 'change', 'biotac': 'force', 'daq': 'force', 'pvdf': 'force'}
 
 
 @dataclass(frozen=True)
-class Trial:
+class SegmentationTrial:
     """One simulated slide and what was found; errors in s, later is above 0, NaN if not exactly one slide was found.
 
     `strength` is the power of the true slide in that of the sensor's noise.
@@ -35,16 +36,18 @@ class Trial:
     end_error_s: float
 
 
-def try_slide(scene: Scene, surface: str, speed_m_s: float, slide_s: float, rng: np.random.Generator) -> Trial:
+def try_slide(
+    scene: Scene, surface: str, speed_m_s: float, slide_s: float, rng: np.random.Generator
+) -> SegmentationTrial:
     """Return how well one slide is found from its signals alone."""
     states, signals = simulate_exploration(
         scene, surface, speed_m_s, FORCE_N, slide_s, start_ns=0, exploration_id='trial', rng=rng
     )
-    params = replace(SegmentParams(), senses=SENSES[scene.sensor])
+    params = replace(SegmentationParams(), quantity=MEASURED_QUANTITIES[scene.sensor])
     found, true = _spans(segment_recording(signals, params)), _spans(states)[0]
     errors = [found[0][i] - true[i] for i in (0, 1)] if len(found) == 1 else [np.nan, np.nan]
     strength = _strength(signals['signal'], true, params.cell_s)
-    return Trial(surface, speed_m_s, strength, len(found), float(errors[0]), float(errors[1]))
+    return SegmentationTrial(surface, speed_m_s, strength, len(found), float(errors[0]), float(errors[1]))
 
 
 def _spans(states: Sequence[ExplorationState]) -> list[tuple[float, float]]:
@@ -63,4 +66,4 @@ def _strength(batches: Sequence[TactileSignal], true: tuple[float, float], cell_
     samples = np.concatenate([batch.samples for batch in batches]).astype(np.float64)
     cell_s, powers = cell_power(samples, batches[0].sampling_rate_hz, cell_s)
     first, last = (round(at_s / cell_s) for at_s in true)
-    return float(np.nanmean(powers[first:last] / rest_power(powers)))
+    return float(np.nanmean(powers[first:last] / baseline_power(powers)))

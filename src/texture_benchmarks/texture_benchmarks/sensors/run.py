@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.sensors.trial import CHECKSUMMED, PROTOCOLS, LinkStatistics, link_statistics
 from texture_core.arrays import Array
 from texture_evaluation.charts import fault_chart
@@ -18,13 +18,15 @@ RATES = (1e-5, 1e-4, 1e-3, 1e-2)
 KINDS = {'drop': 'bytes lost', 'insert': 'bytes added', 'flip': 'one bit of a byte changed'}
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Send packets of each sensor through each kind and rate of fault."""
-    n_packets = QUICK_PACKETS if bench.quick else PACKETS
+    n_packets = QUICK_PACKETS if options.quick else PACKETS
     found = {
         sensor: {
             kind: {
-                rate: link_statistics(ByteFaults(**{kind: rate}), np.random.default_rng(bench.seed), n_packets, sensor)
+                rate: link_statistics(
+                    ByteFaults(**{kind: rate}), np.random.default_rng(options.seed), n_packets, sensor
+                )
                 for rate in RATES
             }
             for kind in KINDS
@@ -34,9 +36,9 @@ def run(bench: Bench) -> BenchResult:
     chart = fault_chart(
         {text: _lines(found, kind) for kind, text in KINDS.items()},
         'Packets recovered on a faulty line, and false ones believed (emulated devices)',
-        bench.out / 'sensors-faults.png',
+        options.out / 'sensors-faults.png',
     )
-    return BenchResult(
+    return BenchmarkResult(
         name='sensors-faults',
         measured='packets recovered unharmed, and false packets believed, of those sent',
         data=f'{n_packets} packets of random content from each emulated device; a packet is one frame on its line '

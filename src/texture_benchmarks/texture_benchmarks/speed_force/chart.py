@@ -1,4 +1,4 @@
-"""Charts of what is recognised at speeds, forces and in directions that were not taught."""
+"""Charts of what is recognised at speeds, forces and in directions that were not in the training set."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.speed_force.held_out import Outcome
+from texture_benchmarks.speed_force.held_out import HeldOutResult
 from texture_evaluation.charts import COLOURS, chart
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
-from texture_recordings.whole_slides import WholeSlide
+from texture_recordings.slide_samples import SlideSamples
 
 BEHIND = {'facecolor': 'white', 'edgecolor': 'none', 'pad': 0.5}
 MARKERS = 'osD^v'
 FINE = MeanSpatialBands(bands=64, floor=1e-9)
 
-Methods = Mapping[str, Mapping[str, Outcome]]
+Methods = Mapping[str, Mapping[str, HeldOutResult]]
 
 
 def held_out_chart(panels: Mapping[str, tuple[Methods, Mapping[str, float]]], path: str | Path) -> Path:
@@ -29,7 +29,7 @@ def held_out_chart(panels: Mapping[str, tuple[Methods, Mapping[str, float]]], pa
         Title → method → what was left out → outcome; and the goal by what was left out.
     """
     with chart(
-        path, (10.0, 2.2 * len(panels) + 0.8), 'Slides recognised under conditions that were not taught'
+        path, (10.0, 2.2 * len(panels) + 0.8), 'Slides recognised under conditions that were not in the training set'
     ) as figure:
         for axes, (title, (methods, goals)) in zip(figure.subplots(len(panels), 1), panels.items(), strict=True):
             _methods(axes, methods, goals)
@@ -38,23 +38,25 @@ def held_out_chart(panels: Mapping[str, tuple[Methods, Mapping[str, float]]], pa
     return Path(path)
 
 
-def window_chart(outcomes: Mapping[str, Outcome], goal: float, path: str | Path) -> Path:
-    """Draw the share of single windows recognised by the speed left out, a line for each way of teaching."""
+def window_chart(outcomes: Mapping[str, HeldOutResult], goal: float, path: str | Path) -> Path:
+    """Draw the share of single windows recognised by the speed left out, a line for each way of adding examples."""
     with chart(path, (7.0, 4.2)) as figure:
         axes = figure.subplots()
-        for (taught, outcome), colour, marker in zip(outcomes.items(), COLOURS, MARKERS, strict=False):
+        for (trained, outcome), colour, marker in zip(outcomes.items(), COLOURS, MARKERS, strict=False):
             speeds = [float(name) for name in outcome.right]
             share = [100 * part.mean() for part in outcome.right.values()]
-            label = f'{taught}: {100 * outcome.accuracy:.1f} % on average'
+            label = f'{trained}: {100 * outcome.accuracy:.1f} % on average'
             axes.plot(speeds, share, marker=marker, color=colour, label=label)
         axes.axhline(100 * goal, color='k', linestyle='--', linewidth=1, label=f'goal for the average, {goal:.0%}')
-        axes.set(xlabel='speed that was not taught (mm/s)', ylabel='windows recognised (%)', ylim=(0, 103))
-        axes.set_title('Single windows of 0.6 s at a speed that was not taught (ntp21)\nTaught: windows of …')
+        axes.set(xlabel='speed that was not in the training set (mm/s)', ylabel='windows recognised (%)', ylim=(0, 103))
+        axes.set_title(
+            'Single windows of 0.6 s at a speed that was not in the training set (ntp21)\nTaught: windows of …'
+        )
         axes.legend(loc='lower right')
     return Path(path)
 
 
-def spectra_chart(slides: Sequence[WholeSlide], path: str | Path) -> Path:
+def spectra_chart(slides: Sequence[SlideSamples], path: str | Path) -> Path:
     """Draw the mean spectrum of one surface at each speed: over frequency, and over waves per metre."""
     with chart(path, (10.0, 4.0), f'One texture at several speeds ({slides[0].surface})') as figure:
         over_time, over_way = figure.subplots(1, 2, sharey=True)

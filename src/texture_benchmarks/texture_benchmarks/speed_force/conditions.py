@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from texture_benchmarks.speed_force.held_out import Mask, Trial, recognised
+from texture_benchmarks.speed_force.held_out import EvaluateSplit, Mask, recognised
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.learners.learner import Learner
-from texture_features.feature import Feature, Windows
-from texture_recordings.whole_slides import WholeSlide
+from texture_features.feature import Feature, WindowBatch
+from texture_recordings.slide_samples import SlideSamples
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Conditions:
         At least one.
     """
 
-    slides: Sequence[WholeSlide]
+    slides: Sequence[SlideSamples]
 
     @property
     def surfaces(self) -> AnyArray:
@@ -52,8 +52,8 @@ class Conditions:
         """1 for a direction of positive angle, -1 for a negative one, (n,)."""
         return np.array([math.copysign(1.0, math.sin(slide.direction_rad)) for slide in self.slides])
 
-    def trial(self, values: Array, learner: Learner, tested_values: Array | None = None) -> Trial:
-        """Return what teaches one example a slide, (n, n_features), and tests others; described otherwise if given."""
+    def trial(self, values: Array, learner: Learner, tested_values: Array | None = None) -> EvaluateSplit:
+        """Return what trains one example a slide, (n, n_features), and tests others; described otherwise if given."""
         surfaces, names = self.surfaces, self.names
         tested = values if tested_values is None else tested_values
 
@@ -63,11 +63,11 @@ class Conditions:
         return test
 
 
-def described(features: Sequence[Feature], windows: Sequence[Windows]) -> Array:
+def extracted(features: Sequence[Feature], windows: Sequence[WindowBatch]) -> Array:
     """Return the values of features, one row for each window there is, (n, n_features)."""
     return np.concatenate([_rows(features, window) for window in windows])
 
 
-def _rows(features: Sequence[Feature], windows: Windows) -> Array:
+def _rows(features: Sequence[Feature], windows: WindowBatch) -> Array:
     values = [feature(windows) for feature in features]
     return np.atleast_2d(np.concatenate([value.reshape(*value.shape[:-2], -1) for value in values], axis=-1))

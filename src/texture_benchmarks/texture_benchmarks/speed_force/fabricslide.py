@@ -1,4 +1,4 @@
-"""Fabrics under slow taxels at forces, speeds and in directions that were not taught.
+"""Fabrics under slow taxels at forces, speeds and in directions that were not in the training set.
 
 Each fabric was mounted once, and the shares of the load among the taxels know the mounting, too.
 """
@@ -8,14 +8,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from texture_benchmarks.speed_force.conditions import Conditions, described
-from texture_benchmarks.speed_force.held_out import Mask, Outcome, Trial, one_out, recognised, run, run_chosen
-from texture_benchmarks.speed_force.turns import TurnFree
+from texture_benchmarks.speed_force.conditions import Conditions, extracted
+from texture_benchmarks.speed_force.held_out import (
+    EvaluateSplit,
+    HeldOutResult,
+    Mask,
+    one_out,
+    recognised,
+    run,
+    run_chosen,
+)
+from texture_benchmarks.speed_force.nuisance_projection import NuisanceProjection
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.learners.learner import Learner
 from texture_estimation.learners.svm_rbf import SvmRbf
-from texture_features.feature import Feature, Windows
-from texture_features.features.level_share import LevelShare
+from texture_features.feature import Feature, WindowBatch
+from texture_features.features.centred_log_ratio import CentredLogRatio
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
 
 COMPLETE = ('BeigeCotton', 'BrownCotton', 'Canvas', 'Linen')  # of all forces, speeds and directions
@@ -51,12 +59,12 @@ class Fabricslide:
             'one direction out': one_out(self.conditions.upwards),
         }
 
-    def loads(self) -> dict[str, Outcome]:
+    def loads(self) -> dict[str, HeldOutResult]:
         """Return how slides are recognised from the shares of the load; no speed is needed.
 
         How much of what a turn changes is taken out is chosen within the training: for forces and speeds by leaving
         another one out; for directions by slides of another force whose finger has not moved yet, as there is no other
-        direction to learn from.
+        direction for training.
         """
         starts, steady = self._shares()
         slides = {f'{energy:.0%}': self._load_trial(starts, steady, energy) for energy in self.energies}
@@ -71,30 +79,30 @@ class Fabricslide:
             name: run_chosen(slides, parts, inner[name][1], inner[name][0]) for name, parts in self.splits().items()
         }
 
-    def loads_as_they_are(self) -> dict[str, Outcome]:
+    def loads_as_they_are(self) -> dict[str, HeldOutResult]:
         """Return the same with nothing taken out."""
         trial = self._load_trial(*self._shares(), energy=0.0)
         return {name: run(trial, parts) for name, parts in self.splits().items()}
 
-    def bands(self) -> dict[str, Outcome]:
+    def bands(self) -> dict[str, HeldOutResult]:
         """Return how slides are recognised without the pattern: from mean bands of waves per metre."""
         windows = [slide.windows() for slide in self.conditions.slides]
-        trial = self.conditions.trial(described([BANDS], windows), SvmRbf())
+        trial = self.conditions.trial(extracted([BANDS], windows), SvmRbf())
         return {name: run(trial, parts) for name, parts in self.splits().items()}
 
     def _shares(self) -> tuple[Array, Array]:
         """Return the load when each finger is about to slide and while it slides, (n, n_taxels)."""
         slides = self.conditions.slides
-        share: Sequence[Feature] = [LevelShare()]
-        starts = described(share, [Windows(slide.before[:START_ROWS], slide.rate_hz) for slide in slides])
-        return starts, described(share, [slide.windows() for slide in slides])
+        share: Sequence[Feature] = [CentredLogRatio()]
+        starts = extracted(share, [WindowBatch(slide.before[:START_ROWS], slide.rate_hz) for slide in slides])
+        return starts, extracted(share, [slide.windows() for slide in slides])
 
-    def _load_trial(self, starts: Array, steady: Array, energy: float, tested: Array | None = None) -> Trial:
+    def _load_trial(self, starts: Array, steady: Array, energy: float, tested: Array | None = None) -> EvaluateSplit:
         surfaces, names = self.conditions.surfaces, self.conditions.names
         asked: AnyArray = steady if tested is None else tested
 
         def trial(train: Mask, test: Mask) -> Mask:
-            free = TurnFree.learnt(starts[train], steady[train], energy)
+            free = NuisanceProjection.fit(starts[train], steady[train], energy)
             return recognised(
                 self.learner, (free(steady[train]), surfaces[train], names[train]), (free(asked[test]), surfaces[test])
             )

@@ -1,4 +1,4 @@
-"""Leave one condition out: learn from the others, choose what is to be chosen among the others alone, then test."""
+"""Leave one condition out: train on the others, choose what is to be chosen among the others alone, then test."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from texture_estimation.learners.learner import Learner
 
 Mask = NDArray[np.bool_]
 # (which slides train, which are tested) -> whether each test example is recognised
-Trial = Callable[[Mask, Mask], Mask]
+EvaluateSplit = Callable[[Mask, Mask], Mask]
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class HeldOutResult:
     """What came out, by the condition left out.
 
     Parameters
@@ -59,17 +59,17 @@ def one_out(conditions: AnyArray, within: Mask | None = None) -> dict[str, tuple
     }
 
 
-def run(trial: Trial, parts: Mapping[str, tuple[Mask, Mask]]) -> Outcome:
+def run(trial: EvaluateSplit, parts: Mapping[str, tuple[Mask, Mask]]) -> HeldOutResult:
     """Test each part."""
-    return Outcome({name: trial(train, test) for name, (train, test) in parts.items()})
+    return HeldOutResult({name: trial(train, test) for name, (train, test) in parts.items()})
 
 
 def run_chosen(
-    candidates: Mapping[str, Trial],
+    candidates: Mapping[str, EvaluateSplit],
     parts: Mapping[str, tuple[Mask, Mask]],
     conditions: Sequence[AnyArray],
-    rehearsals: Mapping[str, Trial] | None = None,
-) -> Outcome:
+    inner_trials: Mapping[str, EvaluateSplit] | None = None,
+) -> HeldOutResult:
     """Test each part by the candidate that does best within its training slides, each condition there left out in turn.
 
     Of candidates that do alike, the first is taken.
@@ -82,34 +82,34 @@ def run_chosen(
         Train and test slides by what is left out.
     conditions
         What is left out in turn within the training.
-    rehearsals
-        Trials of the same names that judge the candidates there, if something else is to be tested than at the end.
+    inner_trials
+        Trials of the same names that evaluate the candidates there, if something else is to be tested than at the end.
     """
-    judges = candidates if rehearsals is None else rehearsals
+    judges = candidates if inner_trials is None else inner_trials
     right, chosen = {}, {}
     for name, (train, test) in parts.items():
         inner = [part for values in conditions for part in one_out(values, train).values() if part[0].any()]
         scores = {key: np.mean([trial(*part).mean() for part in inner]) for key, trial in judges.items()}
         best = max(scores, key=lambda key: scores[key])
         right[name], chosen[name] = candidates[best](train, test), best
-    return Outcome(right, chosen)
+    return HeldOutResult(right, chosen)
 
 
-def recognised(learner: Learner, taught: tuple[Array, AnyArray, AnyArray], tested: tuple[Array, AnyArray]) -> Mask:
+def recognised(learner: Learner, trained: tuple[Array, AnyArray, AnyArray], tested: tuple[Array, AnyArray]) -> Mask:
     """Return whether each test example is recognised.
 
     Parameters
     ----------
     learner
         What learns.
-    taught
+    trained
         Values (n, n_features), surfaces (n,) and slides (n,).
     tested
         Values (m, n_features) and surfaces (m,).
     """
-    values, surfaces, slides = taught
+    values, surfaces, slides = trained
     labels, codes = np.unique(surfaces, return_inverse=True)
     _, groups = np.unique(slides, return_inverse=True)
-    parts = learner.fit(values, codes, groups).parts
-    answers = labels[learner.array_form(parts)(tested[0]).argmax(axis=-1)]
+    parts = learner.fit(values, codes, groups).parameters
+    answers = labels[learner.predictor(parts)(tested[0]).argmax(axis=-1)]
     return np.asarray(answers == tested[1])

@@ -37,7 +37,7 @@ class Borders:
 
 @dataclass(frozen=True, eq=False)
 class Vibration:
-    """How a dragged tip vibrates over the speed, (n,) each; NaN is no period; and what is felt at some speeds."""
+    """How a dragged tip vibrates over the speed, (n,) each; NaN is no period; and what is measured at some speeds."""
 
     speed_m_s: Array
     critical_m_s: float

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.result import Bench, BenchResult
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.stick_slip.chart import Borders, Costs, Vibration, border_chart, cost_chart, vibration_chart
 from texture_core.arrays import Array
 from texture_simulation.stick_slip.friction import StickSlip
@@ -43,18 +43,18 @@ FINE_S = 2e-5
 TARGET_MS = 10.0
 
 
-def run(bench: Bench) -> BenchResult:
+def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Compare the integrators, find their borders, and time the default."""
-    compared_s = QUICK_COMPARED_S if bench.quick else COMPARED_S
-    costs = _costs(compared_s, thin=2 if bench.quick else 1)
-    borders = _borders(STIFFNESSES_1_M[:: 3 if bench.quick else 1])
-    vibration = _vibration(SPEED_SHARES[:: 4 if bench.quick else 1])
+    compared_s = QUICK_COMPARED_S if options.quick else COMPARED_S
+    costs = _costs(compared_s, thin=2 if options.quick else 1)
+    borders = _borders(STIFFNESSES_1_M[:: 3 if options.quick else 1])
+    vibration = _vibration(SPEED_SHARES[:: 4 if options.quick else 1])
     charts = (
-        cost_chart(costs, bench.out / 'stick_slip_cost.png'),
-        border_chart(borders, bench.out / 'stick_slip_border.png'),
-        vibration_chart(vibration, bench.out / 'stick_slip_vibration.png'),
+        cost_chart(costs, options.out / 'stick_slip_cost.png'),
+        border_chart(borders, options.out / 'stick_slip_border.png'),
+        vibration_chart(vibration, options.out / 'stick_slip_vibration.png'),
     )
-    return BenchResult(
+    return BenchmarkResult(
         name='stick_slip',
         measured=f'ms of one core for a scan of {SCAN_S} s; error: rms of the force on the skin over {compared_s} s '
         'against Radau, as share of the rms of its vibration; border: longest stable step, predicted and found',
@@ -63,7 +63,7 @@ def run(bench: Bench) -> BenchResult:
         numbers={
             'target_ms': TARGET_MS,
             'default': {'method': DEFAULT, 'step_us': 1e6 * FRICTION.step_s, **_margins()},
-            'scan_ms': _scan_ms(3 if bench.quick else 31),
+            'scan_ms': _scan_ms(3 if options.quick else 31),
             'integrators': {name: [dict(row) for row in rows] for name, rows in costs.rows.items()},
             'border_us': _border_numbers(borders),
             'vibration': {
@@ -94,16 +94,16 @@ def _scan_ms(repeats: int) -> dict[str, float]:
         x_m = np.arange(round(SCAN_S * rate_hz)) * SPEED_M_S / rate_hz * np.ones((*scans, 1))
         return Trajectory(x_m, np.zeros_like(x_m), np.full_like(x_m, FORCE_N))
 
-    def felt_n(rate_hz: float, scans: tuple[int, ...] = ()) -> Callable[[], Array]:
+    def measured_n(rate_hz: float, scans: tuple[int, ...] = ()) -> Callable[[], Array]:
         way = path(rate_hz, scans)
         return lambda: TipDrag(FRICTION, rate_hz).advance(way)
 
     alone = {
-        f'{sensor}, {rate_hz:g} points/s': 1000 * _median_s(felt_n(rate_hz), repeats)
+        f'{sensor}, {rate_hz:g} points/s': 1000 * _median_s(measured_n(rate_hz), repeats)
         for sensor, rate_hz in RATES_HZ.items()
     }
     rate_hz = RATES_HZ['TSF-85']
-    together_s = _median_s(felt_n(rate_hz, (MANY,)), max(1, repeats // 6))
+    together_s = _median_s(measured_n(rate_hz, (MANY,)), max(1, repeats // 6))
     return {**alone, f'each of {MANY} at once, {rate_hz:g} points/s': 1000 * together_s / MANY}
 
 

@@ -1,11 +1,11 @@
-"""`texture dashboard`: show a web page of what is felt, with buttons to explore and stop."""
+"""`texture dashboard`: show a web page of the live estimates, with buttons to explore and stop."""
 
 from __future__ import annotations
 
 import argparse
 
 from texture_bringup.dashboard.access import TOKEN_VARIABLE
-from texture_bringup.nodes.dashboard import Dashboard, DashboardParams
+from texture_bringup.nodes.dashboard import DashboardNode, DashboardParams
 from texture_core.ros.run_node import run_node
 
 
@@ -28,5 +28,5 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     parameters = {'host': options.host, 'port': options.port, 'recordings': options.recordings}
-    run_node(Dashboard, parameters, options.namespace)
+    run_node(DashboardNode, parameters, options.namespace)
     return 0

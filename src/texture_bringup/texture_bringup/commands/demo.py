@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_bringup.demo.plan import Plan
+from texture_bringup.demo.plan import DemoPlan
+from texture_bringup.demo.progress_log import ProgressLog
 from texture_bringup.demo.run import demonstrate
-from texture_bringup.demo.story import Story
 from texture_core.command_options import add_channels, add_seed
 from texture_evaluation.commands.train import WITH_SLOW_CHANNELS
 
@@ -22,9 +22,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the demonstration; return 1 if a slide was mistaken."""
     recipe = WITH_SLOW_CHANNELS['default'] if options.channels == 'all' else 'default'
-    with Story() as story:
-        story.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
-        all_right = demonstrate(options.out, recipe, options.seed, Plan(), story)
+    with ProgressLog() as progress:
+        progress.line('Everything physical in this demonstration is simulated: surfaces, arm and sensor.')
+        all_right = demonstrate(options.out, recipe, options.seed, DemoPlan(), progress)
         if not all_right:
-            story.line('Not every slide was recognised.')
+            progress.line('Not every slide was recognised.')
     return 0 if all_right else 1

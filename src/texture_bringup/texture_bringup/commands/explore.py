@@ -6,7 +6,7 @@ import argparse
 import sys
 from dataclasses import replace
 
-from texture_bringup.ros.operator import Explored, Operator
+from texture_bringup.ros.operator import ExplorationResult, Operator
 from texture_core.catalogue import find
 from texture_core.errors import MotionRefused
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if succeeded else 1
 
 
-def tell(explored: Explored) -> bool:
+def tell(explored: ExplorationResult) -> bool:
     """Print how an exploration ended; return whether it succeeded."""
     if sys.stderr.isatty():
         print(file=sys.stderr)

@@ -1,4 +1,4 @@
-"""`texture identify`: slide as tells most, again and again, until it is sure what the surface is."""
+"""`texture identify`: repeat the slide with the largest information gain until the texture is certain."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from texture_bringup.ros.operator import Operator
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.exploration import ExplorationRequest
-from texture_core.motion import Motion
-from texture_estimation.model import Model, load_model
-from texture_estimation.next_motion.choice import Explorations, slide_values
+from texture_core.slide_motion import SlideMotion
+from texture_estimation.model import TextureModel, load_model
+from texture_estimation.next_motion.next_touch_model import NextTouchModel, slide_values
 
 SHOWN = 3  # textures, of those that are possible
 
@@ -34,15 +34,15 @@ def run(options: argparse.Namespace) -> int:
             f'--slides is {options.slides} and --sure {options.sure:g}; 1 or more and a probability are needed'
         )
     model = load_model(options.model)
-    known = explorations_of(model)
-    belief, number = known.ignorance, 0
+    known = next_touch_model_of(model)
+    belief, number = known.uniform_log_prior, 0
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(deadline_s=10.0)
         while number < options.slides and np.exp(belief.max()) < options.sure:
             number += 1
-            motion, information = known.best(belief, list(known.felt))
+            motion, information = known.best_motion(belief, list(known.gaussians))
             print(f'slide {number}: {motion_text(motion)}; {information:.2f} nats expected')
-            explored, vectors = operator.feel(request_of(motion, options.surface), show_progress)
+            explored, vectors = operator.explore_with_features(request_of(motion, options.surface), show_progress)
             if not explored.success:
                 return int(not tell(explored))
             belief = known.update(belief, motion, slide_values(vectors, model.feature_set))
@@ -52,17 +52,17 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def explorations_of(model: Model) -> Explorations:
-    """Return what the textures feel like under each motion."""
-    if model.explorations is None:
+def next_touch_model_of(model: TextureModel) -> NextTouchModel:
+    """Return what the textures look like under each motion."""
+    if model.next_touch_model is None:
         raise InvalidParameter(
             f"model '{model.name}' knows no motions to choose from; train it on slides over every texture, two or more "
             'of each kind, in several directions or at several speeds or forces'
         )
-    return model.explorations
+    return model.next_touch_model
 
 
-def request_of(motion: Motion, surface: str) -> ExplorationRequest:
+def request_of(motion: SlideMotion, surface: str) -> ExplorationRequest:
     """Return the request for a motion."""
     return ExplorationRequest(
         motion.motion,
@@ -74,7 +74,7 @@ def request_of(motion: Motion, surface: str) -> ExplorationRequest:
     )
 
 
-def motion_text(motion: Motion) -> str:
+def motion_text(motion: SlideMotion) -> str:
     """Return a motion in words."""
     return (
         f'{motion.motion}, direction {motion.direction_rad:g} rad, {motion.speed_m_s:g} m/s, {motion.force_n:g} N, '
@@ -82,7 +82,7 @@ def motion_text(motion: Motion) -> str:
     )
 
 
-def belief_text(known: Explorations, belief: Array) -> str:
+def belief_text(known: NextTouchModel, belief: Array) -> str:
     """Return the most probable textures in words."""
     first = np.argsort(-belief, kind='stable')[:SHOWN]
     return ', '.join(f'{known.textures[k]} {np.exp(belief[k]):.2f}' for k in first)

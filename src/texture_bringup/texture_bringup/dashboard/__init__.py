@@ -1,1 +1,1 @@
-"""A web page for the operator: what is felt now, buttons to explore, stop, teach and record."""
+"""A web page for the operator: what is measured now, buttons to explore, stop, add and record."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from texture_bringup.dashboard.history import History
-from texture_bringup.dashboard.lights import Lights
+from texture_bringup.dashboard.node_status import NodeStatuses
 from texture_bringup.dashboard.ring import Ring, envelope, spectrum_db
 from texture_bringup.dashboard.taxels import Taxels
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
@@ -31,7 +31,7 @@ class Feed:
 
     def __init__(self) -> None:
         self.history = History()
-        self.lights = Lights()
+        self.node_statuses = NodeStatuses()
         self._ring = Ring(SIGNAL_S)
         self._taxels = Taxels()
         self._state = IDLE
@@ -59,9 +59,9 @@ class Feed:
 
     def on_texture(self, estimate: TextureEstimate) -> None:
         """Take an estimate; one of an exploration before the present one only enters its summary."""
-        told = {'label': estimate.label, 'confidence': _number(estimate.confidence), 'known': estimate.known}
+        reported = {'label': estimate.label, 'confidence': _number(estimate.confidence), 'known': estimate.known}
         if estimate.exploration_id in self.history:
-            self.history.add(estimate.exploration_id, told)
+            self.history.add(estimate.exploration_id, reported)
         if estimate.exploration_id == self._texture.exploration_id or not self._texture.exploration_id:
             self._texture = estimate
 
@@ -90,7 +90,7 @@ class Feed:
         text = json.dumps(frame, allow_nan=False)
         if self.exploring:
             self.history.add(self._state.exploration_id, {}, text)
-        rest = {'lights': self.lights.shown(time_s), 'past': self.history.listed(), 'recording': self.recording}
+        rest = {'lights': self.node_statuses.shown(time_s), 'past': self.history.listed(), 'recording': self.recording}
         return f'{text[:-1]}, {json.dumps(rest)[1:]}'
 
     def _signal(self) -> dict[str, Any]:

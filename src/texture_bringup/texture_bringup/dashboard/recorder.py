@@ -22,7 +22,7 @@ class Recorder:
 
     def __init__(self, folder: Path, namespace: str) -> None:
         self.bag = ''  # that is being recorded
-        self.trouble = ''  # with which the last recording ended
+        self.fault = ''  # with which the last recording ended
         self._folder = folder
         self._namespace = namespace.strip('/')
         self._child: ChildLauncher | None = None
@@ -37,7 +37,7 @@ class Recorder:
             self._child = ChildLauncher('record', arguments, os.environ, self._folder / f'{name}.log').__enter__()
         except OSError as error:
             raise InvalidParameter(f"nothing can be recorded in '{self._folder}': {error.strerror}") from error
-        self.trouble = ''
+        self.fault = ''
         self.bag = str(self._folder / name)
         return f"recording to '{self.bag}'"
 
@@ -58,4 +58,4 @@ class Recorder:
         try:
             child.check()
         except LaunchFailed as error:
-            self._child, self.bag, self.trouble = None, '', str(error)
+            self._child, self.bag, self.fault = None, '', str(error)

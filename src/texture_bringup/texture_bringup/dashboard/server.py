@@ -43,8 +43,8 @@ class Commands(Protocol):
     async def stop(self, asked: Mapping[str, Any]) -> Answer:
         """Stop what moves."""
 
-    async def learn(self, asked: Mapping[str, Any]) -> Answer:
-        """Teach an exploration, or undo it."""
+    async def add(self, asked: Mapping[str, Any]) -> Answer:
+        """Add an exploration, or undo it."""
 
     async def record(self, asked: Mapping[str, Any]) -> Answer:
         """Begin or end a recording."""
@@ -90,7 +90,7 @@ def make_app(commands: Commands, access: Access, page: Path) -> web.Application:
     app.router.add_get('/ws', _watch(viewers))
     app.router.add_get('/api/motions', _motions(commands))
     app.router.add_get('/api/past/{id}', _past(commands))
-    for name in ('explore', 'stop', 'learn', 'record'):
+    for name in ('explore', 'stop', 'add', 'record'):
         app.router.add_post(f'/api/{name}', _command(getattr(commands, name)))
     for path, (file, kind) in PAGE.items():
         app.router.add_get(path, _static(page / file, kind))

@@ -12,12 +12,12 @@ from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_evaluation.evaluate import Report
-from texture_evaluation.tour_chart import Tour, picture
+from texture_evaluation.evaluate import EvaluationReport
+from texture_evaluation.slide_overview_chart import SlideOverview, picture
 from texture_recordings.bags import read_bag
 
 
-def draw(bag: Path, surface: str, report: Report, source: str, path: Path) -> Path:
+def draw(bag: Path, surface: str, report: EvaluationReport, source: str, path: Path) -> Path:
     """Draw an exploration of a surface, and the confusion of all explorations in the bag.
 
     Parameters
@@ -25,7 +25,7 @@ def draw(bag: Path, surface: str, report: Report, source: str, path: Path) -> Pa
     bag
         With the signal, the states and the live estimates.
     surface
-        Of which surface: the exploration in which most was learnt on the way.
+        Of which surface: the exploration in which most was trained on the way.
     report
         Of the model on this bag.
     source
@@ -37,8 +37,10 @@ def draw(bag: Path, surface: str, report: Report, source: str, path: Path) -> Pa
     samples, rate_hz, unit = _sliding_part(states[name], batches)
     others = {states[each][0].surface: _sliding_part(states[each], batches)[0] for each in estimates}
     del others[surface]
-    tour = Tour(source, surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion, others)
-    return picture(tour, path)
+    overview = SlideOverview(
+        source, surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion, others
+    )
+    return picture(overview, path)
 
 
 def _first_share(estimates: Sequence[TextureEstimate]) -> float:

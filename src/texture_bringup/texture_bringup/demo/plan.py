@@ -10,7 +10,7 @@ from texture_core.exploration import ExplorationRequest
 
 
 @dataclass(frozen=True)
-class Plan:
+class DemoPlan:
     """Surfaces of the scene `twelve_textures`, slides over each, and the slide itself.
 
     The finger touches each time at another place; every second slide goes the other way.

@@ -8,15 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from texture_bringup.demo.bench import DemoBench
 from texture_bringup.demo.picture import draw
-from texture_bringup.demo.plan import Plan
+from texture_bringup.demo.plan import DemoPlan
+from texture_bringup.demo.progress_log import ProgressLog
 from texture_bringup.demo.results import Row, latencies_s, table
-from texture_bringup.demo.story import Story
+from texture_bringup.demo.rig import DemoRig
 from texture_core.errors import InvalidData
 from texture_evaluation.commands import train as training
 from texture_evaluation.commands.evaluate import percent
-from texture_evaluation.evaluate import Report, evaluate_bags
+from texture_evaluation.evaluate import EvaluationReport, evaluate_bags
 from texture_evaluation.train import train_from_bags
 
 SOURCE = 'simulated Robotiq TSF-85'
@@ -30,7 +30,7 @@ class Places:
 
     @property
     def learning_bag(self) -> Path:
-        """Recording of the slides learnt from."""
+        """Recording of the training slides."""
         return self.folder / 'learning_bag'
 
     @property
@@ -78,69 +78,69 @@ class Places:
             raise InvalidData(f"'{self.folder}' cannot be used: {error.strerror}; name another with --out") from error
 
 
-def demonstrate(out: Path, recipe: str, seed: int, plan: Plan, story: Story) -> bool:
+def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> bool:
     """Explore, learn, recognise and report on the emulator; return whether every slide was recognised."""
     places = Places(out)
     places.clear()
-    story.chapter('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')
+    progress.section('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')
     with (
         tempfile.TemporaryDirectory(prefix='texture_demo_') as folder,
-        DemoBench(Path(folder), places.log, recipe, seed) as bench,
+        DemoRig(Path(folder), places.log, recipe, seed) as rig,
     ):
-        story.line('5 nodes run, and the sensor delivers 1000 samples a second')
-        _learn(bench, places, plan, story)
-        _train(places, recipe, story)
-        bench.use_model(places.model.resolve())
-        story.line('the running classifier has taken the model over')
-        rows = _recognise(bench, places, plan, story)
-    report = _report(rows, places, plan, story)
+        progress.line('5 nodes run, and the sensor delivers 1000 samples a second')
+        _learn(rig, places, plan, progress)
+        _train(places, recipe, progress)
+        rig.use_model(places.model.resolve())
+        progress.line('the running classifier has taken the model over')
+        rows = _recognise(rig, places, plan, progress)
+    report = _report(rows, places, plan, progress)
     return all(row.right for row in rows) and len(report.known) == len(rows)
 
 
-def _learn(bench: DemoBench, places: Places, plan: Plan, story: Story) -> None:
-    story.chapter(f'Learning: {plan.learning_slides} slides over each of {len(plan.surfaces)} simulated surfaces')
-    with bench.recording(places.learning_bag):
+def _learn(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> None:
+    progress.section(f'Learning: {plan.learning_slides} slides over each of {len(plan.surfaces)} simulated surfaces')
+    with rig.recording(places.learning_bag):
         for surface in plan.surfaces:
-            story.part(f'{surface:<18}', first=True)
-            for number, _ in enumerate(bench.explore(surface, plan.requests(surface, plan.learning_slides)), start=1):
-                story.part(f'{", " * (number > 1)}slide {number}')
-            story.part(' recorded', last=True)
+            progress.part(f'{surface:<18}', first=True)
+            for number, _ in enumerate(rig.explore(surface, plan.requests(surface, plan.learning_slides)), start=1):
+                progress.part(f'{", " * (number > 1)}slide {number}')
+            progress.part(' recorded', last=True)
 
 
-def _train(places: Places, recipe: str, story: Story) -> None:
-    story.chapter('Training on that recording (the same as `texture train`)')
+def _train(places: Places, recipe: str, progress: ProgressLog) -> None:
+    progress.section('Training on that recording (the same as `texture train`)')
     model = train_from_bags(recipe, [places.learning_bag], out=places.model)
     for line in training.summary(model, places.model):
-        story.line(line)
+        progress.line(line)
 
 
-def _recognise(bench: DemoBench, places: Places, plan: Plan, story: Story) -> list[Row]:
-    story.chapter('Recognising: new slides at other places; each ends as soon as the classifier is certain')
+def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> list[Row]:
+    progress.section('Recognising: new slides at other places; each ends as soon as the classifier is certain')
     rows = []
-    with bench.recording(places.recognition_bag):
+    with rig.recording(places.recognition_bag):
         for surface in plan.surfaces:
-            story.part(f'{surface:<18}', first=True)
-            felt = bench.explore(surface, plan.requests(surface, plan.recognition_slides, early_stopping=True))
-            for number, explored in enumerate(felt):
+            progress.part(f'{surface:<18}', first=True)
+            measured = rig.explore(surface, plan.requests(surface, plan.recognition_slides, early_stopping=True))
+            for number, explored in enumerate(measured):
                 rows.append(Row(surface, explored.texture))
-                story.part(f'{", " if number else "felt as "}{explored.texture.label or "nothing"}')
-            story.part('', last=True)
+                progress.part(f'{", " if number else "felt as "}{explored.texture.label or "nothing"}')
+            progress.part('', last=True)
     return rows
 
 
-def _report(rows: list[Row], places: Places, plan: Plan, story: Story) -> Report:
-    story.chapter('Result')
+def _report(rows: list[Row], places: Places, plan: DemoPlan, progress: ProgressLog) -> EvaluationReport:
+    progress.section('Result')
     latencies: Mapping[str, float] = latencies_s(places.recognition_bag)
     for line in table(rows, latencies):
-        story.line(line)
+        progress.line(line)
     right = sum(row.right for row in rows)
-    story.line(f'{right} of {len(rows)} slides over simulated surfaces recognised')
-    story.line('latency: from the last sample of a window to its estimate at another process')
+    progress.line(f'{right} of {len(rows)} slides over simulated surfaces recognised')
+    progress.line('latency: from the last sample of a window to its estimate at another process')
     report = evaluate_bags(places.model, [places.recognition_bag])
     report.write(places.figures)
     windows = percent(report.as_json()['window_accuracy'])
-    story.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
+    progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
     draw(places.recognition_bag, plan.shown, report, SOURCE, places.picture)
-    story.chapter(f'Done. Look at {places.picture}')
-    story.line(f'recordings, model, figures and the log of the nodes are in {places.folder}/')
+    progress.section(f'Done. Look at {places.picture}')
+    progress.line(f'recordings, model, figures and the log of the nodes are in {places.folder}/')
     return report

@@ -37,7 +37,7 @@ from texture_core.ros.run import run
 from texture_exploration.safety import SafetyLimits
 
 ANSWER_DEADLINE_S = 30.0
-ASKED_AGAIN_S = 2.0
+RETRY_PERIOD_S = 2.0
 GONE_S = 10.0  # so long the explorer may be away before an exploration is given up
 MAX_CHARACTERS = 200
 LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
@@ -48,11 +48,11 @@ class DashboardParams:
     """Where the page is, and where recordings go."""
 
     host: str = param('127.0.0.1', 'Address to listen on; beyond loopback the page needs its token.')
-    port: int = param(8085, 'Port to listen on; 0: any that is free.', low=0, high=65535)
+    port: int = param(8085, 'TCP port to listen on; 0: any free port.', low=0, high=65535)
     recordings: str = param('recordings', 'Folder in which the button `record` makes new bags.')
 
 
-class Dashboard(Node):
+class DashboardNode(Node):
     """Serve the page: subscriptions fill the feed, a timer shows its frame, commands become calls."""
 
     def __init__(self) -> None:
@@ -90,24 +90,24 @@ class Dashboard(Node):
         seen_s = time.monotonic()
         while time.monotonic() - seen_s < GONE_S:
             try:
-                result = (await answer_of(ending, ASKED_AGAIN_S)).result
+                result = (await answer_of(ending, RETRY_PERIOD_S)).result
             except LaunchFailed:
                 seen_s = time.monotonic() if self._explorer.server_is_ready() else seen_s
                 continue
             return {'success': result.success, 'message': result.message, 'id': result.exploration_id}
         raise MotionAborted('the explorer has vanished; look at its output')
 
-    async def stop(self, _asked: Mapping[str, Any]) -> Mapping[str, Any]:
+    async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
         """Stop what moves."""
         return await self._ask(self._stop, Trigger.Request(), 'explorer')
 
-    async def learn(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Teach an exploration, the last one if it has no id, or undo the last lesson."""
+    async def add(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Add an exploration, the last one if it has no id, or remove the last added slide."""
         if asked.get('undo'):
             return await self._ask(self._undo, Trigger.Request(), 'classifier')
         label, exploration = (_short(str(asked.get(name, ''))).strip() for name in ('label', 'id'))
         if not label:
-            raise InvalidParameter('the texture to learn has no name; give one')
+            raise InvalidParameter('the texture to add has no name; give one')
         request = srv.AddTexture.Request(label=label, exploration_id=exploration)
         return await self._ask(self._learn, request, 'classifier')
 
@@ -124,7 +124,7 @@ class Dashboard(Node):
         if not self._limits.services_are_ready():
             return offered(SafetyLimits())
         try:
-            answer = await answer_of(self._limits.get_parameters(names), ASKED_AGAIN_S)
+            answer = await answer_of(self._limits.get_parameters(names), RETRY_PERIOD_S)
         except LaunchFailed:
             return offered(SafetyLimits())
         values = {name: value.double_value for name, value in zip(names, answer.values, strict=True)}
@@ -140,7 +140,7 @@ class Dashboard(Node):
         self._explorer = ActionClient(self, action.Explore, 'explore')
         self._stop = self.create_client(Trigger, 'stop')
         self._learn = self.create_client(srv.AddTexture, 'add_texture')
-        self._undo = self.create_client(Trigger, 'undo_learning')
+        self._undo = self.create_client(Trigger, 'remove_last_added')
         self._limits = AsyncParameterClient(self, 'explorer')
 
     def _subscribe(self) -> None:
@@ -167,7 +167,7 @@ class Dashboard(Node):
         for status in message.status:
             if status.name.startswith(ours):
                 level = LEVEL_NAMES.get(status.level, 'ERROR')
-                self._feed.lights.update(status.name.removeprefix(ours), level, status.message, time.monotonic())
+                self._feed.node_statuses.update(status.name.removeprefix(ours), level, status.message, time.monotonic())
 
     def _show(self) -> None:
         self._recorder.watch()
@@ -176,8 +176,8 @@ class Dashboard(Node):
             self._serving.show(self._feed.frame(time.monotonic()))
 
     def _report(self) -> DiagnosticReport:
-        trouble = self._recorder.trouble
-        return 'WARN' if trouble or self._bad else 'OK', trouble or 'the page is served', {'bad_messages': self._bad}
+        fault = self._recorder.fault
+        return 'WARN' if fault or self._bad else 'OK', fault or 'the page is served', {'bad_messages': self._bad}
 
     async def _ask(self, client: Any, request: Any, node: str) -> Mapping[str, Any]:
         await ready(client.service_is_ready, node)
@@ -193,4 +193,4 @@ def _short(value: Any) -> Any:
 
 def main() -> None:
     """Run the node."""
-    run(Dashboard)
+    run(DashboardNode)

@@ -38,14 +38,14 @@ SILENT_S = 75.0
 # So long until a goal is taken: that takes no time, unless the request has been lost with an explorer that just died.
 ACCEPT_S = 15.0
 # After so much silence the explorer is asked again: one that was started anew says that it knows of nothing.
-ASK_AGAIN_S = 5.0
+RETRY_PERIOD_S = 5.0
 # What this process sees, the other processes see soon after.
 DISCOVERY_S = 1.0
 Progress = Callable[[ExplorationState, TextureEstimate], None]
 
 
 @dataclass(frozen=True)
-class Explored:
+class ExplorationResult:
     """The answer to an exploration."""
 
     success: bool
@@ -80,7 +80,7 @@ class Operator:
         self._explore = ActionClient(self._node, action.Explore, 'explore')
         self._stop = self._node.create_client(Trigger, 'stop')
         self._settings: dict[str, AsyncParameterClient] = {}  # of each node, made once: every other node remembers it
-        self._heard_s = 0.0
+        self._received_s = 0.0
         self._vectors: list[FeatureVector] | None = None  # nobody listens yet
 
     def __enter__(self) -> Operator:
@@ -134,8 +134,10 @@ class Operator:
         """Return how many subscriptions a topic has."""
         return int(self._node.count_subscribers(topic))
 
-    def explore(self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None) -> Explored:
-        """Explore, and return what was felt; Ctrl-C stops the exploration before it goes on.
+    def explore(
+        self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
+    ) -> ExplorationResult:
+        """Explore, and return what was measured; Ctrl-C stops the exploration before it goes on.
 
         Raises
         ------
@@ -144,7 +146,7 @@ class Operator:
         """
 
         def on_feedback(message: Any) -> None:
-            self._heard_s = time.monotonic()
+            self._received_s = time.monotonic()
             on_progress(from_msg(message.feedback.state), from_msg(message.feedback.texture))
 
         accepted = self._explore.send_goal_async(request_to_msg(request), on_feedback)
@@ -170,13 +172,13 @@ class Operator:
         if answer.status == GoalStatus.STATUS_UNKNOWN:
             raise MotionAborted('the explorer was started anew and knows of no such exploration; it was broken off')
         result = answer.result
-        return Explored(
+        return ExplorationResult(
             result.success, result.message, result.exploration_id, from_msg(result.texture), from_msg(result.roughness)
         )
 
-    def feel(
+    def explore_with_features(
         self, request: ExplorationRequest, on_progress: Progress = lambda _state, _texture: None
-    ) -> tuple[Explored, list[FeatureVector]]:
+    ) -> tuple[ExplorationResult, list[FeatureVector]]:
         """Explore as `explore` does, and return the features of the windows, too; none of an aborted exploration.
 
         Raises
@@ -204,23 +206,23 @@ class Operator:
         self._until(future.done, deadline_s, 'the explorer does not answer')
         return str(future.result().message)
 
-    def learn(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
-        """Teach an exploration, the last one if '', as a texture; return its number of examples and what happened.
+    def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
+        """Add an exploration, the last one if '', to a texture; return its number of examples and a message.
 
         Raises
         ------
         LaunchFailed
             If no classifier answers.
         InvalidData
-            If it could not be learnt, with the reason.
+            If it could not be added, with the reason.
         """
         request = srv.AddTexture.Request(label=label, exploration_id=exploration_id)
         answer = self._ask_classifier(srv.AddTexture, 'add_texture', request, deadline_s)
         return int(answer.examples), str(answer.message)
 
-    def undo_learning(self, deadline_s: float = 30.0) -> str:
-        """Let the classifier unlearn the last lesson; return what happened. Raises as `learn` does."""
-        return str(self._ask_classifier(Trigger, 'undo_learning', Trigger.Request(), deadline_s).message)
+    def remove_last_added(self, deadline_s: float = 30.0) -> str:
+        """Let the classifier remove the slide that was added last; return what happened. Raises as `learn` does."""
+        return str(self._ask_classifier(Trigger, 'remove_last_added', Trigger.Request(), deadline_s).message)
 
     def _listen_to_features(self) -> list[FeatureVector]:
         """Return the list to which feature vectors are added as they come, once they would come."""
@@ -232,7 +234,7 @@ class Operator:
             msg.FeatureVector, 'features', lambda message: vectors.append(from_msg(message)), FEATURE_QOS
         )
         self._until(lambda: self._node.count_publishers('features') > 0, FEATURES_DEADLINE_S,
-                    'nobody describes what is felt; is the feature_extractor running?')  # fmt: skip
+                    'nobody describes what is measured; is the feature_extractor running?')  # fmt: skip
         self._settle()
         return vectors
 
@@ -282,8 +284,8 @@ class Operator:
     def _wait(
         self, condition: Callable[[], bool], silent_s: float, ask_again: Callable[[], None] = lambda: None
     ) -> None:
-        """Wait while there is an explorer; `ask_again` is called after each `ASK_AGAIN_S` of its silence."""
-        seen_s = asked_s = self._heard_s = time.monotonic()
+        """Wait while there is an explorer; `ask_again` is called after each `RETRY_PERIOD_S` of its silence."""
+        seen_s = requested_s = self._received_s = time.monotonic()
         while not condition():
             self._step()
             now_s = time.monotonic()
@@ -291,12 +293,12 @@ class Operator:
                 seen_s = now_s
             elif now_s - seen_s > GONE_S:
                 raise MotionAborted('the explorer has vanished; look at its output')
-            if now_s - self._heard_s > silent_s:
+            if now_s - self._received_s > silent_s:
                 raise MotionAborted(
                     f'no answer for {silent_s:g} s, though there is an explorer; stop it, and see that it is alone'
                 )
-            if now_s - max(asked_s, self._heard_s) > ASK_AGAIN_S:
-                asked_s = now_s
+            if now_s - max(requested_s, self._received_s) > RETRY_PERIOD_S:
+                requested_s = now_s
                 ask_again()
 
     def _until(self, condition: Callable[[], bool], deadline_s: float, complaint: str) -> None:

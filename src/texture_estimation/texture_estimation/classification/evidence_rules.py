@@ -1,4 +1,4 @@
-"""How the judgements of the windows of one slide are joined."""
+"""Rules that combine the window predictions of one slide."""
 
 from __future__ import annotations
 
@@ -25,44 +25,44 @@ class EvidenceRule(Protocol):
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    def voice(self, log_probabilities: Array) -> Array:
-        """Return what a window says, (..., n_labels), of its log-probabilities; the rule is given the mean of it."""
+    def window_evidence(self, log_probabilities: Array) -> Array:
+        """Return the evidence of a window, (..., n_labels), from its log-probabilities; the rule gets its mean."""
 
-    def log_posterior(self, mean_voice: Array, independent_windows: float | Array, growth: float) -> Array:
+    def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the log-probability of each texture given all windows so far, (..., n_labels).
 
         Parameters
         ----------
-        mean_voice : (..., n_labels)
-        independent_windows : (..., 1) or a number
-            Sliding time over the length of a window: as many windows would not overlap.
-        growth
-            Exponent with which the evidence of one slide grows, learnt from slides held out of the training.
+        mean_evidence : (..., n_labels)
+        effective_windows : (..., 1) or a number
+            Effective window count: sliding time over the length of a window.
+        tempering_exponent
+            Exponent of the effective window count, 0 to 1, fitted on held-out slides.
         """
 
-    def posterior(self, mean_voice: Array, independent_windows: float, growth: float) -> Array:
+    def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
         """Return the probabilities of which `log_posterior` gives the logarithms; it costs half of that."""
 
 
 @dataclass(frozen=True)
 class SoftVote:
-    """Mean log-probability of the windows, times the number of windows that they are worth.
+    """Mean log-probability of the windows, times their tempered effective number.
 
-    Windows that did not overlap and had nothing else in common would be worth their number n; those of one slide share
-    force, place and contact, and are worth n^growth, with `growth` learnt from slides held out of the training.
+    Independent windows would count as their number n. Windows of one slide share force, place and contact, and count
+    as n^tempering_exponent; the exponent is fitted on held-out slides.
     """
 
-    def voice(self, log_probabilities: Array) -> Array:
+    def window_evidence(self, log_probabilities: Array) -> Array:
         """Return the log-probabilities as they are."""
         return log_probabilities
 
-    def log_posterior(self, mean_voice: Array, independent_windows: float | Array, growth: float) -> Array:
-        """Return log softmax(n^growth · mean log p), the last axis being the textures."""
-        return log_softmax(mean_voice * independent_windows**growth)
+    def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
+        """Return log softmax(n^tempering_exponent · mean log p), the last axis being the textures."""
+        return log_softmax(mean_evidence * effective_windows**tempering_exponent)
 
-    def posterior(self, mean_voice: Array, independent_windows: float, growth: float) -> Array:
-        """Return softmax(n^growth · mean log p)."""
-        return softmax(mean_voice * independent_windows**growth)
+    def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
+        """Return softmax(n^tempering_exponent · mean log p)."""
+        return softmax(mean_evidence * effective_windows**tempering_exponent)
 
 
 @dataclass(frozen=True)
@@ -73,31 +73,33 @@ class MajorityVote:
     parts, and the answer that at least three of them give is the answer.
     """
 
-    share: float = param(0.6, 'Share of the votes that the answer needs; 0 for the most votes.', low=0.0, high=1.0)
-    parts: int = param(5, 'The share is that of so many windows at least, even when there are fewer yet.', low=1)
+    share: float = param(
+        0.6, 'Fraction of the votes that a label needs; 0: the label with the most votes wins.', low=0.0, high=1.0
+    )
+    windows: int = param(5, 'Number of windows to which the fraction refers while there are fewer.', low=1)
 
-    def voice(self, log_probabilities: Array) -> Array:
+    def window_evidence(self, log_probabilities: Array) -> Array:
         """Return 1 for the best label and 0 for the others; 0 for all if several are best."""
         best = log_probabilities == np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)
         alone = np.count_nonzero(best, axis=-1, keepdims=True) == 1
         votes: Array = (best & alone).astype(np.float64)
         return votes
 
-    def log_posterior(self, mean_voice: Array, independent_windows: float | Array, growth: float) -> Array:
+    def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the logarithm of the shares of the votes; equal ones for all labels where the majority is lacking.
 
-        What did not vote is shared out equally. `growth` does not matter: votes are counted.
+        What did not vote is shared out equally. `tempering_exponent` does not matter: votes are counted.
         """
-        n_labels = mean_voice.shape[-1]
-        most = np.maximum.reduce(mean_voice, axis=-1, keepdims=True) * independent_windows
-        won = most >= self.share * np.maximum(independent_windows, self.parts) - ROUNDING
-        abstained = 1.0 - np.add.reduce(mean_voice, axis=-1, keepdims=True)
-        shares = np.maximum(mean_voice + abstained / n_labels, MIN_SHARE)
+        n_labels = mean_evidence.shape[-1]
+        most = np.maximum.reduce(mean_evidence, axis=-1, keepdims=True) * effective_windows
+        won = most >= self.share * np.maximum(effective_windows, self.windows) - ROUNDING
+        abstained = 1.0 - np.add.reduce(mean_evidence, axis=-1, keepdims=True)
+        shares = np.maximum(mean_evidence + abstained / n_labels, MIN_SHARE)
         return log_softmax(np.where(won, np.log(shares), 0.0))
 
-    def posterior(self, mean_voice: Array, independent_windows: float, growth: float) -> Array:
+    def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
         """Return the shares of the votes; equal ones for all labels where the majority is lacking."""
-        probabilities: Array = np.exp(self.log_posterior(mean_voice, independent_windows, growth))
+        probabilities: Array = np.exp(self.log_posterior(mean_evidence, effective_windows, tempering_exponent))
         return probabilities
 
 

@@ -1,4 +1,4 @@
-"""A model that is taught while it is used: by one more slide, at once, and back."""
+"""Incremental classification: add one slide to a model while it is used, and remove it again."""
 
 from __future__ import annotations
 
@@ -12,101 +12,101 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_core.features import FeatureVector
 from texture_core.labels import checked_label
-from texture_estimation.incremental.added_examples import Lesson, remove_lesson, write_lesson
-from texture_estimation.model import Model
+from texture_estimation.incremental.added_slides import AddedSlide, remove_added_slide, write_added_slide
+from texture_estimation.model import TextureModel
 
-# Explorations that can still be taught, and windows of each: the latest.
+# Number of recent explorations that can be added, and of windows of each.
 EXPLORATIONS, WINDOWS = 20, 600
 
 
-class Pupil:
-    """Knows a model and what was felt lately, and makes from both a model that knows more.
+class IncrementalClassifier:
+    """Hold a model and the most recent windows, and update the model with slides of them.
 
     Parameters
     ----------
     model
-        Trained; what it was taught before is part of it.
+        Trained model, including the slides added to it before.
     path
-        Of the model: lessons are kept beside it. None keeps them in memory alone.
+        Path of the model, beside which added slides are stored; None keeps them in memory only.
 
     Raises
     ------
     ModelMismatch
-        If the model holds no examples to learn beside.
+        If the model holds no training examples.
     """
 
-    def __init__(self, model: Model, path: str | Path | None = None) -> None:
+    def __init__(self, model: TextureModel, path: str | Path | None = None) -> None:
         self.model = model
-        self._head = model.taught_head()
+        self._ridge_classifier = model.ridge_classifier()
         self._path = path
-        self._felt: OrderedDict[str, list[Array]] = OrderedDict()
+        self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
 
-    def remember(self, vector: FeatureVector) -> None:
-        """Keep a window, in case it is taught."""
+    def observe(self, vector: FeatureVector) -> None:
+        """Keep a window, so that its exploration can be added."""
         if vector.last or vector.feature_set != self.model.feature_set or not np.isfinite(vector.values).all():
             return
-        windows = self._felt.setdefault(vector.exploration_id, [])
-        self._felt.move_to_end(vector.exploration_id)
+        windows = self._recent_windows.setdefault(vector.exploration_id, [])
+        self._recent_windows.move_to_end(vector.exploration_id)
         windows.append(vector.values)
         del windows[:-WINDOWS]
-        while len(self._felt) > EXPLORATIONS:
-            self._felt.popitem(last=False)
+        while len(self._recent_windows) > EXPLORATIONS:
+            self._recent_windows.popitem(last=False)
 
-    def learn(self, label: str, exploration_id: str = '') -> int:
-        """Learn an exploration, the last one if '', under a label; return how many examples of it are known now.
+    def add(self, label: str, exploration_id: str = '') -> int:
+        """Add an exploration, the last one if '', as examples of a label; return their number now.
 
         Raises
         ------
         InvalidData
-            If there is no label or a forbidden one, nothing usable was felt in that exploration, or it already stands
-            under another label.
+            If there is no label or a forbidden one, nothing usable was measured in that exploration, or it already
+            stands under another label.
         OSError
-            If the lesson cannot be kept; it has not been learnt then.
+            If the slide cannot be stored; it has not been added then.
         """
         label = checked_label(label)
         if not label:
-            raise InvalidData('no label was given; name the texture to learn')
-        name = exploration_id or next(reversed(self._felt), '')
-        if name not in self._felt:
-            known = ', '.join(self._felt) or 'none'
-            raise InvalidData(
-                f"no usable window of exploration '{name}' was felt; explore first. Can be taught: {known}"
-            )
+            raise InvalidData('no label was given; name the texture to add')
+        name = exploration_id or next(reversed(self._recent_windows), '')
+        if name not in self._recent_windows:
+            known = ', '.join(self._recent_windows) or 'none'
+            raise InvalidData(f"exploration '{name}' has no usable window; explore first. Can be added: {known}")
         self._refuse_second_label(name, label)
-        lesson = Lesson(label, name, np.stack(self._felt[name]))
+        added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]))
         if self._path is not None:
-            write_lesson(self._path, len(self.model.lessons) + 1, lesson, self.model.feature_set)
-        self._become((*self.model.lessons, lesson), label)
-        return len(self._head.examples_of(self.model.labels.index(label)))
+            write_added_slide(self._path, len(self.model.added_slides) + 1, added_slide, self.model.feature_set)
+        self._update((*self.model.added_slides, added_slide), label)
+        return len(self._ridge_classifier.examples_of(self.model.labels.index(label)))
 
     def _refuse_second_label(self, exploration_id: str, label: str) -> None:
-        others = [kept.label for kept in self.model.lessons if kept.exploration_id == exploration_id != '']
+        others = [kept.label for kept in self.model.added_slides if kept.exploration_id == exploration_id != '']
         if others and label not in others:
             raise InvalidData(
                 f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot be '{label}', too: "
                 'undo that first, or explore again'
             )
 
-    def undo(self) -> Lesson:
-        """Unlearn the last lesson and return it.
+    def remove_last(self) -> AddedSlide:
+        """Remove the slide that was added last, and return it.
 
         Raises
         ------
         InvalidData
-            If nothing was taught.
+            If no slide was added.
         """
-        if not self.model.lessons:
-            raise InvalidData(f"model '{self.model.name}' was taught nothing that could be undone")
-        *before, last = self.model.lessons
+        if not self.model.added_slides:
+            raise InvalidData(f"model '{self.model.name}' has no added slides that could be removed")
+        *before, last = self.model.added_slides
         if self._path is not None:
-            remove_lesson(self._path, len(self.model.lessons))
-        self._become(tuple(before), last.label)
+            remove_added_slide(self._path, len(self.model.added_slides))
+        self._update(tuple(before), last.label)
         return last
 
-    def _become(self, lessons: tuple[Lesson, ...], label: str) -> None:
-        """Let the model know these lessons, of which only those of one label differ from before."""
-        taught = self.model.with_lessons(lessons)
-        labels = taught.labels if label in taught.labels else self.model.labels
-        as_trained = label in taught.trained_labels and all(lesson.label != label for lesson in lessons)
-        self._head.set_examples(labels.index(label), taught.examples_of(label), as_trained=as_trained)
-        self.model = dataclasses.replace(taught, taught=self._head.judge if lessons else None)
+    def _update(self, added_slides: tuple[AddedSlide, ...], label: str) -> None:
+        """Update the model to these added slides; only those of one label differ from before."""
+        updated = self.model.with_added_slides(added_slides)
+        labels = updated.labels if label in updated.labels else self.model.labels
+        as_trained = label in updated.trained_labels and all(added_slide.label != label for added_slide in added_slides)
+        self._ridge_classifier.set_examples(labels.index(label), updated.examples_of(label), as_trained=as_trained)
+        self.model = dataclasses.replace(
+            updated, incremental_predictor=self._ridge_classifier.predictor if added_slides else None
+        )

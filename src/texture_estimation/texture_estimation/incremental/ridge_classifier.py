@@ -1,13 +1,12 @@
-"""A judge that learns more textures in milliseconds: a linear layer in closed form over features that stay as they are.
+"""Ridge classifier on random Fourier features that adds textures in milliseconds, in closed form.
 
-What a window is described by does not change: the hidden layer of the network that was trained, if it was one, and
+The features of a window do not change: the hidden layer of the network that was trained, if it was one, and
 random cosines of the standardised features, which stand for a Gaussian kernel. Only a linear layer on top is fitted, by
 ridge regression to 1 for the own texture and 0 for the others, every texture counting alike however many examples it
-has. It depends on the examples of a texture through their mean and their second moments alone: teaching one changes
-these, and a linear system is solved anew. So nothing is forgotten, and the order of the lessons does not matter.
+has. It depends on the examples of a texture through their mean and their second moments alone: adding examples changes
+these, and a linear system is solved again. So nothing is forgotten, and the order of added slides does not matter.
 
-Among the textures of the training that were taught nothing since, the trained learner and the layer have half the say
-each.
+Among the textures of the training without added slides, trained learner and linear layer have equal weights.
 
 Source: Rahimi & Recht 2007 for the random features.
 """
@@ -24,7 +23,7 @@ from scipy.linalg import solve
 from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
-from texture_estimation.learners.learner import Codes, LogProbabilities
+from texture_estimation.learners.learner import Codes, Predictor
 from texture_estimation.learners.standardisation import standardisation
 from texture_estimation.log_probabilities import log_loss, log_softmax
 
@@ -36,12 +35,12 @@ RIDGE = 3e-4
 SEED = 0
 # Examples of a texture that count; more cost time and memory, and hardly help.
 MAX_EXAMPLES = 400
-DEFAULT_SHARPNESS = 10.0
+DEFAULT_INVERSE_TEMPERATURE = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class Lift:
-    """Fixed features of a window, made from those of the recipe.
+class RandomFourierFeatures:
+    """Random Fourier features and hidden units, computed from the features of the recipe.
 
     Parameters
     ----------
@@ -58,17 +57,17 @@ class Lift:
     hidden_offset: Array
 
     @classmethod
-    def over(cls, values: Array, parts: Mapping[str, Any] | None) -> Lift:
-        """Return the features for examples (n, n_features); `parts` are those of a network, or None."""
+    def over(cls, values: Array, parameters: Mapping[str, Any] | None) -> RandomFourierFeatures:
+        """Return the features for examples (n, n_features); `parameters` are those of a network, or None."""
         rng = np.random.default_rng(SEED)
         mean, scale = standardisation(values)
         count = values.shape[1]
         directions = rng.normal(size=(count, COSINES)) * (1.0 / (WIDTH * math.sqrt(count)))
         cosines = directions / scale[:, None]
         phases = rng.uniform(0.0, 2.0 * np.pi, COSINES) - mean @ cosines
-        if parts is None:
+        if parameters is None:
             return cls(cosines, phases, np.zeros((count, 0)), np.zeros(0))
-        hidden, offset = (np.asarray(parts[name], dtype=np.float64) for name in ('hidden', 'hidden_offset'))
+        hidden, offset = (np.asarray(parameters[name], dtype=np.float64) for name in ('hidden', 'hidden_offset'))
         deviation = np.maximum(values @ hidden + offset, 0.0).std(axis=0)
         weight = HIDDEN_WEIGHT / np.where(deviation > 0, deviation, 1.0)
         return cls(cosines, phases, hidden * weight, offset * weight)
@@ -76,35 +75,35 @@ class Lift:
     def __call__(self, values: Array) -> Array:
         """Return the features, (..., n_hidden + n_cosines + 1), of (..., n_features); the last is 1."""
         n_hidden, n_cosines = self.hidden.shape[1], self.cosines.shape[1]
-        lifted = np.ones((*values.shape[:-1], n_hidden + n_cosines + 1))
-        np.maximum(values @ self.hidden + self.hidden_offset, 0.0, out=lifted[..., :n_hidden])
-        np.cos(values @ self.cosines + self.phases, out=lifted[..., n_hidden:-1])
-        return lifted
+        expanded = np.ones((*values.shape[:-1], n_hidden + n_cosines + 1))
+        np.maximum(values @ self.hidden + self.hidden_offset, 0.0, out=expanded[..., :n_hidden])
+        np.cos(values @ self.cosines + self.phases, out=expanded[..., n_hidden:-1])
+        return expanded
 
 
 @dataclass(frozen=True, eq=False)
-class TaughtJudge:
-    """The linear layer over the fixed features, and what judges the labels of the training.
+class RidgePredictor:
+    """Linear layer over the random features, combined with the predictor of the training.
 
     Parameters
     ----------
-    lift
+    random_features
         The fixed features.
     weights : (n_lifted, n_labels)
     trained
-        What was trained, which knows the first labels.
+        Predictor of the training, for the first labels.
     kept : (n_kept,)
-        Numbers of the labels among which it has a say.
+        Numbers of the labels for which it is used.
     """
 
-    lift: Lift
+    random_features: RandomFourierFeatures
     weights: Array
-    trained: LogProbabilities
+    trained: Predictor
     kept: Codes
 
     def __call__(self, values: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        scores: Array = self.lift(values) @ self.weights
+        scores: Array = self.random_features(values) @ self.weights
         if len(self.kept) > 1:
             own = scores[..., self.kept]
             both = log_softmax(0.5 * (own + self.trained(values)[..., self.kept]))
@@ -114,8 +113,8 @@ class TaughtJudge:
         return scores
 
 
-class TaughtHead:
-    """What the linear layer is solved from.
+class RidgeClassifier:
+    """Ridge regression to class indicators, with equal class weights, updated label by label.
 
     Parameters
     ----------
@@ -123,8 +122,8 @@ class TaughtHead:
     codes, slides : (n,)
         Number of the label, 0…, and of the slide of each example.
     trained
-        What judges their labels since the training.
-    parts
+        Predictor of their labels from the training.
+    parameters
         Of the network that was trained on them, or None.
     """
 
@@ -134,29 +133,31 @@ class TaughtHead:
         codes: Codes,
         slides: Codes,
         *,
-        trained: LogProbabilities,
-        parts: Mapping[str, Any] | None = None,
+        trained: Predictor,
+        parameters: Mapping[str, Any] | None = None,
     ) -> None:
         self._trained = trained
         self._kept = set(range(int(codes.max()) + 1))
-        self._lift = Lift.over(values, parts)
+        self._random_features = RandomFourierFeatures.over(values, parameters)
         self._rows: list[Array] = [values[codes == code] for code in range(int(codes.max()) + 1)]
-        lifted = self._lift(values)
+        expanded = self._random_features(values)
         half = _half(codes, slides)
         halves = [
-            [_Moments.of(lifted[(codes == code) & (half == side)]) for code in range(len(self._rows))]
+            [_Moments.of(expanded[(codes == code) & (half == side)]) for code in range(len(self._rows))]
             for side in (0, 1)
         ]
         whole = [first.with_(second) for first, second in zip(*halves, strict=True)]
-        self._sharpness = _sharpness(halves, lifted, codes, half)
+        self._inverse_temperature = _inverse_temperature(halves, expanded, codes, half)
         self._squares = np.sum([moments.square for moments in whole], axis=0)
         self._means = [moments.mean for moments in whole]
 
     @property
-    def judge(self) -> TaughtJudge:
-        """What judges by all that is known now."""
-        weights = self._sharpness * _solve(self._squares, self._means)
-        return TaughtJudge(self._lift, weights, self._trained, np.array(sorted(self._kept), dtype=np.intp))
+    def predictor(self) -> RidgePredictor:
+        """Predictor of all examples so far."""
+        weights = self._inverse_temperature * _solve(self._squares, self._means)
+        return RidgePredictor(
+            self._random_features, weights, self._trained, np.array(sorted(self._kept), dtype=np.intp)
+        )
 
     def examples_of(self, code: int) -> Array:
         """Return the examples of a label, (n, n_features)."""
@@ -165,16 +166,20 @@ class TaughtHead:
     def set_examples(self, code: int, rows: Array, *, as_trained: bool = False) -> None:
         """Let `rows`, (n, n_features), be the examples of a label; of the next new one if `code` is their number.
 
-        None at all make the last label unknown. `as_trained`: they are those of the training, nothing was taught.
+        No rows remove the last label. `as_trained`: the rows are those of the training.
         """
         (self._kept.add if as_trained else self._kept.discard)(code)
         if code == len(self._rows):
             self._rows.append(rows[:0])
             self._means.append(np.zeros(len(self._squares)))
         before, after = self._rows[code], thinned(rows)
-        old = _Moments.of(self._lift(before))
+        old = _Moments.of(self._random_features(before))
         more = len(after) > len(before) and np.array_equal(after[: len(before)], before)
-        new = old.with_(_Moments.of(self._lift(after[len(before) :]))) if more else _Moments.of(self._lift(after))
+        new = (
+            old.with_(_Moments.of(self._random_features(after[len(before) :])))
+            if more
+            else _Moments.of(self._random_features(after))
+        )
         self._squares += new.square - old.square
         self._rows[code], self._means[code] = after, new.mean
         if not len(rows):
@@ -201,9 +206,9 @@ class _Moments:
     square: Array
 
     @classmethod
-    def of(cls, lifted: Array) -> _Moments:
-        count = len(lifted)
-        return cls(count, lifted.sum(axis=0) / max(count, 1), lifted.T @ lifted / max(count, 1))
+    def of(cls, expanded: Array) -> _Moments:
+        count = len(expanded)
+        return cls(count, expanded.sum(axis=0) / max(count, 1), expanded.T @ expanded / max(count, 1))
 
     def with_(self, other: _Moments) -> _Moments:
         count = self.count + other.count
@@ -228,15 +233,17 @@ def _half(codes: Codes, slides: Codes) -> Codes:
     return half
 
 
-def _sharpness(halves: list[list[_Moments]], lifted: Array, codes: Codes, half: Codes) -> float:
+def _inverse_temperature(halves: list[list[_Moments]], expanded: Array, codes: Codes, half: Codes) -> float:
     """Return the factor of the scores that makes each half most probable to a layer fitted to the other."""
     if any(moments.count == 0 for side in halves for moments in side):
-        return DEFAULT_SHARPNESS
+        return DEFAULT_INVERSE_TEMPERATURE
     scores = np.empty((len(codes), len(halves[0])))
     for side in (0, 1):
-        learnt = halves[1 - side]
-        weights = _solve(np.sum([moments.square for moments in learnt], axis=0), [moments.mean for moments in learnt])
-        scores[half == side] = lifted[half == side] @ weights
+        training = halves[1 - side]
+        weights = _solve(
+            np.sum([moments.square for moments in training], axis=0), [moments.mean for moments in training]
+        )
+        scores[half == side] = expanded[half == side] @ weights
     best = minimize_scalar(
         lambda log_s: log_loss(log_softmax(scores * math.exp(log_s)), codes), bounds=(0.0, 5.0), method='bounded'
     )

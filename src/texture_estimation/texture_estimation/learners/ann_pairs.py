@@ -33,11 +33,13 @@ class AnnPairs:
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C.
     """
 
-    hidden: int = param(10, 'Neurons in the hidden layer.', low=1, high=200)
-    iterations: int = param(30, 'Steps of the training at most.', low=1, high=10_000)
-    seed: int = param(0, 'Of the weights before the training.', low=0)
+    hidden: int = param(10, 'Number of neurons in the hidden layer.', low=1, high=200)
+    iterations: int = param(30, 'Largest number of training iterations.', low=1, high=10_000)
+    seed: int = param(0, 'Seed of the initial weights.', low=0)
     ties: str = param(
-        'unclassified', "Labels that win as many pairs: none of them, or 'nearest', the clearer one.", choices=TIES
+        'unclassified',
+        "How ties are broken: 'unclassified' returns no label, 'nearest' the one with larger margins.",
+        choices=TIES,
     )
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
@@ -53,7 +55,7 @@ class AnnPairs:
             start = Network.random(self.hidden, values.shape[1], rng)
             targets = (codes[rows] == first).astype(np.float64)
             networks.append(fit_network(start, standard[rows], targets, held[rows], self.iterations))
-        parts = {
+        parameters = {
             'mean': mean,
             'scale': scale,
             'hidden': np.stack([network.hidden for network in networks]),
@@ -62,16 +64,16 @@ class AnnPairs:
             'out_bias': np.array([network.out_bias for network in networks]),
             'ties': self.ties,
         }
-        return Fitted(parts, None, NOTE)
+        return Fitted(parameters, None, NOTE)
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> PairNetworks:
-        """Return what judges, from the stored parts."""
-        return PairNetworks(**parts)
+    def predictor(parameters: Mapping[str, Any]) -> PairNetworksPredictor:
+        """Return the predictor made from the stored parameters."""
+        return PairNetworksPredictor(**parameters)
 
 
 @dataclass(frozen=True, eq=False)
-class PairNetworks:
+class PairNetworksPredictor:
     """The networks of all pairs, evaluated together.
 
     Parameters

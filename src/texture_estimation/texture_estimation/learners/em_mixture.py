@@ -27,15 +27,19 @@ class EmMixture:
     Source: Kaboli et al. 2015, section V.C.
     """
 
-    clusters_per_label: int = param(1, 'Clusters to look for, for each label.', low=1, high=50)
+    clusters_per_label: int = param(1, 'Number of clusters per label.', low=1, high=50)
     covariance: str = param(
-        'full', 'full: features depend on each other within a cluster; diag: they do not.', choices=('full', 'diag')
+        'full',
+        "Covariance of a cluster: 'full', or 'diag' if features are taken as independent.",
+        choices=('full', 'diag'),
     )
     regularisation: float = param(
-        1e-3, 'Added to the variances of the standardised features; keeps flat clusters from collapsing.', low=1e-9
+        1e-3, 'Variance added to the standardised features; prevents clusters from collapsing.', low=1e-9
     )
-    starts: int = param(3, 'Of so many random starts the most probable result is kept.', low=1, high=1000)
-    seed: int = param(0, 'Of the random starts.', low=0)
+    starts: int = param(
+        3, 'Number of random initialisations; the result with the highest likelihood is kept.', low=1, high=1000
+    )
+    seed: int = param(0, 'Seed of the random initialisations.', low=0)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
@@ -57,7 +61,7 @@ class EmMixture:
         counts = np.zeros((n_clusters, n_labels))
         np.add.at(counts, (found, codes), 1.0)
         factors = mixture.precisions_cholesky_
-        parts = {
+        parameters = {
             'mean': mean,
             'scale': scale,
             'centres': mixture.means_,
@@ -65,16 +69,16 @@ class EmMixture:
             'log_weights': np.log(mixture.weights_),
             'names': np.eye(n_labels)[counts.argmax(axis=1)],
         }
-        return Fitted(parts, None, 'not calibrated: probabilities of clusters found without labels')
+        return Fitted(parameters, None, 'not calibrated: probabilities of clusters found without labels')
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> Clusters:
-        """Return what judges, from the stored parts."""
-        return Clusters(**parts)
+    def predictor(parameters: Mapping[str, Any]) -> MixturePredictor:
+        """Return the predictor made from the stored parameters."""
+        return MixturePredictor(**parameters)
 
 
 @dataclass(frozen=True, eq=False)
-class Clusters:
+class MixturePredictor:
     """A mixture of normal distributions, each with the name of a label.
 
     Parameters

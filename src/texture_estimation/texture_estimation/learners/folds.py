@@ -7,14 +7,14 @@ import numpy as np
 from texture_estimation.learners.learner import Codes
 
 
-def divide(codes: Codes, groups: Codes, count: int) -> tuple[Codes, str] | None:
+def assign_folds(codes: Codes, groups: Codes, count: int) -> tuple[Codes, str] | None:
     """Return the part (0 to count - 1) in which each example is held out, and how they were divided.
 
     The slides of each label, in the order in which they come, are cut into `count` stretches: sensors and surfaces
     drift, and a neighbour in time would flatter. A label with a single slide is divided by its windows instead, which
     does flatter. None if a label has a single window.
     """
-    parts = np.empty(len(codes), dtype=np.intp)
+    folds_of = np.empty(len(codes), dtype=np.intp)
     note = f'held-out slides, {count} parts'
     for code in np.unique(codes):
         rows = np.flatnonzero(codes == code)
@@ -24,8 +24,8 @@ def divide(codes: Codes, groups: Codes, count: int) -> tuple[Codes, str] | None:
             slides = np.arange(len(rows))
         if len(rows) < 2:
             return None
-        parts[rows] = slides * count // (slides.max() + 1)
-    return parts, note
+        folds_of[rows] = slides * count // (slides.max() + 1)
+    return folds_of, note
 
 
 def _numbered(groups: Codes) -> Codes:

@@ -1,4 +1,4 @@
-"""What a learner is: parameters that fit examples, and the array form of what was fitted."""
+"""What a learner is: parameters that fit examples, and the predictor that it exports."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from texture_core.arrays import Array
 Codes = NDArray[np.intp]
 
 
-class LogProbabilities(Protocol):
-    """What judges windows, as plain arrays."""
+class Predictor(Protocol):
+    """Predict from features, as plain arrays."""
 
     def __call__(self, values: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
@@ -27,7 +27,7 @@ class Fitted:
 
     Parameters
     ----------
-    parts
+    parameters
         What the model file stores: scikit-learn objects, arrays, numbers and texts.
     held_out : (n, n_labels) or None
         Log-probabilities of each example by a learner that has not seen its slide; None if there are too few examples.
@@ -35,7 +35,7 @@ class Fitted:
         How the probabilities were calibrated, in words for the model's card.
     """
 
-    parts: Mapping[str, Any]
+    parameters: Mapping[str, Any]
     held_out: Array | None
     note: str
 
@@ -49,5 +49,5 @@ class Learner(Protocol):
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> LogProbabilities:
-        """Return what judges, from the stored parts."""
+    def predictor(parameters: Mapping[str, Any]) -> Predictor:
+        """Return the predictor made from the stored parameters."""

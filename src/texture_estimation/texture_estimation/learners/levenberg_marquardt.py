@@ -73,22 +73,22 @@ def fit_network(network: Network, values: Array, targets: Array, held: NDArray[n
     values, targets : (n, n_features), (n,)
         Examples.
     held : (n,) bool
-        Examples not learnt from, which tell when to stop; none to stop by `iterations` alone.
+        Examples held out, which tell when to stop; none to stop by `iterations` alone.
     iterations
         At most so many.
 
     Source: Hagan & Menhaj 1994; early stopping as in MATLAB's trainlm.
     """
-    learnt, wanted = values[~held], targets[~held]
-    judge = held if held.any() else ~held
-    best, best_error = network, _error(network, values[judge], targets[judge])
+    training, wanted = values[~held], targets[~held]
+    held_rows = held if held.any() else ~held
+    best, best_error = network, _error(network, values[held_rows], targets[held_rows])
     failures, damping = 0, FIRST_DAMPING
     for _ in range(iterations):
-        stepped, damping = _step(network, learnt, wanted, damping)
+        stepped, damping = _step(network, training, wanted, damping)
         if stepped is None:
             break
         network = stepped
-        error = _error(network, values[judge], targets[judge])
+        error = _error(network, values[held_rows], targets[held_rows])
         if error < best_error:
             best, best_error, failures = network, error, 0
         else:
@@ -142,8 +142,8 @@ def _by_examples(network: Network, values: Array) -> _Linear:
 
     def step(solved: Array) -> Array:
         weighted = by_bias * solved[:, None]
-        parts = ((weighted.T @ values).ravel(), weighted.sum(axis=0), solved @ active, solved.sum(keepdims=True))
-        return np.concatenate(parts)
+        parameters = ((weighted.T @ values).ravel(), weighted.sum(axis=0), solved @ active, solved.sum(keepdims=True))
+        return np.concatenate(parameters)
 
     return _Linear(active @ network.out + network.out_bias, curvature, lambda residual: residual, step)
 

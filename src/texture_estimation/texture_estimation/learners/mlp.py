@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_estimation.learners.folds import divide
+from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.log_probabilities import log_loss, log_softmax
 
@@ -35,24 +35,26 @@ class Mlp:
     Source: Adam of Kingma & Ba 2015 with a rate that falls like a cosine; one temperature (Guo et al. 2017).
     """
 
-    hidden: int = param(128, 'Units of the hidden layer.', low=1, high=4096)
-    noise: float = param(0.3, 'Standard deviation of the noise on standardised features.', low=0.0, high=10.0)
-    decay: float = param(0.01, 'Weight decay, over the number of examples.', low=0.0, high=1e6)
-    epochs: int = param(60, 'Passes over the examples.', low=1, high=100_000)
-    folds: int = param(5, 'Parts into which the slides are divided to calibrate.', low=2, high=50)
-    seed: int = param(0, 'Of the first weights, the order of the examples and the noise.', low=0)
+    hidden: int = param(128, 'Number of units in the hidden layer.', low=1, high=4096)
+    noise: float = param(
+        0.3, 'Standard deviation of the noise added to the standardised features in training.', low=0.0, high=10.0
+    )
+    decay: float = param(0.01, 'Weight decay, divided by the number of examples.', low=0.0, high=1e6)
+    epochs: int = param(60, 'Number of passes over the training examples.', low=1, high=100_000)
+    folds: int = param(5, 'Number of cross-validation folds for the calibration.', low=2, high=50)
+    seed: int = param(0, 'Seed of the initial weights, the order of the examples and the noise.', low=0)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
         n_labels = int(codes.max()) + 1
-        division = divide(codes, groups, self.folds)
-        if division is None:
+        split = assign_folds(codes, groups, self.folds)
+        if split is None:
             return Fitted(self._fit(values, codes, n_labels), None, 'not calibrated, as a label has a single window')
-        parts, note = division
+        folds_of, note = split
         scores = np.empty((len(codes), n_labels))
-        for part in np.unique(parts):
-            held = parts == part
-            scores[held] = self.array_form(self._fit(values[~held], codes[~held], n_labels))(values[held])
+        for part in np.unique(folds_of):
+            held = folds_of == part
+            scores[held] = self.predictor(self._fit(values[~held], codes[~held], n_labels))(values[held])
         best = minimize_scalar(
             lambda log_t: log_loss(log_softmax(scores / math.exp(log_t)), codes), bounds=(-2.0, 4.0), method='bounded'
         )
@@ -61,11 +63,11 @@ class Mlp:
         return Fitted(fitted, log_softmax(scores / temperature), note)
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> ArrayMlp:
-        """Return what judges, from the stored parts."""
+    def predictor(folds_of: Mapping[str, Any]) -> MlpPredictor:
+        """Return the predictor made from the stored parameters."""
         # Column by column a product with one window is a quarter faster.
-        names = ArrayMlp.__dataclass_fields__
-        return ArrayMlp(*(np.asarray(parts[name], dtype=np.float64, order='F') for name in names))
+        names = MlpPredictor.__dataclass_fields__
+        return MlpPredictor(*(np.asarray(folds_of[name], dtype=np.float64, order='F') for name in names))
 
     def _fit(self, values: Array, codes: Codes, n_labels: int, temperature: float = 1.0) -> dict[str, Array]:
         """Return the layers, with standardisation and temperature worked into them."""
@@ -101,7 +103,7 @@ class Mlp:
 
 
 @dataclass(frozen=True, eq=False)
-class ArrayMlp:
+class MlpPredictor:
     """The two layers, made for features as they come.
 
     Parameters

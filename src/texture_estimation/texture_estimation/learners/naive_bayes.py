@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_estimation.learners.folds import divide
+from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.standardisation import standardisation
 from texture_estimation.log_probabilities import log_softmax
@@ -26,11 +26,11 @@ class NaiveBayes:
     """
 
     smoothing: float = param(
-        1e-9, 'Added to the variances, as a share of the variance of the feature over all labels.', low=1e-12, high=1.0
+        1e-9, 'Variance added to each class, as a fraction of the variance over all classes.', low=1e-12, high=1.0
     )
     bins: int = param(
         0,
-        'Each feature is counted in so many bins, filled alike over all labels; 0: it is normally distributed.',
+        'Number of equally filled histogram bins per feature; 0: normal distributions.',
         low=0,
         high=1000,
     )
@@ -38,20 +38,24 @@ class NaiveBayes:
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
         n_labels = int(codes.max()) + 1
-        division = divide(codes, groups, FOLDS)
-        parts = self._fit(values, codes, n_labels)
-        if division is None:
-            return Fitted(parts, None, 'not calibrated, as a label has a single window')
+        split = assign_folds(codes, groups, FOLDS)
+        parameters = self._fit(values, codes, n_labels)
+        if split is None:
+            return Fitted(parameters, None, 'not calibrated, as a label has a single window')
         held_out = np.empty((len(codes), n_labels))
-        for part in np.unique(division[0]):
-            held = division[0] == part
-            held_out[held] = self.array_form(self._fit(values[~held], codes[~held], n_labels))(values[held])
-        return Fitted(parts, held_out, f'not calibrated; growth from {division[1]}')
+        for part in np.unique(split[0]):
+            held = split[0] == part
+            held_out[held] = self.predictor(self._fit(values[~held], codes[~held], n_labels))(values[held])
+        return Fitted(parameters, held_out, f'not calibrated; growth from {split[1]}')
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> Gaussians | Histograms:
-        """Return what judges, from the stored parts."""
-        return Histograms(**parts) if 'edges' in parts else Gaussians(**parts)
+    def predictor(parameters: Mapping[str, Any]) -> GaussianNaiveBayesPredictor | HistogramNaiveBayesPredictor:
+        """Return the predictor made from the stored parameters."""
+        return (
+            HistogramNaiveBayesPredictor(**parameters)
+            if 'edges' in parameters
+            else GaussianNaiveBayesPredictor(**parameters)
+        )
 
     def _fit(self, values: Array, codes: Codes, n_labels: int) -> dict[str, Array]:
         log_priors = np.log(np.bincount(codes, minlength=n_labels) / len(codes))
@@ -79,7 +83,7 @@ class NaiveBayes:
 
 
 @dataclass(frozen=True, eq=False)
-class Gaussians:
+class GaussianNaiveBayesPredictor:
     """Independent normal distributions, as one product with the features and their squares.
 
     Parameters
@@ -113,7 +117,7 @@ class Gaussians:
 
 
 @dataclass(frozen=True, eq=False)
-class Histograms:
+class HistogramNaiveBayesPredictor:
     """How often each feature lies between which edges.
 
     Parameters

@@ -24,15 +24,15 @@ class PassiveAggressive:
     Source: Crammer et al. 2006, PA-I; Kaboli et al. 2015, section V.B.
     """
 
-    c: float = param(1.0, 'How far one example may move a plane.', low=1e-9, high=1e9)
-    rounds: int = param(0, 'Examples of each label to learn from; 0 for all.', low=0)
+    c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
+    rounds: int = param(0, 'Number of examples of each label to train on; 0: all.', low=0)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,), in the order given."""
         order = _in_rounds(codes, self.rounds)
-        # Only what was seen may be known: the scale, too, is that of the examples learnt from.
+        # Only what was seen may be known: the scale, too, is that of the training examples.
         mean, scale = standardisation(values[order])
-        online = OnlinePlanes(np.zeros((int(codes.max()) + 1, values.shape[1] + 1)), self.c)
+        online = OnlineLinearClassifier(np.zeros((int(codes.max()) + 1, values.shape[1] + 1)), self.c)
         for row in order:
             online.update((values[row] - mean) / scale, int(codes[row]))
         return Fitted(
@@ -40,13 +40,13 @@ class PassiveAggressive:
         )
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> Planes:
-        """Return what judges, from the stored parts."""
-        return Planes(**parts)
+    def predictor(parameters: Mapping[str, Any]) -> LinearPredictor:
+        """Return the predictor made from the stored parameters."""
+        return LinearPredictor(**parameters)
 
 
 @dataclass
-class OnlinePlanes:
+class OnlineLinearClassifier:
     """Planes that learn example by example.
 
     Parameters
@@ -71,7 +71,7 @@ class OnlinePlanes:
 
 
 @dataclass(frozen=True, eq=False)
-class Planes:
+class LinearPredictor:
     """Signed distances from planes.
 
     Parameters

@@ -24,19 +24,21 @@ ITERATIONS = 100_000  # of libsvm: a pair that cannot be separated need not be f
 class SvmLinear:
     """Linear machines for all pairs; most pairs won, ties broken by the clearer decisions.
 
-    The penalty C with the best mean accuracy over `repeats` random divisions into `folds` parts is taken, the smallest
-    of those that tie. No slide is on both sides of a division.
+    The penalty C with the best mean accuracy over `repeats` random splits into `folds` parts is taken, the smallest
+    of those that tie. No slide is on both sides of a split.
 
     Source: Kaboli et al. 2015, section V.A: 5 folds, 10 repeats, 20 values.
     """
 
-    folds: int = param(5, 'Parts of a division.', low=2, high=50)
-    repeats: int = param(10, 'Random divisions.', low=1, high=1000)
-    candidates: int = param(20, 'Values of C tried, evenly on a logarithmic scale.', low=1, high=200)
-    least_c: float = param(1e-3, 'Smallest C tried.', low=1e-9, high=1e9)
-    most_c: float = param(1e3, 'Largest C tried.', low=1e-9, high=1e9)
-    examples: int = param(200, 'C is chosen by so many examples at most, taken evenly from all.', low=10)
-    seed: int = param(0, 'Of the divisions.', low=0)
+    folds: int = param(5, 'Number of cross-validation folds.', low=2, high=50)
+    repeats: int = param(10, 'Number of repetitions of the cross-validation with other random folds.', low=1, high=1000)
+    candidates: int = param(
+        20, 'Number of values of C that are tried, evenly spaced on a logarithmic scale.', low=1, high=200
+    )
+    least_c: float = param(1e-3, 'Smallest value of C that is tried.', low=1e-9, high=1e9)
+    most_c: float = param(1e3, 'Largest value of C that is tried.', low=1e-9, high=1e9)
+    examples: int = param(200, 'Largest number of examples with which C is chosen; more are subsampled evenly.', low=10)
+    seed: int = param(0, 'Seed of the random folds.', low=0)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
@@ -44,23 +46,25 @@ class SvmLinear:
         standard = (values - mean) / scale
         c = self._choose(standard, codes, groups)
         weights, intercepts = _planes(_svc(standard, codes, c))
-        parts = {'mean': mean, 'scale': scale, 'weights': weights, 'intercepts': intercepts}
+        folds_of = {'mean': mean, 'scale': scale, 'weights': weights, 'intercepts': intercepts}
         note = f'not calibrated: pairs won; C = {c:.3g} by {self.repeats} times {self.folds}-fold cross-validation'
-        return Fitted(parts, None, note)
+        return Fitted(folds_of, None, note)
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> LinearPairs:
-        """Return what judges, from the stored parts."""
-        return LinearPairs(**parts)
+    def predictor(folds_of: Mapping[str, Any]) -> LinearPairsPredictor:
+        """Return the predictor made from the stored parameters."""
+        return LinearPairsPredictor(**folds_of)
 
     def _choose(self, standard: Array, codes: Codes, groups: Codes) -> float:
         """Return the penalty that does best on what is held out; the middle one if nothing can be."""
         tried = np.geomspace(self.least_c, self.most_c, self.candidates)
         rows = _evenly(codes, self.examples)
         rng = np.random.default_rng(self.seed)
-        divisions = [_divide(codes[rows], groups[rows], self.folds, rng) for _ in range(self.repeats)]
-        splits = [(rows[parts != part], rows[parts == part]) for parts in divisions for part in np.unique(parts)]
-        splits = [(learnt, held) for learnt, held in splits if len(np.unique(codes[learnt])) > 1]
+        assignments = [_divide(codes[rows], groups[rows], self.folds, rng) for _ in range(self.repeats)]
+        splits = [
+            (rows[folds_of != part], rows[folds_of == part]) for folds_of in assignments for part in np.unique(folds_of)
+        ]
+        splits = [(training, held) for training, held in splits if len(np.unique(codes[training])) > 1]
         if not splits:
             return float(tried[len(tried) // 2])
         right = [
@@ -71,7 +75,7 @@ class SvmLinear:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearPairs:
+class LinearPairsPredictor:
     """Linear decisions between all pairs.
 
     Parameters
@@ -129,12 +133,12 @@ def _evenly(codes: Codes, count: int) -> NDArray[np.intp]:
 
 
 def _divide(codes: Codes, groups: Codes, folds: int, rng: np.random.Generator) -> Codes:
-    """Return the part of each example at random: the slides of each label are dealt out in turn."""
-    parts = np.zeros(len(codes), dtype=np.intp)
+    """Return the part of each example at random: the slides of each label are assigned in turn."""
+    folds_of = np.zeros(len(codes), dtype=np.intp)
     for code in np.unique(codes):
         rows = np.flatnonzero(codes == code)
         slides = np.unique(groups[rows], return_inverse=True)[1].reshape(-1)
-        if slides.max() == 0:  # a single slide: its windows are dealt out
+        if slides.max() == 0:  # a single slide: its windows are assigned
             slides = np.arange(len(rows))
-        parts[rows] = rng.permutation(slides.max() + 1)[slides] % folds
-    return parts
+        folds_of[rows] = rng.permutation(slides.max() + 1)[slides] % folds
+    return folds_of

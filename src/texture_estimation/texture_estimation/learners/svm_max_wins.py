@@ -11,10 +11,10 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
-from texture_estimation.learners.array_svm import ArraySvm, export
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.pair_coupling import uncalibrated
 from texture_estimation.learners.pair_votes import PairVotes
+from texture_estimation.learners.svm_predictor import SvmPredictor, export
 from texture_estimation.log_probabilities import log_softmax
 
 CACHE_MB = 500
@@ -30,13 +30,15 @@ class SvmMaxWins:
     Source: Hu et al. 2014, section 4: 99 % of the variance, for each of two directions, joined.
     """
 
-    variance: float = param(0.99, 'Share of the variance that the components kept explain.', low=0.01, high=1.0)
-    blocks: int = param(
-        1, 'Equal stretches of features with components of their own, such as the directions x and y.', low=1, high=64
+    variance: float = param(
+        0.99, 'Fraction of the variance that the kept principal components explain.', low=0.01, high=1.0
     )
-    c: float = param(10.0, 'Penalty of a training error (box constraint).', low=1e-6, high=1e9)
+    blocks: int = param(
+        1, 'Number of equal feature blocks with separate components, such as directions x and y.', low=1, high=64
+    )
+    c: float = param(10.0, 'Penalty of a training error (box constraint C).', low=1e-6, high=1e9)
     gamma: float = param(
-        1.0, 'Of the kernel exp(-gamma d² / (n_components · variance)): a larger one is narrower.', low=1e-9, high=1e9
+        1.0, 'Gamma of the kernel exp(-gamma d² / (n_components · variance)); larger is narrower.', low=1e-9, high=1e9
     )
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
@@ -58,15 +60,15 @@ class SvmMaxWins:
         scaler.mean_, scaler.scale_ = np.zeros(projected.shape[1]), np.full(projected.shape[1], unit)
         gamma = self.gamma / projected.shape[1]
         svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(projected / unit, codes)
-        parts = {'mean': mean, 'components': components, 'scaler': scaler, 'svc': svc}
-        return Fitted(parts, None, f'not calibrated: pairs won; {components.shape[1]} principal components')
+        parameters = {'mean': mean, 'components': components, 'scaler': scaler, 'svc': svc}
+        return Fitted(parameters, None, f'not calibrated: pairs won; {components.shape[1]} principal components')
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> ProjectedMachines:
-        """Return what judges, from the stored parts."""
-        n_labels = len(parts['svc'].n_support_)
-        svm = export(parts['scaler'], parts['svc'], uncalibrated(n_labels))
-        return ProjectedMachines(parts['mean'], parts['components'], svm, PairVotes(n_labels))
+    def predictor(parameters: Mapping[str, Any]) -> PcaSvmPredictor:
+        """Return the predictor made from the stored parameters."""
+        n_labels = len(parameters['svc'].n_support_)
+        svm = export(parameters['scaler'], parameters['svc'], uncalibrated(n_labels))
+        return PcaSvmPredictor(parameters['mean'], parameters['components'], svm, PairVotes(n_labels))
 
     def _components(self, values: Array) -> tuple[Array, Array]:
         """Return the mean, (n_features,), and the components of all blocks, (n_features, n_components)."""
@@ -91,7 +93,7 @@ class SvmMaxWins:
 
 
 @dataclass(frozen=True, eq=False)
-class ProjectedMachines:
+class PcaSvmPredictor:
     """Machines of all pairs on principal components.
 
     Parameters
@@ -104,7 +106,7 @@ class ProjectedMachines:
 
     mean: Array
     components: Array
-    svm: ArraySvm
+    svm: SvmPredictor
     votes: PairVotes
 
     def __call__(self, values: Array) -> Array:

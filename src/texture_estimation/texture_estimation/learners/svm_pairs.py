@@ -10,10 +10,10 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_estimation.learners.array_svm import ArraySvm, export
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.pair_coupling import uncalibrated
 from texture_estimation.learners.pair_votes import TIES, PairVotes
+from texture_estimation.learners.svm_predictor import SvmPredictor, export
 from texture_estimation.log_probabilities import log_softmax
 
 NOTE = 'not calibrated: the pairs won are counted'
@@ -29,11 +29,13 @@ class SvmPairs:
     Source: Roberge et al., "Textures recognition through tactile exploration", sections III.C and IV.
     """
 
-    box_constraint: float = param(10.0, 'Penalty of a training error.', low=1e-6, high=1e9)
-    kernel_scale: float = param(3.0, "Width of the kernel, MATLAB's KernelScale.", low=1e-9, high=1e9)
-    standardise: bool = param(True, 'Bring the features to zero mean and unit variance first.')
+    box_constraint: float = param(10.0, 'Penalty of a training error (box constraint C).', low=1e-6, high=1e9)
+    kernel_scale: float = param(3.0, "Width of the RBF kernel (MATLAB's KernelScale).", low=1e-9, high=1e9)
+    standardise: bool = param(True, 'Whether the features are standardised to zero mean and unit variance first.')
     ties: str = param(
-        'unclassified', "Labels that win as many pairs: none of them, or 'nearest', the clearer one.", choices=TIES
+        'unclassified',
+        "How ties are broken: 'unclassified' returns no label, 'nearest' the one with larger margins.",
+        choices=TIES,
     )
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
@@ -46,22 +48,22 @@ class SvmPairs:
         if not self.standardise:
             scaler.mean_, scaler.scale_ = np.zeros(values.shape[1]), np.ones(values.shape[1])
         svc = SVC(C=self.box_constraint, kernel='rbf', gamma=self.kernel_scale**-2, cache_size=CACHE_MB)
-        parts = {'scaler': scaler, 'svc': svc.fit(scaler.transform(values), codes), 'ties': self.ties}
-        return Fitted(parts, None, NOTE)
+        parameters = {'scaler': scaler, 'svc': svc.fit(scaler.transform(values), codes), 'ties': self.ties}
+        return Fitted(parameters, None, NOTE)
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> PairMachines:
-        """Return what judges, from the stored parts."""
-        n_labels = len(parts['svc'].n_support_)
-        svm = export(parts['scaler'], parts['svc'], uncalibrated(n_labels))
-        return PairMachines(svm, PairVotes(n_labels), str(parts['ties']))
+    def predictor(parameters: Mapping[str, Any]) -> SvmPairsPredictor:
+        """Return the predictor made from the stored parameters."""
+        n_labels = len(parameters['svc'].n_support_)
+        svm = export(parameters['scaler'], parameters['svc'], uncalibrated(n_labels))
+        return SvmPairsPredictor(svm, PairVotes(n_labels), str(parameters['ties']))
 
 
 @dataclass(frozen=True, eq=False)
-class PairMachines:
+class SvmPairsPredictor:
     """The machines of all pairs, evaluated together."""
 
-    svm: ArraySvm
+    svm: SvmPredictor
     votes: PairVotes
     ties: str
 

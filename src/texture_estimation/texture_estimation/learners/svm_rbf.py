@@ -10,10 +10,10 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_estimation.learners.array_svm import ArraySvm, export
-from texture_estimation.learners.folds import divide
+from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.pair_coupling import PairCoupling, fit_coupling, uncalibrated
+from texture_estimation.learners.svm_predictor import SvmPredictor, export
 
 CACHE_MB = 500
 
@@ -25,45 +25,48 @@ class SvmRbf:
     Not scikit-learn's SVC(probability=True): its inner cross-validation mixes the windows of one slide.
     """
 
-    c: float = param(10.0, 'Penalty of a training error (box constraint).', low=1e-6, high=1e9)
+    c: float = param(10.0, 'Penalty of a training error (box constraint C).', low=1e-6, high=1e9)
     gamma: float = param(
-        0.0, 'Width of the kernel exp(-gamma d²); 0 means 1 / (n_features · variance).', low=0.0, high=1e9
+        0.0,
+        'Gamma of the kernel exp(-gamma d²); 0: 1 / (n_features · variance). Larger is narrower.',
+        low=0.0,
+        high=1e9,
     )
     common_scale: bool = param(
-        False, 'One scale for all features, for values of one kind such as taxel levels; else each has its own.'
+        False, 'Whether all features share one scale, for features of one kind such as taxel means.'
     )
-    folds: int = param(5, 'Parts into which the slides are divided to calibrate.', low=2, high=50)
+    folds: int = param(5, 'Number of cross-validation folds for the calibration.', low=2, high=50)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
         coupling, held_out, note = self._calibrate(values, codes, groups)
         scaler, svc = self._fit_svc(values, codes)
-        parts = {
+        folds_of = {
             'scaler': scaler,
             'svc': svc,
             'slopes': coupling.slopes,
             'offsets': coupling.offsets,
             'temperature': coupling.temperature,
         }
-        return Fitted(parts, held_out, note)
+        return Fitted(folds_of, held_out, note)
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> ArraySvm:
-        """Return what judges, from the stored parts."""
+    def predictor(folds_of: Mapping[str, Any]) -> SvmPredictor:
+        """Return the predictor made from the stored parameters."""
         coupling = PairCoupling(
-            len(parts['svc'].n_support_), parts['slopes'], parts['offsets'], float(parts['temperature'])
+            len(folds_of['svc'].n_support_), folds_of['slopes'], folds_of['offsets'], float(folds_of['temperature'])
         )
-        return export(parts['scaler'], parts['svc'], coupling)
+        return export(folds_of['scaler'], folds_of['svc'], coupling)
 
     def _calibrate(self, values: Array, codes: Codes, groups: Codes) -> tuple[PairCoupling, Array | None, str]:
         n_labels = int(codes.max()) + 1
-        division = divide(codes, groups, self.folds)
-        if division is None:
+        split = assign_folds(codes, groups, self.folds)
+        if split is None:
             return uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
-        parts, note = division
+        folds_of, note = split
         decisions = np.empty((len(codes), n_labels * (n_labels - 1) // 2))
-        for part in np.unique(parts):
-            held = parts == part
+        for part in np.unique(folds_of):
+            held = folds_of == part
             svm = export(*self._fit_svc(values[~held], codes[~held]), uncalibrated(n_labels))
             decisions[held] = svm.decisions(values[held])
         coupling = fit_coupling(decisions, codes, n_labels)

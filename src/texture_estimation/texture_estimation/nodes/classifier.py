@@ -1,4 +1,4 @@
-"""Node that says what surface is being felt, with the evidence so far, and learns new ones."""
+"""Node that classifies the touched surface from the evidence so far, and adds new textures."""
 
 from __future__ import annotations
 
@@ -13,92 +13,96 @@ from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
 from texture_core.parameters import param
 from texture_core.ros.run import run
-from texture_estimation.evidence import NO_MODEL, Evidence
-from texture_estimation.incremental.incremental_classifier import Pupil
-from texture_estimation.model import Model, load_model
+from texture_estimation.evidence import NO_MODEL, EvidenceAccumulator
+from texture_estimation.incremental.incremental_classifier import IncrementalClassifier
+from texture_estimation.model import TextureModel, load_model
 from texture_estimation.ros.estimator_node import EstimatorNode
 
 
 @dataclass(frozen=True)
 class ClassifierParams:
-    """What the classifier judges by."""
+    """Parameters of the classifier."""
 
     model: str = param(
-        '', "Path of a trained model (NAME.skops or NAME.json); '' for none yet. May be changed at any time."
+        '', "Path of a trained model (NAME.skops or NAME.json); '': no model. It can be changed at any time."
     )
 
 
 class Classifier(EstimatorNode):
-    """Turn feature vectors into texture estimates, and explorations into knowledge."""
+    """Turn feature vectors into texture estimates, and add explorations to the model."""
 
     params = ClassifierParams
     estimate = (msg.TextureEstimate, 'texture')
     no_model = NO_MODEL
-    doing = 'judging'
-    unused = 'some feature vectors could not be used'
+    activity = 'classifying'
+    vectors_unused = 'some feature vectors could not be used'
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('classifier', **kwargs)
-        self.create_service(srv.AddTexture, 'add_texture', self._on_learn)
-        self.create_service(Trigger, 'undo_learning', self._on_undo)
+        self.create_service(srv.AddTexture, 'add_texture', self._on_add)
+        self.create_service(Trigger, 'remove_last_added', self._on_remove_last)
 
-    def _load(self, path: str) -> Evidence:
+    def _load(self, path: str) -> EvidenceAccumulator:
         model = load_model(path) if path else None
-        self._pupil = Pupil(model, path) if model and model.examples else None
-        return Evidence(model)
+        self._incremental_classifier = IncrementalClassifier(model, path) if model and model.examples else None
+        return EvidenceAccumulator(model)
 
-    def _judge(self, vector: FeatureVector) -> TextureEstimate:
-        if self._pupil is not None:
-            self._pupil.remember(vector)
-        return super()._judge(vector)
+    def _predict(self, vector: FeatureVector) -> TextureEstimate:
+        if self._incremental_classifier is not None:
+            self._incremental_classifier.observe(vector)
+        return super()._predict(vector)
 
     def _facts(self) -> dict[str, int]:
-        return {'lessons': len(self._evidence.model.lessons) if self._evidence.model else 0}
+        return {'added_slides': len(self._evidence.model.added_slides) if self._evidence.model else 0}
 
     def _faults(self) -> dict[str, int]:
         return {'refused_vectors': self._evidence.refused, 'not_finite_vectors': self._evidence.not_finite}
 
-    def _on_learn(self, request: srv.AddTexture.Request, answer: srv.AddTexture.Response) -> Any:
+    def _on_add(self, request: srv.AddTexture.Request, answer: srv.AddTexture.Response) -> Any:
         try:
-            answer.examples = self._taught().learn(request.label, request.exploration_id)
+            answer.examples = self._require_incremental().add(request.label, request.exploration_id)
         except (TextureError, OSError) as error:
             answer.message = str(error)
             return answer
-        model = self._become_taught()
+        model = self._use_updated_model()
         answer.success = True
-        answer.message = f"learnt '{request.label.strip()}' from '{model.lessons[-1].exploration_id}'; " + _known(model)
+        answer.message = f"added '{request.label.strip()}' from '{model.added_slides[-1].exploration_id}'; " + _known(
+            model
+        )
         return answer
 
-    def _on_undo(self, _: Trigger.Request, answer: Trigger.Response) -> Any:
+    def _on_remove_last(self, _: Trigger.Request, answer: Trigger.Response) -> Any:
         try:
-            lesson = self._taught().undo()
+            added_slide = self._require_incremental().remove_last()
         except (TextureError, OSError) as error:
             answer.message = str(error)
             return answer
         answer.success = True
-        answer.message = f"unlearnt '{lesson.label}' from '{lesson.exploration_id}'; " + _known(self._become_taught())
+        answer.message = f"removed '{added_slide.label}' from '{added_slide.exploration_id}'; " + _known(
+            self._use_updated_model()
+        )
         return answer
 
-    def _taught(self) -> Pupil:
-        if self._pupil is None:
+    def _require_incremental(self) -> IncrementalClassifier:
+        if self._incremental_classifier is None:
             raise ModelMismatch(
-                f"model '{self._evidence.model.name}' holds no examples to learn beside; train it again"
+                f"model '{self._evidence.model.name}' holds no training examples, so none can be added; train it again"
                 if self._evidence.model
                 else NO_MODEL
             )
-        return self._pupil
+        return self._incremental_classifier
 
-    def _become_taught(self) -> Model:
-        """Judge by what the pupil knows now."""
-        model = self._taught().model
-        self._evidence = Evidence(model)
+    def _use_updated_model(self) -> TextureModel:
+        """Classify with the updated model."""
+        model = self._require_incremental().model
+        self._evidence = EvidenceAccumulator(model)
         self.get_logger().info(_known(model))
         return model
 
 
-def _known(model: Model) -> str:
-    taught = len(model.lessons)
-    return f'{len(model.labels)} textures known, {taught} {"lesson" if taught == 1 else "lessons"} since the training'
+def _known(model: TextureModel) -> str:
+    trained = len(model.added_slides)
+    return f'{len(model.labels)} textures, {trained} {"slide" if trained == 1 else "slides"} added since the training'
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""Node that says how rough the surface feels, with its uncertainty."""
+"""Node that estimates how rough the surface is, with its uncertainty."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from texture_msgs import msg
 from texture_core.parameters import param
 from texture_core.ros.run import run
 from texture_estimation.ros.estimator_node import EstimatorNode
-from texture_estimation.roughness.evidence import NO_MODEL, RoughnessEvidence
+from texture_estimation.roughness.evidence import NO_MODEL, RoughnessAccumulator
 from texture_estimation.roughness.model import load_roughness_model
 
 
 @dataclass(frozen=True)
 class RoughnessParams:
-    """What the roughness estimator grades by."""
+    """Parameters of the roughness estimator."""
 
     model: str = param(
-        '', "Path of a trained roughness model (NAME.skops or NAME.json); '' for none yet. May be changed at any time."
+        '', "Path of a roughness model (NAME.skops or NAME.json); '': no model. Can be changed at any time."
     )
 
 
@@ -29,14 +29,14 @@ class RoughnessEstimator(EstimatorNode):
     params = RoughnessParams
     estimate = (msg.RoughnessEstimate, 'roughness')
     no_model = NO_MODEL
-    doing = 'grading'
-    unused = 'some feature vectors could not be graded'
+    activity = 'grading'
+    vectors_unused = 'some feature vectors could not be graded'
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('roughness_estimator', **kwargs)
 
-    def _load(self, path: str) -> RoughnessEvidence:
-        return RoughnessEvidence(load_roughness_model(path) if path else None)
+    def _load(self, path: str) -> RoughnessAccumulator:
+        return RoughnessAccumulator(load_roughness_model(path) if path else None)
 
     def _facts(self) -> dict[str, int]:
         return {'windows_without_grade': self._evidence.silent}

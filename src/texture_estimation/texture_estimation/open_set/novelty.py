@@ -1,4 +1,4 @@
-"""Whether a surface resembles any that was learnt: the distance to the slides learnt from, against what is usual."""
+"""Novelty detection: the distance of a slide to the training slides."""
 
 from __future__ import annotations
 
@@ -22,17 +22,16 @@ SMALLEST = 1e-9  # variance within surfaces, in that of all: slides that are the
 FOLDS = 5
 MIN_SLIDES = 3  # of a surface: with one held out, two tell how much slides differ
 # Lengths of evidence at which the limit is learnt, in windows that do not overlap. The start of a slide is like no
-# other part, so slides are compared by the same stretch: by all that was felt, up to the last of these.
-WORTHS = (1.0, 1.5, 2.0, 3.0, 5.0)
+# other part, so slides are compared by the same stretch: by all that was measured, up to the last of these.
+EFFECTIVE_WINDOWS = (1.0, 1.5, 2.0, 3.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Familiarity:
-    """How strange the mean features of a slide are, and from where on they are those of an unknown surface.
+class NoveltyDetector:
+    """Novelty score of the mean features of a slide, and the threshold above which the surface is unknown.
 
-    Strange is what is far from the slides that were learnt, measured by how much the slides of one surface differ, and
-    nearer to what any surface might be: the squared distance to the nearest slides less that to the centre of all
-    surfaces, as in probabilistic discriminant analysis.
+    The score is the squared distance to the nearest training slides less that to the centre of all surfaces, in the
+    metric of the covariance within surfaces, as in probabilistic linear discriminant analysis.
 
     Source: Ioffe 2006, "Probabilistic linear discriminant analysis", with slides in place of the mean of a class.
 
@@ -40,31 +39,31 @@ class Familiarity:
     ----------
     projection : (n_features, n_features)
         Makes the covariance within surfaces the identity, and that between them diagonal.
-    places : (n_slides, n_features)
-        Slides that were learnt, projected.
+    references : (n_slides, n_features)
+        Training slides, projected.
     centre, weights : (n_features,)
         Mean of the surfaces, projected, and one over the variance about it.
-    worths, limits : (n,)
-        Strangeness that a known surface exceeds as rarely as was asked for, by the length of the evidence.
+    effective_window_counts, thresholds : (n,)
+        Score that known surfaces exceed at the false rejection rate, by the effective window count.
     """
 
     projection: Array
-    places: Array
+    references: Array
     centre: Array
     weights: Array
-    worths: Array
-    limits: Array
+    effective_window_counts: Array
+    thresholds: Array
 
     @cached_property
     def _squares(self) -> Array:
-        squares: Array = np.einsum('ij,ij->i', self.places, self.places)
+        squares: Array = np.einsum('ij,ij->i', self.references, self.references)
         return squares
 
     @classmethod
-    def learnt(
-        cls, values: Array, codes: Codes, groups: Codes, overlap: float, false_rejections: float
-    ) -> Familiarity | None:
-        """Learn from the windows of slides, in the order of time; None if there are too few.
+    def fit(
+        cls, values: Array, codes: Codes, groups: Codes, overlap: float, false_rejection_rate: float
+    ) -> NoveltyDetector | None:
+        """Fit to the windows of slides, in temporal order; return None if there are too few.
 
         Each surface needs LEAST_SLIDES, and all together one over the share of false rejections.
 
@@ -75,57 +74,68 @@ class Familiarity:
             Number of the surface and of the slide of each window.
         overlap
             Distance of two windows over their length, at most 1.
-        false_rejections
+        false_rejection_rate
             Share of the slides over known surfaces that may be taken for unknown: of new slides like those held out, no
             more are, on average.
         """
         slides = [np.flatnonzero(groups == group) for group in np.unique(groups)]
         surfaces = codes[[rows[0] for rows in slides]]
-        allowed = math.floor((len(slides) + 1) * false_rejections)
+        allowed = math.floor((len(slides) + 1) * false_rejection_rate)
         own = np.unique(surfaces, return_counts=True)[1]
         if len(own) < 2 or own.min() < MIN_SLIDES or not allowed:
             return None
-        means = np.stack([values[rows[: _count(WORTHS[-1], overlap)]].mean(axis=0) for rows in slides])
-        strange: list[list[float]] = [[] for _ in WORTHS]
+        means = np.stack([values[rows[: _count(EFFECTIVE_WINDOWS[-1], overlap)]].mean(axis=0) for rows in slides])
+        novelty_scores: list[list[float]] = [[] for _ in EFFECTIVE_WINDOWS]
         for train, test in _folds(surfaces):
             known = cls._of(means[train], surfaces[train])
             for slide in np.flatnonzero(test):
-                for level, worth in enumerate(WORTHS):
-                    part = slides[slide][: _count(worth, overlap)]
-                    strange[level].append(float(known.strangeness(values[part].mean(axis=0))))
-        limits = [sorted(level)[-allowed] for level in strange]
+                for level, effective_windows in enumerate(EFFECTIVE_WINDOWS):
+                    part = slides[slide][: _count(effective_windows, overlap)]
+                    novelty_scores[level].append(float(known.novelty_score(values[part].mean(axis=0))))
+        thresholds = [sorted(level)[-allowed] for level in novelty_scores]
         whole = cls._of(means, surfaces)
-        return cls(whole.projection, whole.places, whole.centre, whole.weights, np.array(WORTHS), np.array(limits))
+        return cls(
+            whole.projection,
+            whole.references,
+            whole.centre,
+            whole.weights,
+            np.array(EFFECTIVE_WINDOWS),
+            np.array(thresholds),
+        )
 
-    def strangeness(self, mean_values: Array) -> float:
-        """Return how strange the mean (n_features,) of the first windows of a slide is; higher is stranger."""
-        place = mean_values @ self.projection
-        off = self._squares - 2.0 * (self.places @ place)
+    def novelty_score(self, mean_values: Array) -> float:
+        """Return the novelty score of the mean (n_features,) of the first windows of a slide."""
+        projected = mean_values @ self.projection
+        off = self._squares - 2.0 * (self.references @ projected)
         near = np.partition(off, min(NEAREST, len(off)) - 1)[:NEAREST]
-        away = place - self.centre
-        return float(near.mean() + place @ place - (away * away) @ self.weights)
+        away = projected - self.centre
+        return float(near.mean() + projected @ projected - (away * away) @ self.weights)
 
-    def knows(self, mean_values: Array, worth: float) -> bool:
-        """Return whether a surface resembles one that was learnt, after evidence worth so many windows."""
-        return self.strangeness(mean_values) <= float(np.interp(worth, self.worths, self.limits))
+    def is_known(self, mean_values: Array, effective_windows: float) -> bool:
+        """Return whether the novelty score is below the threshold for this effective window count."""
+        return self.novelty_score(mean_values) <= float(
+            np.interp(effective_windows, self.effective_window_counts, self.thresholds)
+        )
 
-    def with_slides(self, slides: Sequence[Array], overlap: float) -> Familiarity:
-        """Return the same, knowing more slides by their windows, (n_windows, n_features) each, in the order of time."""
-        means = np.stack([values[: _count(WORTHS[-1], overlap)].mean(axis=0) for values in slides])
-        places = np.concatenate([self.places, means @ self.projection])
-        return Familiarity(self.projection, places, self.centre, self.weights, self.worths, self.limits)
+    def with_slides(self, slides: Sequence[Array], overlap: float) -> NoveltyDetector:
+        """Return the detector with more reference slides, (n_windows, n_features) each, in temporal order."""
+        means = np.stack([values[: _count(EFFECTIVE_WINDOWS[-1], overlap)].mean(axis=0) for values in slides])
+        references = np.concatenate([self.references, means @ self.projection])
+        return NoveltyDetector(
+            self.projection, references, self.centre, self.weights, self.effective_window_counts, self.thresholds
+        )
 
-    def as_parts(self) -> dict[str, AnyArray]:
+    def as_arrays(self) -> dict[str, AnyArray]:
         """Return the arrays for the model file."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     @classmethod
-    def from_parts(cls, parts: Mapping[str, Any]) -> Familiarity:
-        """Return what `as_parts` gave."""
-        return cls(*(np.asarray(parts[name], dtype=np.float64) for name in cls.__dataclass_fields__))
+    def from_arrays(cls, parameters: Mapping[str, Any]) -> NoveltyDetector:
+        """Return what `as_arrays` gave."""
+        return cls(*(np.asarray(parameters[name], dtype=np.float64) for name in cls.__dataclass_fields__))
 
     @classmethod
-    def _of(cls, means: Array, surfaces: Codes) -> Familiarity:
+    def _of(cls, means: Array, surfaces: Codes) -> NoveltyDetector:
         """Learn the distance from slides, without limits."""
         names, codes = np.unique(surfaces, return_inverse=True)
         scale = means.std(axis=0)
@@ -140,17 +150,17 @@ class Familiarity:
         nothing = np.zeros(0)
         return cls(
             projection=directions / scale[:, None],
-            places=scaled @ directions,
+            references=scaled @ directions,
             centre=centre @ directions,
             weights=1.0 / (1.0 + np.maximum(spread, 0.0)),
-            worths=nothing,
-            limits=nothing,
+            effective_window_counts=nothing,
+            thresholds=nothing,
         )
 
 
-def _count(worth: float, overlap: float) -> int:
-    """Return how many windows are worth so many that do not overlap."""
-    return 1 + round((worth - 1.0) / overlap)
+def _count(effective_windows: float, overlap: float) -> int:
+    """Return how many windows count as so many that do not overlap."""
+    return 1 + round((effective_windows - 1.0) / overlap)
 
 
 def _covariance(deviations: Array, freedom: int) -> Array:

@@ -1,4 +1,4 @@
-"""The textures of which one is the right one: as few as possible, with a coverage that holds."""
+"""Conformal prediction sets: the smallest sets of textures with a given coverage."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 
-WORTHS = (1.0, 2.0, 4.0, 8.0)  # lengths of evidence at which it is learnt, in windows that do not overlap
+EFFECTIVE_WINDOWS = (1.0, 2.0, 4.0, 8.0)  # lengths of evidence at which it is learnt, in windows that do not overlap
 
 
 @dataclass(frozen=True)
@@ -25,23 +25,26 @@ class PredictionSets:
     ----------
     coverage
         Share of slides whose texture is to be in the set.
-    worths, least
-        Length of the evidence, and the probability from which a texture is in the set.
+    effective_window_counts, thresholds
+        Effective window count, and the smallest probability of a texture in the set.
     """
 
     coverage: float = 0.95
-    worths: tuple[float, ...] = (1.0,)
-    least: tuple[float, ...] = (0.0,)
+    effective_window_counts: tuple[float, ...] = (1.0,)
+    thresholds: tuple[float, ...] = (0.0,)
 
-    def members(self, probabilities: Array, worth: float) -> list[int]:
+    def members(self, probabilities: Array, effective_windows: float) -> list[int]:
         """Return the numbers of the textures in the set, the most probable first; never empty."""
-        least = min(float(np.interp(worth, self.worths, self.least)), float(probabilities.max()))
+        thresholds = min(
+            float(np.interp(effective_windows, self.effective_window_counts, self.thresholds)),
+            float(probabilities.max()),
+        )
         order = np.argsort(-probabilities, kind='stable')
-        return [int(number) for number in order if probabilities[number] >= least]
+        return [int(number) for number in order if probabilities[number] >= thresholds]
 
 
-def learnt(
-    posteriors: Sequence[Array], truths: Sequence[int], worths: Sequence[Array], coverage: float
+def fit_prediction_sets(
+    posteriors: Sequence[Array], truths: Sequence[int], effective_window_counts: Sequence[Array], coverage: float
 ) -> PredictionSets:
     """Return the sets for a coverage from slides held out of the training.
 
@@ -51,15 +54,15 @@ def learnt(
         Log-probabilities after each window.
     truths
         Number of the true texture of each slide.
-    worths : of each slide (n_windows,)
+    effective_window_counts : of each slide (n_windows,)
         Length of the evidence after each window.
     coverage
         Share of slides whose texture is to be in the set.
     """
-    least = []
+    thresholds = []
     rank = math.floor((len(truths) + 1) * (1.0 - coverage))  # so many slides may lie below: with this rank it is exact
-    for worth in WORTHS:
-        places = [int(np.abs(own - worth).argmin()) for own in worths]
+    for effective_windows in EFFECTIVE_WINDOWS:
+        places = [int(np.abs(own - effective_windows).argmin()) for own in effective_window_counts]
         true = np.sort([np.exp(p[place, truth]) for p, place, truth in zip(posteriors, places, truths, strict=True)])
-        least.append(float(true[rank - 1]) if rank else 0.0)
-    return PredictionSets(coverage, WORTHS, tuple(least))
+        thresholds.append(float(true[rank - 1]) if rank else 0.0)
+    return PredictionSets(coverage, EFFECTIVE_WINDOWS, tuple(thresholds))

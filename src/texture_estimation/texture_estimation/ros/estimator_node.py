@@ -24,15 +24,15 @@ class EstimatorNode(Node):
     params: ClassVar[type]  # has the field `model`, a path or ''
     estimate: ClassVar[tuple[type, str]]  # message and topic
     no_model: ClassVar[str]
-    doing: ClassVar[str]
-    unused: ClassVar[str]  # what is said when there are new faults
+    activity: ClassVar[str]
+    vectors_unused: ClassVar[str]  # what is said when there are new faults
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         super().__init__(name, **kwargs)
         self._evidence = self._load(declare(self, self.params, changeable=True).model)
         on_change(self, self.params, self._change)
         self._estimates = 0
-        self._broken = 0
+        self._invalid = 0
         self._lost = 0
         self._next_number: int | None = None
         self._reported = 0
@@ -45,7 +45,7 @@ class EstimatorNode(Node):
         """Return the evidence that begins with the model of this path, without one for ''."""
         raise NotImplementedError
 
-    def _judge(self, vector: FeatureVector) -> Any:
+    def _predict(self, vector: FeatureVector) -> Any:
         """Return the estimate after one more vector, None if there is none."""
         return self._evidence.update(vector)
 
@@ -63,10 +63,10 @@ class EstimatorNode(Node):
         try:
             vector = from_msg(message)
         except TextureError as error:
-            self._broken += 1
+            self._invalid += 1
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
             return
-        estimate = self._judge(vector)
+        estimate = self._predict(vector)
         if estimate is None:
             return
         self._processing_s = time.perf_counter() - began
@@ -87,7 +87,7 @@ class EstimatorNode(Node):
 
     def _report(self) -> DiagnosticReport:
         model = self._evidence.model
-        faults = {**self._faults(), 'broken_messages': self._broken, 'lost_vectors': self._lost}
+        faults = {**self._faults(), 'invalid_messages': self._invalid, 'lost_vectors': self._lost}
         numbers = {
             'model': model.name if model else '',
             'estimates': self._estimates,
@@ -99,4 +99,4 @@ class EstimatorNode(Node):
             return 'WARN', self.no_model, numbers
         count = sum(faults.values())
         new, self._reported = count != self._reported, count
-        return ('WARN', self.unused, numbers) if new else ('OK', self.doing, numbers)
+        return ('WARN', self.vectors_unused, numbers) if new else ('OK', self.activity, numbers)

@@ -1,1 +1,1 @@
-"""Roughness as people grade it: heads, recipes, models and evidence."""
+"""Roughness as people grade it: regressors, recipes, models and evidence."""

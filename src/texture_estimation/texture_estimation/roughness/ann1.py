@@ -11,8 +11,8 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_estimation.learners.learner import Codes
-from texture_estimation.roughness.head import ROUGH, SMOOTH
-from texture_estimation.roughness.networks import Networks, fit_networks
+from texture_estimation.roughness.networks import RegressionNetworks, fit_networks
+from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 
 
 @dataclass(frozen=True)
@@ -25,25 +25,25 @@ class Ann1:
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
 
-    hidden: int = param(10, 'Neurons in the hidden layer.', low=1, high=200)
-    iterations: int = param(50, 'Steps of the training at most.', low=1, high=10_000)
-    seed: int = param(0, 'Of the weights before the training.', low=0)
+    hidden: int = param(10, 'Number of neurons in the hidden layer.', low=1, high=200)
+    iterations: int = param(50, 'Largest number of training iterations.', low=1, high=10_000)
+    seed: int = param(0, 'Seed of the initial weights.', low=0)
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
         """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,)."""
         return fit_networks(values, [grades], textures, **asdict(self))
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> NetworkGrader:
-        """Return what grades, from the stored parts."""
-        return NetworkGrader(Networks(**parts))
+    def predictor(parameters: Mapping[str, Any]) -> NetworkRegressorPredictor:
+        """Return the predictor made from the stored parameters."""
+        return NetworkRegressorPredictor(RegressionNetworks(**parameters))
 
 
 @dataclass(frozen=True, eq=False)
-class NetworkGrader:
+class NetworkRegressorPredictor:
     """The grade is the output, within 1 and 5."""
 
-    networks: Networks
+    networks: RegressionNetworks
 
     def __call__(self, values: Array) -> tuple[Array, Array]:
         """Return grade and standard deviation, the latter not known."""

@@ -12,17 +12,20 @@ from texture_core.arrays import Array
 from texture_core.features import FeatureVector
 from texture_core.parameters import param
 
-# Features that tell whether a window can be used; a head does not see them.
-SKID, LEVEL = 'bursts', 'log_variance'
+# Features that tell whether a window can be used; a regressor does not see them.
+STICK_SLIP, LEVEL = 'peak_to_median_power', 'log_variance'
 
 
 @dataclass(frozen=True)
 class CheckParams:
     """What makes a window unusable; both margins are beyond what was met in the training."""
 
-    least_force_n: float = param(0.05, 'Less force than this is no contact.', unit='N', low=0.0, high=100.0)
-    skid_margin: float = param(
-        1.0, f'Rise of `{SKID}` over the strongest in the training, natural logarithm of power.', low=0.0, high=100.0
+    min_force_n: float = param(0.05, 'Smallest force that counts as contact.', unit='N', low=0.0, high=100.0)
+    stick_slip_margin: float = param(
+        1.0,
+        f'Rise of `{STICK_SLIP}` over the strongest in the training, natural logarithm of power.',
+        low=0.0,
+        high=100.0,
     )
     quiet_margin: float = param(
         0.7, f'Fall of `{LEVEL}` below the weakest in the training, natural logarithm of power.', low=0.0, high=100.0
@@ -35,15 +38,15 @@ def checked_columns(names: Sequence[str], feature: str) -> NDArray[np.intp]:
 
 
 def graded_columns(names: Sequence[str]) -> NDArray[np.intp]:
-    """Return the columns that a head sees."""
-    return np.flatnonzero([name.split('/')[1:2] not in ([SKID], [LEVEL]) for name in names])
+    """Return the columns that a regressor sees."""
+    return np.flatnonzero([name.split('/')[1:2] not in ([STICK_SLIP], [LEVEL]) for name in names])
 
 
 def limits_of(params: CheckParams, names: Sequence[str], values: Array) -> dict[str, float]:
     """Return the largest `bursts` and the least `log_variance` to accept, from training windows (n, n_features)."""
     limits = {}
-    if (columns := checked_columns(names, SKID)).size:
-        limits[SKID] = float(values[:, columns].max()) + params.skid_margin
+    if (columns := checked_columns(names, STICK_SLIP)).size:
+        limits[STICK_SLIP] = float(values[:, columns].max()) + params.stick_slip_margin
     if (columns := checked_columns(names, LEVEL)).size:
         limits[LEVEL] = float(values[:, columns].max(axis=1).min()) - params.quiet_margin
     return limits
@@ -69,11 +72,11 @@ class Checks:
     _columns: dict[str, NDArray[np.intp]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        self._columns.update({feature: checked_columns(self.names, feature) for feature in (SKID, LEVEL)})
+        self._columns.update({feature: checked_columns(self.names, feature) for feature in (STICK_SLIP, LEVEL)})
 
     def refusal(self, vector: FeatureVector) -> str:
         """Return why a window cannot be graded; '' if it can."""
-        if vector.force_n < self.params.least_force_n:  # an unknown force is NaN and says nothing
+        if vector.force_n < self.params.min_force_n:  # an unknown force is NaN and says nothing
             return f'no contact: the force is {vector.force_n:.2f} N'
         finite = np.isfinite(vector.values)
         if not finite.all():
@@ -81,6 +84,9 @@ class Checks:
             return f"its feature '{bad}' is not finite; is the speed known?"
         if LEVEL in self.limits and float(vector.values[self._columns[LEVEL]].max()) < self.limits[LEVEL]:
             return 'no contact: the signal is weaker than on the smoothest surface learnt'
-        if SKID in self.limits and float(vector.values[self._columns[SKID]].max()) > self.limits[SKID]:
-            return 'the finger skids: the signal comes in bursts'
+        if (
+            STICK_SLIP in self.limits
+            and float(vector.values[self._columns[STICK_SLIP]].max()) > self.limits[STICK_SLIP]
+        ):
+            return 'the finger skids: stick-slip dominates the signal'
         return ''

@@ -7,9 +7,9 @@ import math
 from texture_core.estimates import RoughnessEstimate
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
-from texture_estimation.fingerprint import difference
-from texture_estimation.roughness.head import ROUGH, SMOOTH
+from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.roughness.model import NORMAL_90, RoughnessModel
+from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estimator to the path of a trained one"
 NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
@@ -18,7 +18,7 @@ SILENT = 'no grade: the surface resembles none of those learnt'
 PRIOR_WINDOWS = 4.0
 
 
-class RoughnessEvidence:
+class RoughnessAccumulator:
     """Join the grades of the windows of one slide; the same code on the robot and on recordings.
 
     A new exploration id, or a vector after the `last` one, begins anew.
@@ -33,7 +33,7 @@ class RoughnessEvidence:
         self.model = model
         self.refused = 0  # vectors of another fingerprint
         self.unusable = 0  # windows without contact, with skids or with values that are not finite
-        self.silent = 0  # windows to which the head gave no grade
+        self.silent = 0  # windows to which the regressor gave no grade
         self._over = True
         self._final = False
         self._exploration_id = ''
@@ -62,7 +62,9 @@ class RoughnessEvidence:
     def _take(self, vector: FeatureVector, model: RoughnessModel) -> None:
         if vector.feature_set != model.feature_set:
             self.refused += 1
-            self._message = f"model '{model.name}' does not fit: {difference(vector.feature_set, model.feature_set)}"
+            self._message = (
+                f"model '{model.name}' does not fit: {fingerprint_difference(vector.feature_set, model.feature_set)}"
+            )
             return
         refusal = model.checks.refusal(vector)
         if refusal:
@@ -98,7 +100,7 @@ class RoughnessEvidence:
         std = math.sqrt(shared + scatter)
         to_gain = NORMAL_90 * (std - math.sqrt(shared))
         params = model.recipe.evidence
-        narrow = self._windows >= params.least_windows and to_gain < params.narrow_grades
+        narrow = self._windows >= params.min_windows and to_gain < params.min_narrowing_grades
         return RoughnessEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -119,5 +121,5 @@ class RoughnessEvidence:
         around = max(0.0, self._sum_squares - self._sum * self._sum / count)
         known = PRIOR_WINDOWS * model.calibration.within_std**2
         scatter = (known + around) / (PRIOR_WINDOWS + count - 1.0)
-        # Windows that overlap are worth the sliding time that they cover together.
+        # Windows that overlap contribute the sliding time that they cover together.
         return self._sum_variances / count, scatter * self._window_ns / self._evidence_ns

@@ -14,7 +14,7 @@ from texture_core.errors import InvalidData
 from texture_core.parameters import param
 from texture_estimation.learners.learner import Codes
 from texture_estimation.learners.standardisation import standardisation
-from texture_estimation.roughness.head import ROUGH, SMOOTH
+from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 
 MIDDLE = 3.0  # of the scale: the grade of a texture of which nothing is known
 # What is known beforehand of the logarithms of the hyperparameters, in grades and in distances between textures:
@@ -35,7 +35,7 @@ class GaussianProcess:
     Source: Rasmussen & Williams 2006, sections 2.2 and 5.4.1.
     """
 
-    curved: bool = param(True, 'Allow what is not straight; false: Bayesian linear regression.')
+    curved: bool = param(True, 'Whether a nonlinear (RBF) term is added; false: Bayesian linear regression.')
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
         """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,)."""
@@ -75,13 +75,13 @@ class GaussianProcess:
         return hyper
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> ProcessGrader:
-        """Return what grades, from the stored parts."""
-        return ProcessGrader(**parts)
+    def predictor(parameters: Mapping[str, Any]) -> GaussianProcessPredictor:
+        """Return the predictor made from the stored parameters."""
+        return GaussianProcessPredictor(**parameters)
 
 
 @dataclass(frozen=True, eq=False)
-class ProcessGrader:
+class GaussianProcessPredictor:
     """The posterior at a window's features.
 
     Parameters

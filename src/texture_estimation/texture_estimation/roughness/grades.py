@@ -13,7 +13,7 @@ from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.files import MB, read_text
 from texture_core.resources import find_file
-from texture_estimation.roughness.head import ROUGH, SMOOTH
+from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 
 MAX_BYTES = 1 * MB
 TRAIN, TEST = 'train', 'test'

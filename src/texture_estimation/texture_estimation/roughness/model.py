@@ -15,22 +15,22 @@ from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch
 from texture_estimation import model_files
 from texture_estimation.roughness.checks import Checks, graded_columns
-from texture_estimation.roughness.head import Grader
 from texture_estimation.roughness.recipe import RoughnessRecipe
+from texture_estimation.roughness.regressor import RegressorPredictor
 
 NORMAL_90 = 1.6449  # a normal value lies so many standard deviations around its mean in 90 of 100 cases
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What makes an honest standard deviation of the one that a head claims.
+    """What makes an honest standard deviation of the one that a regressor claims.
 
     Parameters
     ----------
     scale
         Factor on what is common to all windows of a texture.
     base_std
-        Standard deviation, in grades, of what the head does not know of.
+        Standard deviation, in grades, of what the regressor does not know of.
     within_std
         Standard deviation of the windows of one texture around their mean, in grades.
     """
@@ -39,19 +39,19 @@ class Calibration:
     base_std: float = 0.0
     within_std: float = 0.0
 
-    def shared_variance(self, head_std: Array | float) -> Array:
+    def shared_variance(self, regressor_std: Array | float) -> Array:
         """Return the variance that more sliding over the texture does not lessen."""
-        variance: Array = self.scale**2 * (np.square(head_std) + self.base_std**2)
+        variance: Array = self.scale**2 * (np.square(regressor_std) + self.base_std**2)
         return variance
 
-    def window_std(self, head_std: Array) -> Array:
+    def window_std(self, regressor_std: Array) -> Array:
         """Return the standard deviation of the grade of a single window."""
-        return np.sqrt(self.shared_variance(head_std) + self.within_std**2)
+        return np.sqrt(self.shared_variance(regressor_std) + self.within_std**2)
 
 
 @dataclass(frozen=True, eq=False)
 class RoughnessModel:
-    """What was learnt, with all that is needed to grade a feature vector and to refuse a foreign one.
+    """Fitted parameters, and what is needed to grade a feature vector and to refuse an incompatible one.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ class RoughnessModel:
         Features it expects, and their fingerprint.
     recipe
         By which it was made.
-    parts
-        What the head has learnt: plain arrays.
+    parameters
+        What the regressor has learnt: plain arrays.
     calibration
         Of the standard deviation.
     limits
@@ -77,16 +77,16 @@ class RoughnessModel:
     names: tuple[str, ...]
     feature_set: str
     recipe: RoughnessRecipe
-    parts: Mapping[str, Any]
+    parameters: Mapping[str, Any]
     calibration: Calibration
     limits: Mapping[str, float]
     grades: Mapping[str, float]
     training: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
-    def grader(self) -> Grader:
+    def predictor(self) -> RegressorPredictor:
         """The head as plain arrays; it sees the features that are no checks."""
-        return self.recipe.head.array_form(self.parts)
+        return self.recipe.regressor.predictor(self.parameters)
 
     @cached_property
     def checks(self) -> Checks:
@@ -98,8 +98,8 @@ class RoughnessModel:
         return graded_columns(self.names)
 
     def grade(self, values: Array) -> tuple[Array, Array]:
-        """Return grade and the head's own standard deviation, (...) each, of (..., n_features)."""
-        return self.grader(values.take(self._columns, axis=-1))
+        """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features)."""
+        return self.predictor(values.take(self._columns, axis=-1))
 
     @property
     def card(self) -> dict[str, Any]:
@@ -120,7 +120,7 @@ class RoughnessModel:
 
     def save(self, path: str | Path, facts: Mapping[str, Any] | None = None) -> Path:
         """Write NAME.skops and NAME.json; `facts` are added to the card. Return NAME.skops."""
-        return model_files.write(path, self.parts, {**self.card, **(facts or {})})
+        return model_files.write(path, self.parameters, {**self.card, **(facts or {})})
 
 
 def load_roughness_model(path: str | Path) -> RoughnessModel:
@@ -133,15 +133,15 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
     """
     target = model_files.stem(path)
     card, content = model_files.read(target)
-    if 'head' not in card.get('recipe', {}):
-        raise ModelMismatch(f"model '{target}' names textures and gives no grades; the classifier takes it")
+    if 'regressor' not in card.get('recipe', {}):
+        raise ModelMismatch(f"model '{target}' classifies textures; load it in the classifier")
     try:
         model = RoughnessModel(
             name=str(card['name']),
             names=tuple(map(str, card['features'])),
             feature_set=str(card['feature_set']),
             recipe=RoughnessRecipe.from_mapping(card['recipe'], str(card['recipe_name'])),
-            parts=model_files.parts_of(content, ()),
+            parameters=model_files.load_parameters(content, ()),
             calibration=Calibration(**card['calibration']),
             limits=dict(card['limits']),
             grades=dict(card['grades']),

@@ -18,7 +18,7 @@ HELD_OUT = 7
 
 
 @dataclass(frozen=True, eq=False)
-class Networks:
+class RegressionNetworks:
     """Sigmoid hidden layers with one linear output each, over the same standardised features.
 
     Parameters
@@ -48,7 +48,7 @@ class Networks:
 def fit_networks(
     values: Array, targets: Sequence[Array], textures: Codes, *, hidden: int, iterations: int, seed: int
 ) -> Mapping[str, Any]:
-    """Return the fields of `Networks`, one network for each target, (n,), of values (n, n_features)."""
+    """Return the fields of `RegressionNetworks`, one network for each target, (n,), of values (n, n_features)."""
     mean, scale = standardisation(values)
     standard = (values - mean) / scale
     rng = np.random.default_rng(seed)

@@ -11,28 +11,28 @@ from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
 from texture_estimation.recipe import TrainingParams
-from texture_estimation.roughness.catalogue import HEADS
+from texture_estimation.roughness.catalogue import REGRESSORS
 from texture_estimation.roughness.checks import CheckParams
-from texture_estimation.roughness.head import Head
-from texture_features.choice import choose
+from texture_estimation.roughness.regressor import RoughnessRegressor
 from texture_features.feature_set import FeatureSet
+from texture_features.recipe_entry import choose
 from texture_features.recipe_file import read_recipe
 from texture_features.windowing.windows import WindowParams
 
-KEYS = ('description', 'windows', 'inputs', 'head', 'checks', 'evidence', 'training')
+KEYS = ('description', 'windows', 'inputs', 'regressor', 'checks', 'evidence', 'training')
 
 
 @dataclass(frozen=True)
 class EvidenceParams:
     """When a grade is final before the slide ends."""
 
-    narrow_grades: float = param(
+    min_narrowing_grades: float = param(
         0.1,
-        'A grade is final once more sliding could narrow its 90 % interval by less than this; 0: at the end only.',
+        'The grade is final once more sliding would narrow its 90 % interval by less; 0: only at the end.',
         low=0.0,
         high=5.0,
     )
-    least_windows: int = param(3, 'Graded windows without which none is final before the end.', low=1, high=10_000)
+    min_windows: int = param(3, 'Smallest number of graded windows before a grade can be final.', low=1, high=10_000)
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class CalibrationParams(TrainingParams):
     """How the examples for training are cut, and on what the interval is calibrated."""
 
     folds: int = param(
-        15, 'Parts into which the textures are divided to be held out; at most one a texture.', low=2, high=1000
+        15, 'Number of folds of textures for the calibration; at most one per texture.', low=2, high=1000
     )
 
 
@@ -50,8 +50,8 @@ class RoughnessRecipe:
 
     name: str
     feature_set: FeatureSet
-    head_name: str
-    head: Head
+    regressor_name: str
+    regressor: RoughnessRegressor
     checks: CheckParams = field(default_factory=CheckParams)
     evidence: EvidenceParams = field(default_factory=EvidenceParams)
     training: CalibrationParams = field(default_factory=CalibrationParams)
@@ -59,7 +59,7 @@ class RoughnessRecipe:
 
     @property
     def training_windows(self) -> WindowParams:
-        """How to cut the windows that are learnt from."""
+        """How to cut the windows that are used for training."""
         return dataclasses.replace(self.feature_set.windows, hop_s=self.training.hop_s)
 
     @classmethod
@@ -75,12 +75,12 @@ class RoughnessRecipe:
         for key in content:
             if key not in KEYS:
                 raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
-        head_name, head = choose(HEADS, content.get('head', 'gaussian_process'), 'head', where)
+        regressor_name, regressor = choose(REGRESSORS, content.get('regressor', 'gaussian_process'), 'regressor', where)
         return cls(
             name,
             FeatureSet.from_mapping(content, where),
-            head_name,
-            head,
+            regressor_name,
+            regressor,
             from_mapping(CheckParams, content.get('checks') or {}, f'{where}, checks'),
             from_mapping(EvidenceParams, content.get('evidence') or {}, f'{where}, evidence'),
             from_mapping(CalibrationParams, content.get('training') or {}, f'{where}, training'),
@@ -92,7 +92,7 @@ class RoughnessRecipe:
         return {
             'description': self.description,
             **self.feature_set.as_mapping(),
-            'head': {self.head_name: dataclasses.asdict(self.head)},
+            'regressor': {self.regressor_name: dataclasses.asdict(self.regressor)},
             'checks': dataclasses.asdict(self.checks),
             'evidence': dataclasses.asdict(self.evidence),
             'training': dataclasses.asdict(self.training),

@@ -12,8 +12,8 @@ from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_estimation.learners.learner import Codes
 from texture_estimation.learners.standardisation import standardisation
-from texture_estimation.roughness.fired import belongs, mean_of_fired
-from texture_estimation.roughness.head import GRADES
+from texture_estimation.roughness.grade_votes import grade_membership, mean_of_votes
+from texture_estimation.roughness.regressor import GRADES
 
 
 @dataclass(frozen=True)
@@ -23,8 +23,10 @@ class Svm5:
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
 
-    c: float = param(10.0, 'Box constraint.', low=1e-6, high=1e9)
-    kernel_scale: float = param(3.0, 'Kernel exp(-(d / scale)²), d between standardised features.', low=1e-9, high=1e9)
+    c: float = param(10.0, 'Penalty of a training error (box constraint C).', low=1e-6, high=1e9)
+    kernel_scale: float = param(
+        3.0, 'Width of the kernel exp(-(d / scale)²) over standardised features.', low=1e-9, high=1e9
+    )
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
         """Learn from values (n, n_features) and grades (n,)."""
@@ -35,7 +37,7 @@ class Svm5:
         weights = np.zeros((len(values), len(GRADES)))
         # A grade that no texture has never fires.
         offsets = np.full(len(GRADES), -1.0)
-        for number, member in enumerate(belongs(grades).T):
+        for number, member in enumerate(grade_membership(grades).T):
             if member.all():
                 offsets[number] = 1.0
             elif member.any():
@@ -53,13 +55,13 @@ class Svm5:
         }
 
     @staticmethod
-    def array_form(parts: Mapping[str, Any]) -> FiringMachines:
-        """Return what grades, from the stored parts."""
-        return FiringMachines(**parts)
+    def predictor(parameters: Mapping[str, Any]) -> VotingSvmsPredictor:
+        """Return the predictor made from the stored parameters."""
+        return VotingSvmsPredictor(**parameters)
 
 
 @dataclass(frozen=True, eq=False)
-class FiringMachines:
+class VotingSvmsPredictor:
     """The mean of the grades whose machine fires.
 
     Parameters
@@ -85,5 +87,5 @@ class FiringMachines:
         standard = (values - self.mean) / self.scale
         squares = (standard**2).sum(axis=-1)[..., None] + (self.vectors**2).sum(axis=1)
         distances = squares - 2.0 * standard @ self.vectors.T
-        grade = mean_of_fired(np.exp(-self.gamma * distances) @ self.weights + self.offsets > 0.0)
+        grade = mean_of_votes(np.exp(-self.gamma * distances) @ self.weights + self.offsets > 0.0)
         return grade, np.zeros_like(grade)

@@ -14,18 +14,18 @@ from texture_core.errors import InvalidData
 from texture_estimation.learners.learner import Codes
 from texture_estimation.roughness.checks import graded_columns, limits_of
 from texture_estimation.roughness.grades import Grades
-from texture_estimation.roughness.head import Head
 from texture_estimation.roughness.model import NORMAL_90, Calibration, RoughnessModel
 from texture_estimation.roughness.recipe import RoughnessRecipe
+from texture_estimation.roughness.regressor import RoughnessRegressor
 from texture_features.labelled_features import LabelledFeatures
 
-MIN_TEXTURES = 4  # to hold one out and learn from the others
+MIN_TEXTURES = 4  # to hold one out and train on the others
 SCALES = (0.05, 20.0)
 
 
 @dataclass(frozen=True, eq=False)
-class HeldOut:
-    """What a head says of windows of textures that it has not seen, (n,) each; NaN where it gives no grade."""
+class HeldOutGrades:
+    """What a regressor says of windows of textures that it has not seen, (n,) each; NaN where it gives no grade."""
 
     grades: Array
     stds: Array
@@ -33,10 +33,10 @@ class HeldOut:
     textures: Codes
 
     @property
-    def graded(self) -> HeldOut:
+    def graded(self) -> HeldOutGrades:
         """Those windows that got a grade."""
         rows = np.isfinite(self.grades)
-        return HeldOut(self.grades[rows], self.stds[rows], self.true[rows], self.textures[rows])
+        return HeldOutGrades(self.grades[rows], self.stds[rows], self.true[rows], self.textures[rows])
 
     def mean_over_textures(self, values: Array) -> float:
         """Return the mean of values, (n,), in which each texture counts alike."""
@@ -70,14 +70,14 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
     _check(examples)
     columns = graded_columns(examples.names)
     values = examples.values[:, columns]
-    held_out = hold_out(recipe.head, values, true, codes, recipe.training.folds)
+    held_out = hold_out(recipe.regressor, values, true, codes, recipe.training.folds)
     calibration, facts = calibrate(held_out)
     return RoughnessModel(
         name=name or recipe.name,
         names=examples.names,
         feature_set=examples.feature_set,
         recipe=recipe,
-        parts=recipe.head.fit(values, true, codes),
+        parameters=recipe.regressor.fit(values, true, codes),
         calibration=calibration,
         limits=limits_of(recipe.checks, examples.names, examples.values),
         grades=table,
@@ -92,8 +92,10 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
     )
 
 
-def hold_out(head: Head, values: Array, true: Array, textures: Codes, folds: int) -> HeldOut | None:
-    """Return what is said of each texture by a head that learnt from the others; None if there are too few."""
+def hold_out(
+    regressor: RoughnessRegressor, values: Array, true: Array, textures: Codes, folds: int
+) -> HeldOutGrades | None:
+    """Return what is said of each texture by a regressor that trained on the others; None if there are too few."""
     codes = np.unique(textures)
     if len(codes) < MIN_TEXTURES:
         return None
@@ -102,12 +104,12 @@ def hold_out(head: Head, values: Array, true: Array, textures: Codes, folds: int
     order = codes[np.argsort([true[textures == code][0] for code in codes], kind='stable')]
     for part in range(min(folds, len(codes))):
         held = np.isin(textures, order[part :: min(folds, len(codes))])
-        fitted = head.array_form(head.fit(values[~held], true[~held], textures[~held]))
+        fitted = regressor.predictor(regressor.fit(values[~held], true[~held], textures[~held]))
         grades[held], stds[held] = fitted(values[held])
-    return HeldOut(grades, stds, true, textures)
+    return HeldOutGrades(grades, stds, true, textures)
 
 
-def calibrate(held_out: HeldOut | None) -> tuple[Calibration, Mapping[str, object]]:
+def calibrate(held_out: HeldOutGrades | None) -> tuple[Calibration, Mapping[str, object]]:
     """Return the calibration, and facts for the card.
 
     The scale makes the mean square of error over standard deviation, each texture counting alike, what it is for a

@@ -72,5 +72,5 @@ def algorithm_for(
 def _first_points(space: SearchSpace, population: int, seed: int, start: Sequence[Individual]) -> Array:
     """Return the first generation, (population, n_variables)."""
     given = np.array([space.encode(individual) for individual in start]).reshape(-1, len(space.names))[:population]
-    drawn = np.random.default_rng(seed).random((population - len(given), len(space.names)))
-    return np.concatenate([given, drawn])
+    sample_rows = np.random.default_rng(seed).random((population - len(given), len(space.names)))
+    return np.concatenate([given, sample_rows])

@@ -14,10 +14,10 @@ from texture_estimation.roughness.svm5 import Svm5
 from texture_features.feature import Feature
 from texture_features.features.arc_length import ArcLength
 from texture_features.features.force import Force
-from texture_features.features.integral import Integral
+from texture_features.features.signal_energy import SignalEnergy
 from texture_features.features.spectral_peaks import SpectralPeaks
 from texture_features.features.speed import Speed
-from texture_features.windowing.stretch import Stretched
+from texture_features.windowing.time_stretch import Stretched
 
 # Operations of one exponential or hyperbolic tangent.
 EXPONENTIAL = 10.0
@@ -26,23 +26,23 @@ UNKNOWN = 50.0
 
 
 def operations(
-    features: Sequence[Feature], learner: Any, *, n_samples: int, n_values: int, n_labels: int, n_learnt: int
+    features: Sequence[Feature], learner: Any, *, n_samples: int, n_values: int, n_labels: int, n_training: int
 ) -> float:
     """Return about how many operations it takes from the samples of one window to the decision.
 
     Parameters
     ----------
     features, learner
-        What is done; the learner may be a head that grades.
+        What is done; the learner may be a regressor that grades.
     n_samples
         Of a window, all channels together.
     n_values
         Values of all features.
-    n_labels, n_learnt
-        Surfaces or grades, and examples learnt from, all of which may become support vectors.
+    n_labels, n_training
+        Surfaces or grades, and training examples, all of which may become support vectors.
     """
-    described = sum(_feature(feature, n_samples) for feature in features)
-    return described + LEARNERS.get(type(learner), _unknown_learner)(learner, n_values, n_labels, n_learnt)
+    extracted = sum(_feature(feature, n_samples) for feature in features)
+    return extracted + LEARNERS.get(type(learner), _unknown_learner)(learner, n_values, n_labels, n_training)
 
 
 def _feature(feature: Any, n: int) -> float:
@@ -55,12 +55,12 @@ def _networks(learner: Any, count: float, n_values: int) -> float:
     return float(count * learner.hidden * (2.0 * n_values + EXPONENTIAL))
 
 
-def _machines(count: float, n_values: int, n_learnt: int) -> float:
-    return n_learnt * (2.0 * n_values + EXPONENTIAL + 2.0 * count)
+def _machines(count: float, n_values: int, n_training: int) -> float:
+    return n_training * (2.0 * n_values + EXPONENTIAL + 2.0 * count)
 
 
-def _unknown_learner(_: Any, n_values: int, n_labels: int, n_learnt: int) -> float:
-    return float(n_learnt * n_values)
+def _unknown_learner(_: Any, n_values: int, n_labels: int, n_training: int) -> float:
+    return float(n_training * n_values)
 
 
 def _fourier(n: int) -> float:
@@ -78,7 +78,7 @@ def _unknown(_: Any, n: int) -> float:
 
 FEATURES: Mapping[type[Feature], Callable[[Any, int], float]] = {
     SpectralPeaks: _peaks,  # transform, amplitudes, and twice through half the points for each peak
-    Integral: lambda _, n: 3.0 * n,
+    SignalEnergy: lambda _, n: 3.0 * n,
     ArcLength: lambda _, n: 6.0 * n,
     Speed: lambda _, n: 1.0,
     Force: lambda _, n: 1.0,
@@ -86,7 +86,7 @@ FEATURES: Mapping[type[Feature], Callable[[Any, int], float]] = {
 LEARNERS: Mapping[type, Callable[[Any, int, int, int], float]] = {
     AnnPairs: lambda learner, v, k, _: _networks(learner, k * (k - 1) / 2, v),
     SvmPairs: lambda _, v, k, n: _machines(k - 1, v, n),  # each example has a weight in k - 1 pairs
-    Ann1: lambda head, v, _, n: _networks(head, 1.0, v),
-    Ann5: lambda head, v, k, _: _networks(head, k, v),
+    Ann1: lambda regressor, v, _, n: _networks(regressor, 1.0, v),
+    Ann5: lambda regressor, v, k, _: _networks(regressor, k, v),
     Svm5: lambda _, v, k, n: _machines(k, v, n),
 }

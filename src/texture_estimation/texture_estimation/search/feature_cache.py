@@ -10,12 +10,12 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
-from texture_estimation.search.examples import Cut
-from texture_estimation.search.spread import Spread, in_turn
-from texture_features.feature import Feature, Windows
+from texture_estimation.search.labelled_windows import Cut
+from texture_estimation.search.parallel import ParallelMap, serial_map
+from texture_features.feature import Feature, WindowBatch
 from texture_features.feature_set import FeatureSet, InputFeatures
 from texture_features.features.spectral_peaks import SpectralPeaks, by_frequency
-from texture_features.windowing.stretch import Stretched
+from texture_features.windowing.time_stretch import Stretched
 from texture_features.windowing.windows import WindowParams
 
 # Windows described in one go: what they and their spectra take should fit the processor's cache.
@@ -40,17 +40,17 @@ class FeatureCache:
     def __init__(self, cut: Cut, most_peaks: int = 15) -> None:
         self._cut = cut
         self._most_peaks = most_peaks
-        self._chunks: dict[Key, list[Windows]] = {}
+        self._chunks: dict[Key, list[WindowBatch]] = {}
         self._blocks: dict[Key, Array] = {}
         self.hits = 0
         self.misses = 0
 
-    def values(self, feature_set: FeatureSet, spread: Spread = in_turn) -> Array:
+    def values(self, feature_set: FeatureSet, parallel_map: ParallelMap = serial_map) -> Array:
         """Return the values of each window, (n, n_values)."""
-        return self.many([feature_set], spread)[0]
+        return self.many([feature_set], parallel_map)[0]
 
-    def many(self, feature_sets: Sequence[FeatureSet], spread: Spread = in_turn) -> list[Array]:
-        """Return the values of each feature set, (n, n_values) each; what is not there yet is computed over `spread`.
+    def many(self, feature_sets: Sequence[FeatureSet], parallel_map: ParallelMap = serial_map) -> list[Array]:
+        """Return the values of each feature set, (n, n_values) each; missing ones are computed in parallel.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class FeatureCache:
         self.hits += len(wanted) - len(missing)
         self.misses += len(missing)
         jobs = [(self._windows(windows, item), feature) for windows, item, feature in map(wanted.__getitem__, missing)]
-        for key, block in zip(missing, spread(_describe, jobs), strict=True):
+        for key, block in zip(missing, parallel_map(_describe, jobs), strict=True):
             if not np.isfinite(block).all():
                 raise InvalidData(
                     f"feature {key[2]!r} of '{key[1]}' is not finite in some windows; leave it out of the search"
@@ -83,7 +83,7 @@ class FeatureCache:
                 blocks.append(_derived(block, feature).reshape(len(block), -1))
         return np.concatenate(blocks, axis=1)
 
-    def _windows(self, params: WindowParams, item: InputFeatures) -> list[Windows]:
+    def _windows(self, params: WindowParams, item: InputFeatures) -> list[WindowBatch]:
         key = (params, item.topic, None)
         if key not in self._chunks:
             inputs = self._cut(params).inputs
@@ -106,8 +106,8 @@ class FeatureCache:
         return feature
 
 
-def _some(windows: Windows, rows: slice) -> Windows:
-    return Windows(windows.samples[rows], windows.rate_hz, windows.speed_m_s[rows], windows.force_n[rows])
+def _some(windows: WindowBatch, rows: slice) -> WindowBatch:
+    return WindowBatch(windows.samples[rows], windows.rate_hz, windows.speed_m_s[rows], windows.force_n[rows])
 
 
 def _derived(block: Array, feature: Feature) -> Array:
@@ -120,6 +120,6 @@ def _derived(block: Array, feature: Feature) -> Array:
     return by_frequency(peaks) if feature.order == 'frequency' else peaks
 
 
-def _describe(job: tuple[list[Windows], Feature]) -> Array:
+def _describe(job: tuple[list[WindowBatch], Feature]) -> Array:
     chunks, feature = job
     return np.concatenate([feature(windows) for windows in chunks])

@@ -1,4 +1,4 @@
-"""How well an individual does: shares of right decisions on what was learnt and on what was not."""
+"""How well an individual does: shares of right decisions on what was trained and on what was not."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def decisions(scores: Array) -> Codes:
     return chosen
 
 
-def shares_right(decided: Codes, codes: Codes, learnt: Mask) -> tuple[float, float]:
+def shares_right(decided: Codes, codes: Codes, training: Mask) -> tuple[float, float]:
     """Return the shares of right decisions among the learnt and among the other examples; undecided is not right."""
     right = decided == codes
-    return float(right[learnt].mean()), float(right[~learnt].mean())
+    return float(right[training].mean()), float(right[~training].mean())
 
 
 def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share: float) -> tuple[Codes, Codes]:
@@ -54,7 +54,7 @@ def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share
     _, first, member = np.unique(slides, return_index=True, return_inverse=True)
     member = member.reshape(-1)
     counts = np.bincount(member)
-    voices = rule.voice(log_softmax(scores))
-    sums = np.stack([np.bincount(member, weights=column) for column in voices.T], axis=1)
-    worth = 1.0 + min(hop_share, 1.0) * (counts[:, None].astype(np.float64) - 1.0)
-    return decisions(rule.log_posterior(sums / counts[:, None], worth, 1.0)), first
+    window_evidence_rows = rule.window_evidence(log_softmax(scores))
+    sums = np.stack([np.bincount(member, weights=column) for column in window_evidence_rows.T], axis=1)
+    effective_windows = 1.0 + min(hop_share, 1.0) * (counts[:, None].astype(np.float64) - 1.0)
+    return decisions(rule.log_posterior(sums / counts[:, None], effective_windows, 1.0)), first

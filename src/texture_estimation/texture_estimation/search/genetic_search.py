@@ -10,9 +10,9 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_estimation.search.algorithm import algorithm_for
-from texture_estimation.search.memory import Memory
-from texture_estimation.search.spread import Spread, in_turn
-from texture_estimation.search.trial import EMPTY, Record, Trial, judge, verdict
+from texture_estimation.search.parallel import ParallelMap, serial_map
+from texture_estimation.search.racing import EMPTY, FitnessFunction, HalfScores, race, raced_fitness
+from texture_estimation.search.score_cache import ScoreCache
 from texture_estimation.search.variables import Individual, SearchSpace
 
 OBJECTIVES = ('accuracy', 'front')
@@ -24,19 +24,23 @@ FIRST_LOOK = 4
 class SearchParams:
     """How long and for what is searched; the defaults are those of Roberge et al."""
 
-    population: int = param(20, 'Individuals of a generation.', low=4, high=1000)
-    generations: int = param(30, 'Generations, the first included.', low=1, high=10_000)
-    halves: int = param(20, 'Random halves on which each individual is judged.', low=2, high=1000)
-    seed: int = param(0, 'Of the halves and of the search.', low=0)
+    population: int = param(20, 'Number of individuals in a generation.', low=4, high=1000)
+    generations: int = param(30, 'Number of generations, including the first one.', low=1, high=10_000)
+    halves: int = param(20, 'Number of random half splits on which each individual is evaluated.', low=2, high=1000)
+    seed: int = param(0, 'Seed of the random half splits and of the search.', low=0)
     objective: str = param(
-        'accuracy', 'accuracy alone, or the front of accuracy and computing time (NSGA-II).', choices=OBJECTIVES
+        'accuracy',
+        "Objective: 'accuracy', or the Pareto 'front' of accuracy and computing cost (NSGA-II).",
+        choices=OBJECTIVES,
     )
-    finalists: int = param(3, 'Best individuals that are judged again by the learner itself.', low=1, high=1000)
-    race: bool = param(True, 'Give up an individual once it is clearly worse than the best; else do all its halves.')
+    finalists: int = param(
+        3, 'Number of best individuals that are evaluated again with the learner itself.', low=1, high=1000
+    )
+    race: bool = param(True, 'Stop evaluating an individual once it is significantly worse than the best one (racing).')
 
 
 @dataclass(frozen=True)
-class Scored:
+class ScoredIndividual:
     """An individual with its fitness (larger is better), its cost and the number of halves behind the fitness."""
 
     individual: Individual
@@ -55,24 +59,24 @@ class Generation:
         Of the generation, and how many there will be.
     best
         Of the individuals alive.
-    judged
+    evaluated
         Different individuals met so far.
-    remembered
+    cache_hits
         How often one was met again.
     halves
-        Judged so far: `judged` times the number of halves, had none been given up early.
+        Judged so far: `evaluated` times the number of halves, had none been given up early.
     """
 
     number: int
     of: int
-    best: Scored
-    judged: int
-    remembered: int
+    best: ScoredIndividual
+    evaluated: int
+    cache_hits: int
     halves: int
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchOutcome:
     """What a search found.
 
     Parameters
@@ -85,117 +89,120 @@ class Found:
         One entry a generation.
     """
 
-    ranked: tuple[Scored, ...]
-    front: tuple[Scored, ...]
+    ranked: tuple[ScoredIndividual, ...]
+    front: tuple[ScoredIndividual, ...]
     history: tuple[Generation, ...]
 
 
 def search(
     space: SearchSpace,
-    trials: Callable[[Sequence[Individual]], Sequence[Trial]],
+    fitness_functions: Callable[[Sequence[Individual]], Sequence[FitnessFunction]],
     params: SearchParams,
-    memory: Memory,
+    score_cache: ScoreCache,
     *,
     start: Sequence[Individual] = (),
     cost: Callable[[Individual], float] = lambda _: 0.0,
-    spread: Spread = in_turn,
+    parallel_map: ParallelMap = serial_map,
     tell: Callable[[Generation], None] = lambda _: None,
-) -> Found:
+) -> SearchOutcome:
     """Return the best individuals of a space.
 
     Parameters
     ----------
     space
         What is varied.
-    trials
-        Makes the trials of individuals; called once a generation with those that need to be judged.
+    fitness_functions
+        Makes the trials of individuals; called once a generation with those that need to be evaluated.
     params
         Population, generations, halves, seed and objective.
-    memory
+    score_cache
         Remembers scores; filled from a checkpoint, the search goes on where that one ended.
     start
         Individuals that belong to the first generation; the others are drawn.
     cost
         Second objective of 'front', such as operations a window.
-    spread
+    parallel_map
         Over what the trials are spread.
     tell
         Called after each generation.
     """
     n_objectives = 2 if params.objective == 'front' else 1
     algorithm = algorithm_for(space, params.population, n_objectives, params.seed, start)
-    jury = _Jury(trials, params, memory, cost, spread)
+    racer = _Racer(fitness_functions, params, score_cache, cost, parallel_map)
     history: list[Generation] = []
-    members: dict[Individual, Scored] = {}
+    members: dict[Individual, ScoredIndividual] = {}
     for number in range(1, params.generations + 1):
         offspring = algorithm.ask()
         if offspring is None:  # nothing new is left in a small space
             break
         tried = [space.decode(point) for point in offspring.get('X')]
-        scored = jury.score(tried, list(members.values()))
+        scored = racer.score(tried, list(members.values()))
         offspring.set('F', np.array([_objectives(one, params) for one in scored]))
         algorithm.tell(infills=offspring)
         known = {**members, **{one.individual: one for one in scored}}
         members = {key: known[key] for key in (space.decode(point) for point in algorithm.pop.get('X'))}
         best = max(members.values(), key=_rank)
-        history.append(Generation(number, params.generations, best, len(memory.records), memory.hits, jury.halves))
+        history.append(
+            Generation(number, params.generations, best, len(score_cache.records), score_cache.hits, racer.halves)
+        )
         tell(history[-1])
     ranked = tuple(sorted(members.values(), key=_rank, reverse=True))
-    return Found(ranked, _front(ranked), tuple(history))
+    return SearchOutcome(ranked, _front(ranked), tuple(history))
 
 
-class _Jury:
+class _Racer:
     """Score individuals, each against one that it must beat to survive."""
 
     def __init__(
         self,
-        trials: Callable[[Sequence[Individual]], Sequence[Trial]],
+        fitness_functions: Callable[[Sequence[Individual]], Sequence[FitnessFunction]],
         params: SearchParams,
-        memory: Memory,
+        score_cache: ScoreCache,
         cost: Callable[[Individual], float],
-        spread: Spread,
+        parallel_map: ParallelMap,
     ) -> None:
-        self._trials, self._params, self._memory = trials, params, memory
-        self._cost, self._spread = cost, spread
+        self._fitness_functions, self._params, self._score_cache = fitness_functions, params, score_cache
+        self._cost, self._parallel_map = cost, parallel_map
         self.halves = 0
 
-    def score(self, individuals: Sequence[Individual], parents: Sequence[Scored]) -> list[Scored]:
+    def score(self, individuals: Sequence[Individual], parents: Sequence[ScoredIndividual]) -> list[ScoredIndividual]:
         """Return the scores of one generation."""
-        self._memory.hits += sum(one in self._memory.records for one in individuals)
+        self._score_cache.hits += sum(one in self._score_cache.records for one in individuals)
         costs = [self._cost(one) for one in individuals]
         leaders = parents or (self._first_leaders(individuals, costs) if self._params.race else [])
-        rivals = [self._rival(leaders, cost) for cost in costs]
-        self._judge(individuals, rivals, self._params.halves)
+        incumbents = [self._incumbent(leaders, cost) for cost in costs]
+        self._race(individuals, incumbents, self._params.halves)
         scored = []
-        for one, rival, cost in zip(individuals, rivals, costs, strict=True):
-            value, halves = verdict(self._memory.records[one], rival, self._params.halves)
-            scored.append(Scored(one, value, cost, halves))
+        for one, incumbent, cost in zip(individuals, incumbents, costs, strict=True):
+            value, halves = raced_fitness(self._score_cache.records[one], incumbent, self._params.halves)
+            scored.append(ScoredIndividual(one, value, cost, halves))
         return scored
 
-    def _first_leaders(self, individuals: Sequence[Individual], costs: Sequence[float]) -> list[Scored]:
-        """Return the one that does best on a few halves, when there are no parents, judged on all."""
+    def _first_leaders(self, individuals: Sequence[Individual], costs: Sequence[float]) -> list[ScoredIndividual]:
+        """Return the one that does best on a few halves, when there are no parents, evaluated on all."""
         few = min(FIRST_LOOK, self._params.halves)
-        self._judge(individuals, [None] * len(individuals), few)
-        glimpses = [float(self._memory.records[one].means[:few].mean()) for one in individuals]
+        self._race(individuals, [None] * len(individuals), few)
+        glimpses = [float(self._score_cache.records[one].means[:few].mean()) for one in individuals]
         best = max(range(len(individuals)), key=lambda index: (glimpses[index], -costs[index], -index))
-        self._judge([individuals[best]], [None], self._params.halves)
-        record = self._memory.records[individuals[best]]
-        return [Scored(individuals[best], float(record.means.mean()), costs[best], self._params.halves)]
+        self._race([individuals[best]], [None], self._params.halves)
+        record = self._score_cache.records[individuals[best]]
+        return [ScoredIndividual(individuals[best], float(record.means.mean()), costs[best], self._params.halves)]
 
-    def _judge(self, individuals: Sequence[Individual], rivals: Sequence[Array | None], n_halves: int) -> None:
+    def _race(self, individuals: Sequence[Individual], incumbents: Sequence[Array | None], n_halves: int) -> None:
         """Have the memory hold what a verdict on each needs."""
-        memory = self._memory
-        known = [memory.recall(one) for one in individuals]
-        open_cases = [index for index, record in enumerate(known) if not _settled(record, rivals[index], n_halves)]
-        trials = self._trials([individuals[index] for index in open_cases]) if open_cases else ()
+        score_cache = self._score_cache
+        known = [score_cache.get(one) for one in individuals]
+        open_cases = [index for index, record in enumerate(known) if not _settled(record, incumbents[index], n_halves)]
+        fitness_functions = self._fitness_functions([individuals[index] for index in open_cases]) if open_cases else ()
         cases = [
-            (trial, known[index], rivals[index], n_halves) for index, trial in zip(open_cases, trials, strict=True)
+            (fitness_function, known[index], incumbents[index], n_halves)
+            for index, fitness_function in zip(open_cases, fitness_functions, strict=True)
         ]
-        for index, record in zip(open_cases, self._spread(_judge, cases), strict=True):
+        for index, record in zip(open_cases, self._parallel_map(_race, cases), strict=True):
             self.halves += record.halves - known[index].halves
-            memory.keep(individuals[index], record)
+            score_cache.store(individuals[index], record)
 
-    def _rival(self, leaders: Sequence[Scored], cost: float) -> Array | None:
+    def _incumbent(self, leaders: Sequence[ScoredIndividual], cost: float) -> Array | None:
         """Return the mean scores on each half of the best of those that cost no more; None without any.
 
         Whoever is clearly worse than the best need not be known exactly: it is ranked by its estimate.
@@ -206,33 +213,33 @@ class _Jury:
         fair = [one for one in leaders if one.cost <= cost and one.halves == n_halves]
         if not fair:
             return None
-        return self._memory.records[max(fair, key=_rank).individual].means[:n_halves]
+        return self._score_cache.records[max(fair, key=_rank).individual].means[:n_halves]
 
 
-def _judge(case: tuple[Trial, Record, Array | None, int]) -> Record:
-    return judge(*case)
+def _race(case: tuple[FitnessFunction, HalfScores, Array | None, int]) -> HalfScores:
+    return race(*case)
 
 
-def _settled(known: Record, rival: Array | None, n_halves: int) -> bool:
+def _settled(known: HalfScores, incumbent: Array | None, n_halves: int) -> bool:
     """Tell whether what is remembered is enough for a verdict."""
     if known is EMPTY:
         return False
     return known.halves >= n_halves or (
-        rival is not None and verdict(known, rival, known.halves + 1)[1] <= known.halves
+        incumbent is not None and raced_fitness(known, incumbent, known.halves + 1)[1] <= known.halves
     )
 
 
-def _objectives(one: Scored, params: SearchParams) -> list[float]:
+def _objectives(one: ScoredIndividual, params: SearchParams) -> list[float]:
     return [-one.fitness, one.cost] if params.objective == 'front' else [-one.fitness]
 
 
-def _rank(one: Scored) -> tuple[float, float, str]:
+def _rank(one: ScoredIndividual) -> tuple[float, float, str]:
     return one.fitness, -one.cost, str(one.individual)
 
 
-def _front(scored: Sequence[Scored]) -> tuple[Scored, ...]:
+def _front(scored: Sequence[ScoredIndividual]) -> tuple[ScoredIndividual, ...]:
     """Return those that none beats in accuracy at the same cost or less, cheapest first."""
-    front: list[Scored] = []
+    front: list[ScoredIndividual] = []
     for one in sorted(scored, key=lambda s: (s.cost, -s.fitness)):
         if not front or one.fitness > front[-1].fitness:
             front.append(one)

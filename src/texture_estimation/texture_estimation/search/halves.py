@@ -1,4 +1,4 @@
-"""Random halves of labelled slides: one to learn from, one to test on."""
+"""Random halves of labelled slides: one for training, one to test on."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ Mask = NDArray[np.bool_]
 
 
 def random_halves(codes: Codes, groups: Codes, count: int, rng: np.random.Generator) -> Mask:
-    """Return which examples are learnt from in each of `count` divisions, (count, n).
+    """Return which examples are used for training in each of `count` splits, (count, n).
 
-    Half of the slides of each label, rounded down, are learnt from; all windows of a slide are on one side.
+    Half of the slides of each label, rounded down, are used for training; all windows of a slide are on one side.
 
     Parameters
     ----------
     codes, groups : (n,)
         Label and slide number of each example.
     count
-        How many divisions.
+        How many splits.
     rng
         Draws the slides.
 
@@ -37,10 +37,10 @@ def random_halves(codes: Codes, groups: Codes, count: int, rng: np.random.Genera
     if min(len(members) for members in of_label) < 2:
         raise InvalidData(
             f'a surface has {min(len(members) for members in of_label)} slides; '
-            'two at least are needed, one to learn from and one to test on'
+            'two at least are needed, one for training and one to test on'
         )
     halves = np.zeros((count, len(codes)), dtype=bool)
     for mask in halves:
-        learnt = [rng.permutation(members)[: len(members) // 2] for members in of_label]
-        mask[:] = np.isin(groups, np.concatenate(learnt))
+        training = [rng.permutation(members)[: len(members) // 2] for members in of_label]
+        mask[:] = np.isin(groups, np.concatenate(training))
     return halves

@@ -12,21 +12,21 @@ from typing import Any, Generic
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
-from texture_estimation.search.division import Division
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.fitness import fitness
-from texture_estimation.search.genetic_search import Found, Generation, Scored, SearchParams, search
-from texture_estimation.search.memory import Memory
+from texture_estimation.search.genetic_search import Generation, ScoredIndividual, SearchOutcome, SearchParams, search
+from texture_estimation.search.parallel import ParallelMap, serial_map
+from texture_estimation.search.racing import FitnessFunction, HalfScores
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.spread import Spread, in_turn
-from texture_estimation.search.task import R, Task
-from texture_estimation.search.trial import Record, Trial
+from texture_estimation.search.score_cache import ScoreCache
+from texture_estimation.search.search_slides import SearchSlides
+from texture_estimation.search.search_task import R, SearchTask
 from texture_estimation.search.variables import Individual
 
 
 @dataclass(frozen=True, eq=False)
 class Finalist(Generic[R]):
-    """A recipe judged by its own learner on every half.
+    """A recipe evaluated by its own learner on every half.
 
     Parameters
     ----------
@@ -39,8 +39,8 @@ class Finalist(Generic[R]):
     """
 
     recipe: R
-    searched: Scored
-    record: Record
+    searched: ScoredIndividual
+    record: HalfScores
 
     @property
     def fitness(self) -> float:
@@ -49,7 +49,7 @@ class Finalist(Generic[R]):
 
 
 @dataclass(frozen=True, eq=False)
-class Optimised(Generic[R]):
+class SearchResult(Generic[R]):
     """What was found.
 
     Parameters
@@ -60,43 +60,43 @@ class Optimised(Generic[R]):
         The best of the search, or the whole front of accuracy and cost; best first.
     found
         What the search says of its last generation.
-    memory
+    score_cache
         All scores.
     """
 
     best: Finalist[R]
     finalists: tuple[Finalist[R], ...]
-    found: Found
-    memory: Memory
+    found: SearchOutcome
+    score_cache: ScoreCache
 
 
 def optimise(
     space: RecipeSpace[R],
-    division: Division,
+    search_slides: SearchSlides,
     params: SearchParams,
-    task: Task[R],
+    task: SearchTask[R],
     *,
     features: FeatureCache | None = None,
-    spread: Spread = in_turn,
+    parallel_map: ParallelMap = serial_map,
     checkpoint: str | Path | None = None,
     resume: str | Path | None = None,
     tell: Callable[[Generation], None] = lambda _: None,
-) -> Optimised[R]:
-    """Search the space with quick judges, then judge the best again with the learner itself.
+) -> SearchResult[R]:
+    """Search the space with quick surrogate, then evaluate the best again with the learner itself.
 
     Parameters
     ----------
     space
         The recipe, and what of it is varied. The recipe itself takes part in the first generation.
-    division
+    search_slides
         Slides and their halves; with as many halves as `params` has, and its seed.
     params
         Population, generations and so on.
     task
-        `TellingApart()`, or `Grading(grades)`.
+        `ClassificationTask()`, or `RoughnessTask(grades)`.
     features
         Of earlier searches on the same slides, all surfaces included.
-    spread
+    parallel_map
         Over cores or a cluster.
     checkpoint, resume
         File that is written after each generation, and file that is read first.
@@ -106,54 +106,59 @@ def optimise(
     Raises
     ------
     InvalidParameter
-        If the division has other halves than `params`.
+        If the split has other halves than `params`.
     TextureError
         If slides, features or checkpoint cannot be used.
     """
-    if (division.n_halves, division.seed) != (params.halves, params.seed):
+    if (search_slides.n_halves, search_slides.seed) != (params.halves, params.seed):
         raise InvalidParameter(
-            f'the slides are divided into {division.n_halves} halves with seed {division.seed}, the search asks for '
+            f'the slides have {search_slides.n_halves} half splits with seed {search_slides.seed}, the search asks for '
             f'{params.halves} with seed {params.seed}; give both the same'
         )
-    plan = _Plan(space, division, task, features or FeatureCache(division.cut), spread)
-    memory = Memory(plan.identity)
+    plan = _Plan(space, search_slides, task, features or FeatureCache(search_slides.cut), parallel_map)
+    score_cache = ScoreCache(plan.identity)
     if resume:
-        memory.load(resume)
+        score_cache.load(resume)
 
     def after_generation(generation: Generation) -> None:
         if checkpoint:
-            memory.save(checkpoint)
+            score_cache.save(checkpoint)
         tell(generation)
 
     found = search(
         space.variables,
-        plan.trials,
+        plan.fitness_functions,
         params,
-        memory,
+        score_cache,
         start=[space.of_base()],
         cost=plan.cost if params.objective == 'front' else lambda _: 0.0,
-        spread=spread,
+        parallel_map=parallel_map,
         tell=after_generation,
     )
     chosen = found.front if params.objective == 'front' else found.ranked[: params.finalists]
-    finalists = plan.judged_exactly(chosen)
-    return Optimised(finalists[0], finalists, found, memory)
+    finalists = plan.evaluated_exactly(chosen)
+    return SearchResult(finalists[0], finalists, found, score_cache)
 
 
 class _Plan(Generic[R]):
-    """Trials, costs and exact judgements of individuals."""
+    """Trials, costs and exact predictions of individuals."""
 
     def __init__(
-        self, space: RecipeSpace[R], division: Division, task: Task[R], features: FeatureCache, spread: Spread
+        self,
+        space: RecipeSpace[R],
+        search_slides: SearchSlides,
+        task: SearchTask[R],
+        features: FeatureCache,
+        parallel_map: ParallelMap,
     ) -> None:
-        self._space, self._division, self._task, self._features = space, division, task, features
-        self._spread = spread
+        self._space, self._split, self._task, self._features = space, search_slides, task, features
+        self._parallel_map = parallel_map
         self.cost = lru_cache(maxsize=None)(self._cost)
 
     @property
     def identity(self) -> dict[str, Any]:
         """What the scores of this search belong to."""
-        examples = self._division.examples(self._space.base.training_windows)
+        examples = self._split.examples(self._space.base.training_windows)
         recipe = json.dumps(self._space.base.as_mapping(), sort_keys=True)
         return {
             'recipe': _digest(recipe),
@@ -161,42 +166,42 @@ class _Plan(Generic[R]):
             'variables': {name: repr(axis) for name, axis in self._space.axes.items()},
             'slides': examples.digest,
             'surfaces': list(examples.names),
-            'halves': self._division.n_halves,
-            'seed': self._division.seed,
+            'halves': self._split.n_halves,
+            'seed': self._split.seed,
         }
 
-    def trials(self, individuals: Sequence[Individual], *, quick: bool = True) -> list[Trial]:
+    def fitness_functions(self, individuals: Sequence[Individual], *, quick: bool = True) -> list[FitnessFunction]:
         """Return the trials of individuals."""
         recipes = [self._space.recipe(individual) for individual in individuals]
-        described = self._features.many([self._task.described(recipe) for recipe in recipes], self._spread)
+        extracted = self._features.many([self._task.feature_set_of(recipe) for recipe in recipes], self._parallel_map)
         return [
-            self._trial(recipe, values[self._division.rows(recipe.training_windows)], quick)
-            for recipe, values in zip(recipes, described, strict=True)
+            self._fitness_function(recipe, values[self._split.rows(recipe.training_windows)], quick)
+            for recipe, values in zip(recipes, extracted, strict=True)
         ]
 
-    def judged_exactly(self, chosen: Sequence[Scored]) -> tuple[Finalist[R], ...]:
+    def evaluated_exactly(self, chosen: Sequence[ScoredIndividual]) -> tuple[Finalist[R], ...]:
         """Return the recipes with the scores of their learners on all halves, best first."""
-        trials = self.trials([one.individual for one in chosen], quick=False)
-        n_halves = self._division.n_halves
-        cases = [(trial, number) for trial in trials for number in range(n_halves)]
-        scores = self._spread(_one_half, cases)
+        fitness_functions = self.fitness_functions([one.individual for one in chosen], quick=False)
+        n_halves = self._split.n_halves
+        cases = [(fitness_function, number) for fitness_function in fitness_functions for number in range(n_halves)]
+        scores = self._parallel_map(_one_half, cases)
         finalists = []
         for place, one in enumerate(chosen):
             mine = scores[place * n_halves : (place + 1) * n_halves]
             recipe = self._space.recipe(one.individual)
-            finalists.append(Finalist(recipe, one, Record.of(mine)))
+            finalists.append(Finalist(recipe, one, HalfScores.of(mine)))
         return tuple(sorted(finalists, key=lambda finalist: -finalist.fitness))
 
-    def _trial(self, recipe: R, values: Array, quick: bool) -> Trial:
+    def _fitness_function(self, recipe: R, values: Array, quick: bool) -> FitnessFunction:
         windows = recipe.training_windows
-        examples, halves = self._division.examples(windows), self._division.halves(windows)
-        return self._task.trial(recipe, values, examples, halves, quick=quick)
+        examples, halves = self._split.examples(windows), self._split.halves(windows)
+        return self._task.fitness_function(recipe, values, examples, halves, quick=quick)
 
     def _cost(self, individual: Individual) -> float:
         recipe = self._space.recipe(individual)
-        examples = self._division.examples(recipe.training_windows)
+        examples = self._split.examples(recipe.training_windows)
         n_samples = sum(item.samples[0].size for item in examples.inputs.values())
-        n_values = self._features.values(self._task.described(recipe)).shape[1]
+        n_values = self._features.values(self._task.feature_set_of(recipe)).shape[1]
         return self._task.cost(recipe, n_samples, n_values, examples)
 
 
@@ -204,6 +209,6 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:8]
 
 
-def _one_half(case: tuple[Trial, int]) -> tuple[float, float]:
-    trial, number = case
-    return trial.start()(number)
+def _one_half(case: tuple[FitnessFunction, int]) -> tuple[float, float]:
+    fitness_function, number = case
+    return fitness_function.start()(number)

@@ -13,22 +13,22 @@ from texture_core.arrays import Array
 from texture_estimation.classification.evidence_rules import EvidenceRule
 from texture_estimation.learners.learner import Codes, Learner
 from texture_estimation.recipe import Recipe
-from texture_estimation.search.division import Division
+from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.fitness import UNDECIDED, decided_by_slide, decisions, fitness, shares_right
 from texture_estimation.search.genetic_search import Generation, SearchParams
 from texture_estimation.search.halves import Mask
-from texture_estimation.search.optimise import Optimised, optimise
+from texture_estimation.search.optimise import SearchResult, optimise
+from texture_estimation.search.parallel import ParallelMap, serial_map
+from texture_estimation.search.racing import HalfScores
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.spread import Spread, in_turn
-from texture_estimation.search.telling_apart import TellingApart
-from texture_estimation.search.trial import Record
+from texture_estimation.search.search_slides import SearchSlides
 
 Pair = tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
-class OptimisedPairs:
+class PairSearchResult:
     """What was found for each pair, and how all pairs do together.
 
     Parameters
@@ -39,8 +39,8 @@ class OptimisedPairs:
         Learning and test accuracy of the most pairs won, over all surfaces, on each half.
     """
 
-    by_pair: Mapping[Pair, Optimised[Recipe]]
-    record: Record
+    by_pair: Mapping[Pair, SearchResult[Recipe]]
+    record: HalfScores
 
     @property
     def fitness(self) -> float:
@@ -50,44 +50,44 @@ class OptimisedPairs:
 
 def optimise_pairs(
     space: RecipeSpace[Recipe],
-    division: Division,
+    search_slides: SearchSlides,
     params: SearchParams,
     *,
-    spread: Spread = in_turn,
+    parallel_map: ParallelMap = serial_map,
     checkpoint: str | Path | None = None,
     resume: str | Path | None = None,
     tell: Callable[[Pair, Generation], None] = lambda *_: None,
-) -> OptimisedPairs:
-    """Search for each pair of surfaces by itself, then judge all pairs together.
+) -> PairSearchResult:
+    """Search for each pair of surfaces by itself, then evaluate all pairs together.
 
     Arguments are those of `optimise`; each pair has its own checkpoint, named after it.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
     to each pair of textures.
     """
-    features = FeatureCache(division.cut)
-    names = division.examples(space.base.training_windows).names
+    features = FeatureCache(search_slides.cut)
+    names = search_slides.examples(space.base.training_windows).names
     found = {
         pair: optimise(
             space,
-            division.only(pair),
+            search_slides.only(pair),
             params,
-            TellingApart(),
+            ClassificationTask(),
             features=features,
-            spread=spread,
+            parallel_map=parallel_map,
             checkpoint=checkpoint and beside(checkpoint, pair),
             resume=_reached(resume, pair),
             tell=lambda generation, pair=pair: tell(pair, generation),  # type: ignore[misc]
         )
         for pair in combinations(names, 2)
     }
-    votes = [_votes_of(pair, result, division, features) for pair, result in found.items()]
-    scores = spread(_judged_together, [(votes, number) for number in range(division.n_halves)])
-    return OptimisedPairs(found, Record.of(scores))
+    votes = [_votes_of(pair, result, search_slides, features) for pair, result in found.items()]
+    scores = parallel_map(_evaluated_together, [(votes, number) for number in range(search_slides.n_halves)])
+    return PairSearchResult(found, HalfScores.of(scores))
 
 
 def beside(path: str | Path, pair: Pair) -> Path:
-    """Return the path with the pair's name in it: 'best.yaml' → 'best-cork-vs-felt.yaml'."""
+    """Return the path with the pair's name in it: 'best.yaml' → 'best-cork-vs-measured.yaml'."""
     path = Path(path)
     return path.with_name(f'{path.stem}-{pair[0]}-vs-{pair[1]}{path.suffix}')
 
@@ -113,38 +113,40 @@ class _PairVotes:
 
     def winners(self, number: int) -> tuple[Codes, Codes]:
         """Return the label that each slide is taken for, by number, or UNDECIDED, and the row of its first window."""
-        learnt = self.halves[number] & np.isin(self.codes, self.pair)
-        of_pair = (self.codes[learnt] == self.pair[1]).astype(np.intp)
-        fitted = self.learner.fit(self.values[learnt], of_pair, self.slides[learnt])
-        scores = self.learner.array_form(fitted.parts)(self.values)
+        training = self.halves[number] & np.isin(self.codes, self.pair)
+        of_pair = (self.codes[training] == self.pair[1]).astype(np.intp)
+        fitted = self.learner.fit(self.values[training], of_pair, self.slides[training])
+        scores = self.learner.predictor(fitted.parameters)(self.values)
         decided, first = decided_by_slide(scores, self.slides, self.rule, self.hop_share)
         return np.where(decided == UNDECIDED, UNDECIDED, np.array(self.pair)[decided]), first
 
 
-def _votes_of(pair: Pair, result: Optimised[Recipe], division: Division, features: FeatureCache) -> _PairVotes:
+def _votes_of(
+    pair: Pair, result: SearchResult[Recipe], search_slides: SearchSlides, features: FeatureCache
+) -> _PairVotes:
     recipe = result.best.recipe
     windows = recipe.training_windows
-    examples = division.examples(windows)
+    examples = search_slides.examples(windows)
     return _PairVotes(
         pair=(examples.names.index(pair[0]), examples.names.index(pair[1])),
         learner=recipe.learner,
         rule=recipe.evidence,
-        values=features.values(TellingApart().described(recipe)),
+        values=features.values(ClassificationTask().feature_set_of(recipe)),
         codes=examples.codes,
         slides=examples.slides,
-        halves=division.halves(windows),
+        halves=search_slides.halves(windows),
         hop_share=windows.hop_s / windows.length_s,
     )
 
 
-def _judged_together(case: tuple[list[_PairVotes], int]) -> tuple[float, float]:
+def _evaluated_together(case: tuple[list[_PairVotes], int]) -> tuple[float, float]:
     votes, number = case
     wins: Array | None = None
     for of_pair in votes:
         winners, first = of_pair.winners(number)
-        codes, learnt = of_pair.codes[first], of_pair.halves[number][first]
+        codes, training = of_pair.codes[first], of_pair.halves[number][first]
         wins = np.zeros((len(codes), int(codes.max()) + 1)) if wins is None else wins
         rows = np.flatnonzero(winners != UNDECIDED)
         wins[rows, winners[rows]] += 1.0
     assert wins is not None
-    return shares_right(decisions(wins), codes, learnt)
+    return shares_right(decisions(wins), codes, training)

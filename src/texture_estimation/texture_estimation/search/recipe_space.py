@@ -12,8 +12,8 @@ from texture_core.catalogue import find, unknown_name
 from texture_core.errors import InvalidParameter
 from texture_core.plain_data import load_yaml, safe_repr
 from texture_core.resources import find_file
-from texture_estimation.search.task import R
-from texture_estimation.search.variables import Choice, Individual, Integer, LogReal, SearchSpace, Value, Variable
+from texture_estimation.search.search_task import R
+from texture_estimation.search.variables import Categorical, Individual, Integer, LogReal, SearchSpace, Value, Variable
 
 MAX_INCLUDES = 10
 KEYS = ('description', 'include', 'variables')
@@ -114,7 +114,7 @@ class RecipeSpace(Generic[R]):
 
     def table(self) -> list[tuple[str, str, str]]:
         """Return name, kind and range of each variable, for people."""
-        return [(name, *_described(axis.variable)) for name, axis in self.axes.items()]
+        return [(name, *_extracted(axis.variable)) for name, axis in self.axes.items()]
 
     def _present(self, axis: Axis, content: Mapping[str, Any]) -> Value:
         variable = axis.variable
@@ -185,14 +185,14 @@ def _log(entry: Mapping[str, Any]) -> Axis:
 def _choice(entry: Mapping[str, Any]) -> Axis:
     options = entry['options']
     if not isinstance(options, Mapping):
-        return Axis(Choice(tuple(map(str, options))), _path(entry['set']))
+        return Axis(Categorical(tuple(map(str, options))), _path(entry['set']))
     edits = {str(option): tuple(_edit(step) for step in steps or ()) for option, steps in options.items()}
-    return Axis(Choice(tuple(edits)), edits=edits)
+    return Axis(Categorical(tuple(edits)), edits=edits)
 
 
 def _use(entry: Mapping[str, Any]) -> Axis:
     path = _path(entry['feature'])
-    return Axis(Choice(('no', 'yes')), edits={'no': (Edit('drop', path),), 'yes': (Edit('use', path),)})
+    return Axis(Categorical(('no', 'yes')), edits={'no': (Edit('drop', path),), 'yes': (Edit('use', path),)})
 
 
 def _edit(step: Mapping[str, Any]) -> Edit:
@@ -237,8 +237,8 @@ def _enter(place: Any, step: str, path: Sequence[str]) -> Any:
     return place[step]
 
 
-def _described(variable: Variable) -> tuple[str, str]:
-    if isinstance(variable, Choice):
+def _extracted(variable: Variable) -> tuple[str, str]:
+    if isinstance(variable, Categorical):
         return 'choice', ', '.join(variable.options)
     kind = 'whole number' if isinstance(variable, Integer) else 'logarithmic'
     return kind, f'{variable.value(0):g} to {variable.value(variable.count - 1):g}'

@@ -87,7 +87,7 @@ class LogReal:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Categorical:
     """One of some names."""
 
     options: tuple[str, ...]

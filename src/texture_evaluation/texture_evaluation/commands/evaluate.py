@@ -6,8 +6,8 @@ import argparse
 
 from texture_core.command_options import add_channels, add_seed, add_slides
 from texture_core.errors import ModelMismatch
-from texture_estimation.model import Model, load_model
-from texture_evaluation.evaluate import Report, evaluate
+from texture_estimation.model import TextureModel, load_model
+from texture_evaluation.evaluate import EvaluationReport, evaluate
 from texture_evaluation.train import FAST_TOPIC
 
 
@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def refuse_slow_channels(model: Model) -> None:
+def refuse_slow_channels(model: TextureModel) -> None:
     """Raise ModelMismatch if a model needs more than the vibration."""
     slow = [topic for topic in model.recipe.feature_set.topics if topic != FAST_TOPIC]
     if slow:
@@ -44,7 +44,7 @@ def refuse_slow_channels(model: Model) -> None:
         )
 
 
-def summary(report: Report) -> list[str]:
+def summary(report: EvaluationReport) -> list[str]:
     """Return the figures in lines for people."""
     figures = report.as_json()
     at = [

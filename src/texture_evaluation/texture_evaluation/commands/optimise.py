@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from texture_core.command_options import add_channels, add_seed, add_slides
 from texture_core.parameters import from_mapping
 from texture_estimation.search.genetic_search import OBJECTIVES, Generation, SearchParams
-from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags, over_machine
+from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags, parallel_map_for
 
 BAR = 20  # letters
 
@@ -29,8 +29,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--population', type=int, default=usual.population, metavar='N', help='of a generation')
     parser.add_argument('--generations', type=int, default=usual.generations, metavar='N', help='the first included')
-    parser.add_argument('--halves', type=int, default=usual.halves, metavar='N', help='random divisions judged on')
-    parser.add_argument('--all-halves', action='store_true', help='judge each individual on all, however bad it is')
+    parser.add_argument('--halves', type=int, default=usual.halves, metavar='N', help='random splits evaluated on')
+    parser.add_argument('--all-halves', action='store_true', help='evaluate each individual on all, however bad it is')
     parser.add_argument('--jobs', type=int, default=-1, metavar='N', help='cores to use; -1: all')
     parser.add_argument('--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead')
     parser.add_argument('--resume', action='store_true', help='go on from the checkpoint beside FILE')
@@ -58,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
             wanted,
             params,
             options.out,
-            over=over_machine(options.jobs, options.dask),
+            over=parallel_map_for(options.jobs, options.dask),
             resume=options.resume,
             tell=progress.tell,
         )
@@ -97,6 +97,6 @@ def bar(generation: Generation, taken_s: float, pair: str = '') -> str:
     done = BAR * generation.number // generation.of
     return (
         f'{pair}{": " if pair else ""}[{"#" * done}{"." * (BAR - done)}] {generation.number}/{generation.of}  '
-        f'best {100 * generation.best.fitness:.2f} %  {generation.judged} tried, {generation.remembered} remembered, '
-        f'{generation.halves} halves  {taken_s:.0f} s'
+        f'best {100 * generation.best.fitness:.2f} %  {generation.evaluated} tried, '
+        f'{generation.cache_hits} remembered, {generation.halves} halves  {taken_s:.0f} s'
     )

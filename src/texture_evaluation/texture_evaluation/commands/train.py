@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from texture_core.command_options import add_channels, add_seed, add_slides
-from texture_estimation.model import Model
+from texture_estimation.model import TextureModel
 from texture_estimation.roughness.model import RoughnessModel
 from texture_evaluation.train import train_from_bags
 from texture_evaluation.train_grades import train_grades_from_bags
@@ -31,7 +31,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Train, save, and say what was learnt."""
+    """Train, save, and say what was trained."""
     if options.grades:
         graded = train_grades_from_bags(options.recipe, options.bags, options.grades, options.slides, options.out)
         print('\n'.join(graded_summary(graded, Path(options.out))))
@@ -43,14 +43,14 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def summary(model: Model, out: Path) -> list[str]:
+def summary(model: TextureModel, out: Path) -> list[str]:
     """Return what a model knows and how well it did on what was held out, in lines."""
     training = model.training
     accuracy = training['held_out_window_accuracy']
     held_out = (
         'nothing could be held out' if accuracy is None else f'{100 * accuracy:.1f} % of the held-out windows right'
     )
-    kinds = len(model.explorations.felt) if model.explorations else 0
+    kinds = len(model.next_touch_model.gaussians) if model.next_touch_model else 0
     return [
         f"recipe '{model.recipe.name}' learnt {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',

@@ -18,7 +18,7 @@ from texture_exploration.hands.simulated import SimulatedHand
 
 HELD_SHARE = 0.8  # of the wanted force: a finger that presses with it holds the object
 LOST_SHARE = 0.5  # one that presses less has lost it
-LOOK_S = 0.01
+SAMPLE_PERIOD_S = 0.01
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class InHandArm:
         while weak := self._weak(HELD_SHARE):
             if time.monotonic() > end_s:
                 raise DeviceError(f'there is nothing to hold: {weak}; give the hand an object')
-            time.sleep(LOOK_S)
+            time.sleep(SAMPLE_PERIOD_S)
 
     def _weak(self, share: float) -> str:
         """Return which holding finger presses with less than a share of the wanted force, '' if none."""

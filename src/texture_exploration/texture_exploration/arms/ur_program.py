@@ -14,7 +14,7 @@ from texture_exploration.arms.ur_tables import (
     PROGRAM_STOPPED,
 )
 
-LOOK_S = 0.05
+SAMPLE_PERIOD_S = 0.05
 STOPPING_S = 2.0
 
 
@@ -43,7 +43,7 @@ def check_program(
                 f"another program is on the controller at {ip} ('{program}'), and connecting would stop it; stop it on "
                 "the pendant, or set parameter 'take_over' to true"
             )
-        time.sleep(LOOK_S)
+        time.sleep(SAMPLE_PERIOD_S)
     else:
         return
     _stop(ip, version, timeout_s)
@@ -75,4 +75,4 @@ def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:
             raise DeviceError(
                 f"the program on the controller at {ip} ('{program}') does not stop; stop it on the pendant"
             )
-        time.sleep(LOOK_S)
+        time.sleep(SAMPLE_PERIOD_S)

@@ -18,7 +18,7 @@ from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
 from texture_exploration.presets import load_preset
 
-LOOK_S = 0.1
+SAMPLE_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class ExplorePreset(Node):
         self._busy = False
         self._on_end = on_end
         self._client = self.create_client(srv.Explore, 'explore')
-        self._timer = self.create_timer(LOOK_S, self._request_next)
+        self._timer = self.create_timer(SAMPLE_PERIOD_S, self._request_next)
         self.get_logger().info(f"preset '{preset.name}': {self._total} explorations; {preset.paper}")
 
     def _request_next(self) -> None:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_features.feature import Windows, slopes
+from texture_features.feature import WindowBatch, first_difference
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,10 @@ class ArcLength:
     Source: Roberge et al., "Textures recognition through tactile exploration", eq. 2.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return Σ √(Δt² + Δs²)."""
-        lengths: Array = np.add.reduce(np.hypot(slopes(windows.rows), 1.0 / windows.rate_hz), axis=-1)
+        lengths: Array = np.add.reduce(np.hypot(first_difference(windows.rows), 1.0 / windows.rate_hz), axis=-1)
         return lengths[..., None]

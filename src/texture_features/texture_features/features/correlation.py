@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
-from texture_features.feature import Windows, centred, power
+from texture_features.feature import WindowBatch, centred, power
 
 TINY = 1e-150
 
@@ -27,11 +27,11 @@ class Correlation:
     Source: Kaboli et al. 2015, eq. 4 and 5.
     """
 
-    of_signal: ClassVar[bool] = False
+    per_channel: ClassVar[bool] = False
     names: ClassVar[tuple[str, ...]] = ('pearson', 'spearman')
     joins: ClassVar[bool] = True
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the two correlations, (..., 1, 2)."""
         inputs = (windows, *windows.joined)
         count = min(item.samples.shape[-2] for item in inputs)

@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows, power, slopes
+from texture_features.feature import WindowBatch, first_difference, power
 
 # Far below any deviation, far above the smallest number: 0 / 0 becomes 0.
 TINY = 1e-150
@@ -19,17 +19,19 @@ TINY = 1e-150
 class Hjorth:
     """Activity (power), mobility (mean frequency) and complexity (bandwidth) of each channel."""
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
-    log_activity: bool = param(True, 'Give the logarithm of the activity.')
-    floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
+    log_activity: bool = param(True, 'Return the logarithm of the activity instead of the activity itself.')
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
         """Activity, mobility, complexity."""
         return ('log_activity' if self.log_activity else 'activity', 'mobility', 'complexity')
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return activity, mobility and complexity."""
         values = hjorth(windows.centred_rows)
         if self.log_activity:
@@ -51,16 +53,16 @@ def hjorth(rows: Array) -> Array:
 
     Source: Hjorth 1970; Kaboli et al. 2015, eq. 1 to 3.
     """
-    slope = slopes(rows)
-    bend = slopes(slope)
+    slope = first_difference(rows)
+    second_difference = first_difference(slope)
     powers = np.empty((3, *rows.shape[:-1]))
     powers[0] = power(rows)
     powers[1] = power(slope)
-    powers[2] = power(bend)
+    powers[2] = power(second_difference)
     # The mean of the steps is known from the first and the last sample.
     drift = (rows[..., -1] - rows[..., 0]) / slope.shape[-1]
     powers[1] -= drift * drift
-    drift = (slope[..., -1] - slope[..., 0]) / bend.shape[-1]
+    drift = (slope[..., -1] - slope[..., 0]) / second_difference.shape[-1]
     powers[2] -= drift * drift
     roots = np.sqrt(np.maximum(powers, 0.0, out=powers))
     mobility = roots[1:] / (roots[:2] + TINY)

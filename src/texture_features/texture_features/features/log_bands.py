@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.spectra.spectrum import densities_of, mean_over_segments
 
 
@@ -18,11 +18,21 @@ from texture_features.spectra.spectrum import densities_of, mean_over_segments
 class LogBands:
     """Logarithm of the mean power spectral density in equal bands from 0 Hz to half the sampling rate (Welch)."""
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
-    bands: int = param(32, 'Number of bands; a segment is twice as many samples long.', low=2, high=512)
-    overlap: float = param(0.75, 'Share of a segment that the next one repeats.', low=0.0, high=0.9)
-    floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
+    bands: int = param(32, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
+    overlap: float = param(
+        0.75,
+        'Fraction of a segment that overlaps the next one; more gives smoother values and costs time.',
+        low=0.0,
+        high=0.9,
+    )
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -33,7 +43,7 @@ class LogBands:
     def _step(self) -> int:
         return max(1, round(2 * self.bands * (1.0 - self.overlap)))
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor)."""
         densities = densities_of(windows, 2 * self.bands, self._step, self.bands)
         return np.log(mean_over_segments(densities) + self.floor)

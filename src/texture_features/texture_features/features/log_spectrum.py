@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.spectra.spectrum import long_densities
 
 
@@ -23,16 +23,21 @@ class LogSpectrum:
     Source: Hu et al. 2014, section 4.1 (12 288 points there).
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
-    points: int = param(12288, 'Number of frequencies: k · rate / (2 · points), k from 1.', low=2, high=1 << 19)
-    floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
+    points: int = param(12288, 'Number of frequency bins: k · rate / (2 · points), k from 1.', low=2, high=1 << 19)
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
         """Number of the frequency, from 1."""
         return tuple(str(point + 1) for point in range(self.points))
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return log(density + floor)."""
         return np.log(long_densities(windows.rows, windows.rate_hz, self.points) + self.floor)

@@ -9,20 +9,23 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows, power
+from texture_features.feature import WindowBatch, power
 
 
 @dataclass(frozen=True)
 class LogVariance:
     """Logarithm of the variance of each channel."""
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
     floor: float = param(
-        1e-20, 'Power added before the logarithm, unit²; 1/12 for whole counts.', low=1e-300, high=1e300
+        1e-20,
+        'Power added before the logarithm, unit²; use 1/12 for signals quantised to integers.',
+        low=1e-300,
+        high=1e300,
     )
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return log(variance + floor)."""
         return np.log(power(windows.centred_rows) + self.floor)[..., None]

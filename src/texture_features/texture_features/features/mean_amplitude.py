@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 
 
 @dataclass(frozen=True)
@@ -19,13 +19,18 @@ class MeanAmplitude:
     Source: Jamali & Sammut 2010, section VI (the baseline there).
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    logarithm: bool = param(False, 'Give the logarithm.')
-    floor: float = param(1e-10, 'Amplitude added before the logarithm, unit.', low=1e-300, high=1e300)
+    logarithm: bool = param(False, 'Return the logarithm instead of the amplitude.')
+    floor: float = param(
+        1e-10,
+        'Amplitude added before the logarithm, so that silence gives a finite value, unit.',
+        low=1e-300,
+        high=1e300,
+    )
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return mean |s - mean(s)|, or its logarithm."""
         rows = np.abs(windows.centred_rows)
         amplitudes: Array = np.add.reduce(rows, axis=-1, keepdims=True) / rows.shape[-1]

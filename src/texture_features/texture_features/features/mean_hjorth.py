@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.features.hjorth import Hjorth
 
 
@@ -20,22 +20,24 @@ class MeanHjorth:
     Source: Kaboli et al. 2015, eq. 6 (the electrodes, with `log_activity` off).
     """
 
-    of_signal: ClassVar[bool] = False
+    per_channel: ClassVar[bool] = False
 
-    log_activity: bool = param(True, 'Take the logarithm of each activity.')
-    floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
+    log_activity: bool = param(True, 'Average the logarithm of the activity instead of the activity itself.')
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
         """Activity, mobility, complexity."""
-        return self._of_channel.names
+        return self._per_channel.names
 
     @property
-    def _of_channel(self) -> Hjorth:
+    def _per_channel(self) -> Hjorth:
         return Hjorth(self.log_activity, self.floor)
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the means."""
-        values = self._of_channel(windows)
+        values = self._per_channel(windows)
         means: Array = np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
         return means

@@ -8,17 +8,17 @@ from typing import ClassVar
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.features.spatial_bands import SpatialBands
 
 
 @dataclass(frozen=True)
 class MeanSpatialBands(SpatialBands):
-    """Mean over the channels of `spatial_bands`: the texture, not which taxel felt it. NaN if the speed is unknown."""
+    """Mean over the channels of `spatial_bands`, independent of the taxel. NaN if the speed is unknown."""
 
-    of_signal: ClassVar[bool] = False
+    per_channel: ClassVar[bool] = False
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the mean over the channels of the log bands."""
         bands = SpatialBands.__call__(self, windows)
         mean: Array = np.add.reduce(bands, axis=-2, keepdims=True) / bands.shape[-2]

@@ -1,4 +1,4 @@
-"""Size, lopsidedness and tails of the signal, of its slope and of its bend."""
+"""Log power, skewness and log kurtosis of the signal and of its first and second difference."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows, shares
-from texture_features.features.differences import differences, squares
+from texture_features.feature import WindowBatch, mean_weights
+from texture_features.features.differences import signal_differences, squares
 
 VALUES = ('log_power', 'log_amplitude', 'skewness', 'log_kurtosis')
 # Far below any power, far above the smallest number: nothing over nothing becomes 0 or 1.
@@ -25,19 +25,21 @@ class Moments:
     it hits rarely and hard or often and softly.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
-    floor: float = param(1e-10, 'Amplitude, squared for powers, added before a logarithm.', low=1e-140, high=1e100)
+    floor: float = param(
+        1e-10, 'Amplitude added before a logarithm; it is squared where a power is meant.', low=1e-140, high=1e100
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
         """Value of the signal, of its slope and of its bend."""
-        return tuple(f'{order}_{value}' for value in VALUES for order in ('signal', 'slope', 'bend'))
+        return tuple(f'{order}_{value}' for value in VALUES for order in ('signal', 'difference', 'second_difference'))
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the values; skewness and log kurtosis of a constant signal are 0."""
-        signals, powers = differences(windows), squares(windows)
-        mean = shares(signals.shape[-1])
+        signals, powers = signal_differences(windows), squares(windows)
+        mean = mean_weights(signals.shape[-1])
         square = powers @ mean
         values = (
             np.log(square + self.floor * self.floor),

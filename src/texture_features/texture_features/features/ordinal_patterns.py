@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 
 _PATTERNS = {length: tuple(permutations(range(length))) for length in range(2, 6)}
 
@@ -27,17 +27,17 @@ class OrdinalPatterns:
     Source: Bandt & Pompe 2002.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
-    length: int = param(4, 'Samples of a pattern; there are as many patterns as orders.', low=2, high=5)
-    delay: int = param(2, 'Distance of these samples.', low=1, high=10_000)
+    length: int = param(4, 'Number of samples in a pattern; there are factorial(length) patterns.', low=2, high=5)
+    delay: int = param(2, 'Distance between the samples of a pattern, in samples.', low=1, high=10_000)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Rank of each sample of the pattern from the lowest, 0: '012' rises."""
         return tuple(''.join(map(str, ranks)) for ranks in permutations(range(self.length)))
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the shares."""
         rows = windows.rows
         count = len(_PATTERNS[self.length])

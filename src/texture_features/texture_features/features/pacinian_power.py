@@ -9,10 +9,10 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
-from texture_features.spectra.line_spectrum import at_reference_speed, line_spectrum, without_force
+from texture_features.feature import WindowBatch
+from texture_features.spectra.welch_spectrum import at_reference_speed, force_normalised, welch_spectrum
 
-OCTAVES_A_DB = 0.1 / np.log10(2.0)  # of power
+OCTAVES_PER_DB = 0.1 / np.log10(2.0)  # of power
 
 
 @dataclass(frozen=True)
@@ -26,23 +26,46 @@ class PacinianPower:
     after Bolanowski et al. 1988. The straight lines are an approximation.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    points: int = param(128, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
-    best_hz: float = param(250.0, 'Frequency of the lowest threshold.', unit='Hz', low=1.0, high=10_000.0)
-    slope_below_db: float = param(12.0, 'Fall of the threshold below it, dB an octave.', low=0.0, high=100.0)
-    slope_above_db: float = param(12.0, 'Rise of the threshold above it, dB an octave.', low=0.0, high=100.0)
-    rate_of_change: bool = param(True, 'The signal is the rate of change of what touches.')
-    at_speed_m_s: float = param(0.0, 'Weigh as if felt at this speed; 0: as felt.', unit='m/s', low=0.0, high=10.0)
-    force_exponent: float = param(0.0, 'Divide the power by force to this exponent; 2/3: Hertz.', low=0.0, high=4.0)
-    floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
+    )
+    best_hz: float = param(
+        250.0, 'Frequency at which the detection threshold is lowest.', unit='Hz', low=1.0, high=10_000.0
+    )
+    slope_below_db: float = param(
+        12.0, 'Slope of the threshold below that frequency, dB per octave.', low=0.0, high=100.0
+    )
+    slope_above_db: float = param(
+        12.0, 'Slope of the threshold above that frequency, dB per octave.', low=0.0, high=100.0
+    )
+    rate_of_change: bool = param(
+        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
+    )
+    at_speed_m_s: float = param(
+        0.0,
+        'Reference speed to which frequencies are scaled before weighting; 0: no scaling.',
+        unit='m/s',
+        low=0.0,
+        high=10.0,
+    )
+    force_exponent: float = param(
+        0.0,
+        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
+        low=0.0,
+        high=4.0,
+    )
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the log power."""
-        densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
+        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         octaves = np.log2(at_reference_speed(hertz, windows, self.at_speed_m_s) / self.best_hz)
-        below, above = OCTAVES_A_DB * self.slope_below_db, OCTAVES_A_DB * self.slope_above_db
+        below, above = OCTAVES_PER_DB * self.slope_below_db, OCTAVES_PER_DB * self.slope_above_db
         weights = np.exp2(np.minimum(below * octaves, -above * octaves))  # 1 / threshold²
         power = np.add.reduce(densities * weights, axis=-1, keepdims=True) * hertz[0]
-        return without_force(np.log(power + self.floor), windows, self.force_exponent)
+        return force_normalised(np.log(power + self.floor), windows, self.force_exponent)

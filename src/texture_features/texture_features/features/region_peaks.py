@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.spectra.spectrum import amplitudes_of
 
 
@@ -24,25 +24,25 @@ class RegionPeaks:
     Source: Jamali & Sammut 2010, Algorithm 1.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
     peaks: int = param(3, 'Number of peaks; those that the spectrum lacks have frequency 0.', low=1, high=64)
-    regions: int = param(32, 'Number of equal parts of the spectrum.', low=2, high=4096)
+    regions: int = param(32, 'Number of equal regions into which the spectrum is divided.', low=2, high=4096)
     order: str = param(
         'intensity',
         "How the peaks are ranked: 'intensity' as found, by their strongest region; by 'frequency', the lowest first.",
         choices=('intensity', 'frequency'),
     )
-    heights: bool = param(False, 'Give the amplitude of that coefficient, too.')
-    points: int = param(2048, 'Samples of the transform; a shorter window is padded with zeros.', low=8, high=1 << 20)
+    heights: bool = param(False, 'Return the amplitude of each peak in addition to its frequency.')
+    points: int = param(2048, 'FFT length in samples; a shorter window is zero-padded.', low=8, high=1 << 20)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Frequency of each peak in turn, with its amplitude if that is wanted; peaks are numbered from 1."""
-        told = ('frequency_hz', 'amplitude') if self.heights else ('frequency_hz',)
-        return tuple(f'{number + 1}/{what}' for number in range(self.peaks) for what in told)
+        reported = ('frequency_hz', 'amplitude') if self.heights else ('frequency_hz',)
+        return tuple(f'{number + 1}/{what}' for number in range(self.peaks) for what in reported)
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the frequency of each peak, each followed by its amplitude if that is wanted."""
         amplitudes, step_hz = amplitudes_of(windows, self.points)
         bins = region_peaks(amplitudes, self.peaks, self.regions, by_frequency=self.order == 'frequency')

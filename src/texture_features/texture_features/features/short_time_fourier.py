@@ -10,7 +10,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.spectra.spectrum import densities_of
 
 
@@ -22,19 +22,29 @@ class ShortTimeFourier:
     neighbouring parts share one.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
-    parts: int = param(4, 'Number of parts of the window.', low=1, high=256)
-    bands: int = param(16, 'Number of bands; a segment is twice as many samples long.', low=2, high=512)
-    overlap: float = param(0.5, 'Share of a segment that the next one repeats.', low=0.0, high=0.9)
-    floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
+    parts: int = param(4, 'Number of equal time segments of the window.', low=1, high=256)
+    bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
+    overlap: float = param(
+        0.5,
+        'Fraction of a segment that overlaps the next one; more gives smoother values and costs time.',
+        low=0.0,
+        high=0.9,
+    )
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
         """Part and band, each from 1."""
         return tuple(f'{part + 1}/{band + 1}' for part in range(self.parts) for band in range(self.bands))
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density of each part + floor), part by part."""
         step = max(1, round(2 * self.bands * (1.0 - self.overlap)))
         densities = densities_of(windows, 2 * self.bands, step, self.bands)

@@ -10,8 +10,8 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
-from texture_features.feature import Windows
-from texture_features.spectra.spatial_spectrum import spatial_log_bands, without_level
+from texture_features.feature import WindowBatch
+from texture_features.spectra.spatial_spectrum import mean_subtracted, spatial_log_bands
 
 
 @dataclass(frozen=True)
@@ -19,17 +19,22 @@ class SpatialBands:
     """Logarithm of the mean density in bands of waves per metre, f / speed; longest waves first.
 
     Bands are equally wide in octaves, over the whole window: a grating of pitch λ stands in the band of 1/λ whatever
-    the speed. Choose waves that the sensor reaches at every speed v: none shorter than 2 v / rate. Which channel feels
-    what may betray how a surface was mounted; `mean_spatial_bands` does not know it. NaN if the speed is unknown or 0.
+    the speed. Choose waves that the sensor reaches at every speed v: none shorter than 2 v / rate. Which channel
+    measures what may betray how a surface was mounted; `mean_spatial_bands` does not know it. NaN if the speed is
+    unknown or 0.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
-    bands: int = param(32, 'Number of bands.', low=2, high=512)
-    longest_m: float = param(33e-3, 'Longest wave.', unit='m', low=1e-6, high=1e3)
-    shortest_m: float = param(0.67e-3, 'Shortest wave.', unit='m', low=1e-7, high=1e3)
-    normalised: bool = param(True, 'Take the mean over the bands away: the level changes with force and speed.')
-    floor: float = param(1e-7, 'Density added before the logarithm, unit² m.', low=1e-300, high=1e300)
+    bands: int = param(32, 'Number of spatial frequency bands.', low=2, high=512)
+    longest_m: float = param(
+        33e-3, 'Longest wavelength, the lower edge of the first band.', unit='m', low=1e-6, high=1e3
+    )
+    shortest_m: float = param(
+        0.67e-3, 'Shortest wavelength, the upper edge of the last band.', unit='m', low=1e-7, high=1e3
+    )
+    normalised: bool = param(True, 'Subtract the mean over the bands, which depends mainly on force and speed.')
+    floor: float = param(1e-7, 'Spatial power density added before the logarithm, unit² m.', low=1e-300, high=1e300)
 
     def __post_init__(self) -> None:
         if not self.shortest_m < self.longest_m:
@@ -48,7 +53,7 @@ class SpatialBands:
         edges = np.geomspace(1.0 / self.longest_m, 1.0 / self.shortest_m, self.bands + 1)
         return np.asarray(edges, dtype=np.float64)
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean density + floor) of each band."""
         bands = spatial_log_bands(windows, self.edges_per_m, self.floor)
-        return without_level(bands) if self.normalised else bands
+        return mean_subtracted(bands) if self.normalised else bands

@@ -1,4 +1,4 @@
-"""How much the surface, as felt, changes within a short way."""
+"""How much the surface, as measured, changes within a short way."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
-from texture_features.spectra.line_spectrum import line_spectrum, without_force
+from texture_features.feature import WindowBatch
+from texture_features.spectra.welch_spectrum import force_normalised, welch_spectrum
 
 
 @dataclass(frozen=True)
@@ -24,18 +24,35 @@ class SpatialVariation:
     Source: Lieber & Bensmaia 2019; Connor & Johnson 1992.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    lag_m: float = param(5e-4, 'Way between what is compared.', unit='m', low=1e-6, high=1.0)
-    points: int = param(128, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
-    rate_of_change: bool = param(True, 'The signal is the rate of change of what touches.')
-    force_exponent: float = param(0.0, 'Divide the power by force to this exponent; 2/3: Hertz.', low=0.0, high=4.0)
-    floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
+    lag_m: float = param(
+        5e-4,
+        'Distance on the surface between the two compared points; longer lags compare coarser texture.',
+        unit='m',
+        low=1e-6,
+        high=1.0,
+    )
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
+    )
+    rate_of_change: bool = param(
+        True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'
+    )
+    force_exponent: float = param(
+        0.0,
+        'Exponent of the force by which the power is divided; 2/3 for Hertzian contact, 0 for none.',
+        low=0.0,
+        high=4.0,
+    )
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the log mean square difference."""
-        densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
+        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
         phase = 2.0 * np.pi * hertz * (self.lag_m / windows.moving_m_s[..., None, None])
         power = 2.0 * np.add.reduce(densities * (1.0 - np.cos(phase)), axis=-1, keepdims=True) * hertz[0]
-        return without_force(np.log(power + self.floor), windows, self.force_exponent)
+        return force_normalised(np.log(power + self.floor), windows, self.force_exponent)

@@ -9,8 +9,8 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
-from texture_features.spectra.line_spectrum import at_reference_speed, line_spectrum
+from texture_features.feature import WindowBatch
+from texture_features.spectra.welch_spectrum import at_reference_speed, welch_spectrum
 
 TINY = 1e-300
 
@@ -25,23 +25,42 @@ class SpectralExponent:
     Source: Toscani & Metzger 2022.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    points: int = param(128, 'Samples of a segment; lines are rate / points apart.', low=4, high=16384)
-    low_hz: float = param(60.0, 'Lower end of the band.', unit='Hz', low=0.0, high=1e6)
-    high_hz: float = param(420.0, 'Upper end of the band.', unit='Hz', low=0.0, high=1e6)
-    rate_of_change: bool = param(False, 'The signal is the rate of change of what touches: adds 2 to the exponent.')
-    at_speed_m_s: float = param(
-        0.0, 'The band holds at this speed and moves with it; 0: it stands.', unit='m/s', low=0.0, high=10.0
+    points: int = param(
+        128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
     )
-    floor: float = param(1e-20, 'Density added before the logarithm, unit²/Hz.', low=1e-300, high=1e300)
+    low_hz: float = param(
+        60.0, 'Lower edge of the frequency band in which the exponent is fitted.', unit='Hz', low=0.0, high=1e6
+    )
+    high_hz: float = param(
+        420.0, 'Upper edge of the frequency band in which the exponent is fitted.', unit='Hz', low=0.0, high=1e6
+    )
+    rate_of_change: bool = param(
+        False, 'Whether the signal is the time derivative of the contact quantity; adds 2 to the exponent.'
+    )
+    at_speed_m_s: float = param(
+        0.0,
+        'Speed for which the band is given; it scales with the speed. 0: the band is fixed.',
+        unit='m/s',
+        low=0.0,
+        high=10.0,
+    )
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return s."""
-        densities, hertz = line_spectrum(windows, self.points, self.rate_of_change)
-        felt = at_reference_speed(hertz, windows, self.at_speed_m_s)
-        within = (felt >= self.low_hz) * (felt <= self.high_hz) + 0.0 * felt  # NaN where the speed is unknown
+        densities, hertz = welch_spectrum(windows, self.points, self.rate_of_change)
+        measured = at_reference_speed(hertz, windows, self.at_speed_m_s)
+        within = (measured >= self.low_hz) * (
+            measured <= self.high_hz
+        ) + 0.0 * measured  # NaN where the speed is unknown
         logs = np.log(hertz)
         middle = (within @ logs) / (np.add.reduce(within, axis=-1) + TINY)
         weights = within * (logs - middle[..., None])

@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.spectra.spectrum import amplitudes_of
 
 
@@ -23,21 +23,23 @@ class SpectralPeaks:
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.B.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
     peaks: int = param(
         5, 'Number of peaks; those that the spectrum lacks have frequency and amplitude 0.', low=1, high=64
     )
-    gap_hz: float = param(10.0, 'Least distance between two peaks.', unit='Hz', low=0.0, high=1e6)
-    order: str = param('intensity', 'How the peaks are ranked.', choices=('intensity', 'frequency'))
-    points: int = param(2048, 'Samples of the transform; a shorter window is padded with zeros.', low=8, high=1 << 20)
+    gap_hz: float = param(
+        10.0, 'Smallest distance between two peaks; a larger one suppresses side peaks.', unit='Hz', low=0.0, high=1e6
+    )
+    order: str = param('intensity', 'Order in which the peaks are returned.', choices=('intensity', 'frequency'))
+    points: int = param(2048, 'FFT length in samples; a shorter window is zero-padded.', low=8, high=1 << 20)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Frequency and amplitude of each peak."""
         return tuple(f'{number + 1}/{what}' for number in range(self.peaks) for what in ('frequency_hz', 'amplitude'))
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return frequency and amplitude of each peak in turn."""
         amplitudes, step_hz = amplitudes_of(windows, self.points)
         bins, heights = highest_peaks(amplitudes, self.peaks, self.gap_hz / step_hz)

@@ -8,16 +8,16 @@ from typing import ClassVar
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 
 
 @dataclass(frozen=True)
 class Speed:
     """Mean speed of the finger along the surface in the window, m/s; NaN if the exploration does not say."""
 
-    of_signal: ClassVar[bool] = False
+    per_channel: ClassVar[bool] = False
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return the speed."""
         return np.asarray(windows.speed_m_s, dtype=np.float64)[..., None, None]

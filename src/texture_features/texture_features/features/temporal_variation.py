@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 
 
 @dataclass(frozen=True)
@@ -22,13 +22,20 @@ class TemporalVariation:
     Source: Lieber & Bensmaia 2019; Lieber, Xia, Weber & Bensmaia 2017.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    lag_s: float = param(0.002, 'Time between what is compared; at least one sample.', unit='s', low=0.0, high=10.0)
-    floor: float = param(1e-20, 'Difference added before the logarithm, unit.', low=1e-300, high=1e300)
+    lag_s: float = param(
+        0.002, 'Time lag between the compared samples; at least one sample.', unit='s', low=0.0, high=10.0
+    )
+    floor: float = param(
+        1e-20,
+        'Difference added before the logarithm, so that silence gives a finite value, unit.',
+        low=1e-300,
+        high=1e300,
+    )
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return log(mean |s(t + lag) - s(t)|)."""
         rows = windows.rows
         lag = min(max(1, round(self.lag_s * windows.rate_hz)), rows.shape[-1] - 1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 
 # Scaling filter of Daubechies' wavelet with four vanishing moments: Daubechies 1992, table 6.1, to double precision.
 DB4 = np.array([
@@ -28,17 +28,19 @@ class WaveletEnergy:
     is repeated where their number is odd. Octaves that a window is too short for hold no power.
     """
 
-    of_signal: ClassVar[bool] = True
+    per_channel: ClassVar[bool] = True
 
-    octaves: int = param(6, 'Number of octaves.', low=1, high=20)
-    floor: float = param(1e-20, 'Power added before the logarithm, unit².', low=1e-300, high=1e300)
+    octaves: int = param(6, 'Number of octaves of the wavelet transform.', low=1, high=20)
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
 
     @property
     def names(self) -> tuple[str, ...]:
         """Number of the octave, from 1, and 'rest' for what lies below the last."""
         return (*(str(octave + 1) for octave in range(self.octaves)), 'rest')
 
-    def __call__(self, windows: Windows) -> Array:
+    def __call__(self, windows: WindowBatch) -> Array:
         """Return log(power + floor)."""
         rows = windows.centred_rows
         return np.log(wavelet_energies(rows, self.octaves) / rows.shape[-1] + self.floor)

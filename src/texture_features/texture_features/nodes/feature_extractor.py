@@ -1,4 +1,4 @@
-"""Node that cuts windows of sliding from the tactile streams and describes them."""
+"""Node that cuts windows of sliding from the tactile streams and extracts their features."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from texture_core.ros.parameters import declare
 from texture_core.ros.qos import FEATURE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_features.feature_set import FeatureSet
-from texture_features.windowing.windows import Piece, WindowCutter
+from texture_features.windowing.windows import WindowCutter, WindowEvent
 
-SILENCE_PERIOD_S = 0.1
+TIMEOUT_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
 class ExtractorParams:
-    """What the feature extractor makes of the streams."""
+    """Parameters of the feature extractor."""
 
     recipe: str = param('default', "Name of a shipped recipe, or path of a recipe (YAML) or of a model's card (JSON).")
 
@@ -38,7 +38,7 @@ class FeatureExtractor(Node):
         super().__init__('feature_extractor', **kwargs)
         self._feature_set = FeatureSet.load(declare(self, ExtractorParams).recipe)
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.topics)
-        self._broken = 0
+        self._invalid = 0
         self._reported = 0
         self._sent = 0
         self._frame_id = ''  # of the fingertip
@@ -46,7 +46,7 @@ class FeatureExtractor(Node):
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         for topic in self._feature_set.topics:
             self.create_subscription(msg.TactileSignal, topic, partial(self._on_signal, topic), SENSOR_QOS)
-        self.create_timer(SILENCE_PERIOD_S, self._on_silence_timer)
+        self.create_timer(TIMEOUT_PERIOD_S, self._on_timeout_timer)
         self._diagnostics = Diagnostics(self, self._report)
 
     def _on_signal(self, topic: str, message: msg.TactileSignal) -> None:
@@ -60,30 +60,30 @@ class FeatureExtractor(Node):
         try:
             add(from_msg(message))
         except TextureError as error:
-            self._broken += 1
+            self._invalid += 1
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
             return
         self._publish(self._cutter.take())
 
-    def _on_silence_timer(self) -> None:
-        self._publish(self._cutter.silence(time.monotonic()))
+    def _on_timeout_timer(self) -> None:
+        self._publish(self._cutter.time_out(time.monotonic()))
 
-    def _publish(self, pieces: list[Piece]) -> None:
-        for piece in pieces:
-            vector = to_msg(self._feature_set.describe(piece))
+    def _publish(self, events: list[WindowEvent]) -> None:
+        for event in events:
+            vector = to_msg(self._feature_set.extract(event))
             vector.sequence = self._sent
             vector.header.frame_id = self._frame_id
             self._publisher.publish(vector)
             self._sent += 1
 
     def _report(self) -> DiagnosticReport:
-        numbers = {**self._cutter.counts, 'broken_messages': self._broken}
+        numbers = {**self._cutter.counts, 'invalid_messages': self._invalid}
         waiting = self._cutter.waiting_for
         if waiting:
             return 'WARN', f'nothing has come yet on {", ".join(waiting)}', numbers
         faults = sum(numbers.values()) - numbers['windows']
         new, self._reported = faults - self._reported, faults
-        return ('WARN', 'samples or messages were lost', numbers) if new else ('OK', 'describing', numbers)
+        return ('WARN', 'samples or messages were lost', numbers) if new else ('OK', 'extracting', numbers)
 
 
 def main() -> None:

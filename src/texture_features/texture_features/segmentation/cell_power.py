@@ -34,16 +34,14 @@ def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = S
     lowest = np.where(known, fast, np.inf).min(axis=0)
     highest = np.where(known, fast, -np.inf).max(axis=0)
     at_end = ((fast <= lowest) | (fast >= highest))[: count * width].reshape(count, width, -1).all(axis=1)
-    power: Array = (
-        np.square(vibration_of(fast, rate_hz, smooth_s)[: count * width]).reshape(count, width, -1).mean(axis=1)
-    )
+    power: Array = np.square(highpass(fast, rate_hz, smooth_s)[: count * width]).reshape(count, width, -1).mean(axis=1)
     power[at_end] = np.nan
     return width / rate_hz, power
 
 
-def vibration_of(fast: Samples, rate_hz: float, smooth_s: float = SMOOTH_S) -> Samples:
+def highpass(fast: Samples, rate_hz: float, smooth_s: float = SMOOTH_S) -> Samples:
     """Return the samples without what changes over longer than `smooth_s`; 0 for what is not finite."""
-    vibration = centred(fast)
+    vibration = median_centred(fast)
     smoothed = _smoothed(rate_hz, smooth_s)
     if len(fast) > smoothed:
         vibration -= savgol_filter(vibration, smoothed, SMOOTH_ORDER, axis=0)
@@ -51,7 +49,7 @@ def vibration_of(fast: Samples, rate_hz: float, smooth_s: float = SMOOTH_S) -> S
     return vibration
 
 
-def rest_power(powers: Array) -> Array:
+def baseline_power(powers: Array) -> Array:
     """Return the power of each channel at rest, (n_channels,), above 0, from the quietest tenth of the recording."""
     known = np.isfinite(powers)
     share = uniform_filter1d(known.astype(float), SMOOTHED_CELLS, axis=0)
@@ -68,7 +66,7 @@ def _smoothed(rate_hz: float, smooth_s: float) -> int:
     return max(2 * round(0.5 * smooth_s * rate_hz) + 1, SMOOTH_ORDER + 2)
 
 
-def centred(fast: Samples) -> Samples:
+def median_centred(fast: Samples) -> Samples:
     """Return the samples about the median of each channel; 0 for what is not finite."""
     known = np.where(np.isfinite(fast), fast, np.nan)
     some = np.isfinite(known).any(axis=0)
@@ -77,15 +75,15 @@ def centred(fast: Samples) -> Samples:
     return about
 
 
-def passed_share(frequency_hz: AnyArray, rate_hz: float, smooth_s: float) -> Array:
+def highpass_gain(frequency_hz: AnyArray, rate_hz: float, smooth_s: float) -> Array:
     """Return the share of power at frequencies that is not taken for the smooth part."""
-    grid_hz, passed = _passed(rate_hz, smooth_s)
+    grid_hz, passed = _highpass_response(rate_hz, smooth_s)
     share: Array = np.interp(frequency_hz, grid_hz, passed)
     return share
 
 
 @lru_cache(maxsize=8)
-def _passed(rate_hz: float, smooth_s: float) -> tuple[Array, Array]:
+def _highpass_response(rate_hz: float, smooth_s: float) -> tuple[Array, Array]:
     """Return frequencies up to half the rate, and the share of power passed at each."""
     kernel = savgol_coeffs(_smoothed(rate_hz, smooth_s), SMOOTH_ORDER)
     turns = np.arange(len(kernel)) - len(kernel) // 2

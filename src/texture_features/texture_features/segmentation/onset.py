@@ -1,4 +1,4 @@
-"""When a finger sets off, told from how its spectrum moves up while it gains speed.
+"""Onset of motion from the shift of the spectrum while the finger accelerates.
 
 At half the speed all lines of a texture stand at half the frequency. So the spectrum at steady speed, squeezed by the
 speed of the moment, tells what each short window of the ramp should hold, and the most likely moment of setting off is
@@ -18,17 +18,21 @@ from scipy.ndimage import convolve1d
 from scipy.signal import welch
 
 from texture_core.arrays import AnyArray, Array, Samples
-from texture_features.segmentation.cell_power import TINY, centred, passed_share, vibration_of
+from texture_features.segmentation.cell_power import TINY, highpass, highpass_gain, median_centred
 
 # What a vibration channel senses, and the powers of the speed with which the amplitude of one and the same wave of a
 # texture then grows: films that hold their charge and hydrophones feel the force, differentiating channels its change.
 # A change grows as the speed, and where waves rise towards the corner of a high-pass, faster.
-SENSES: Mapping[str, tuple[float, ...]] = {'force': (0.0,), 'change': (1.0, 1.5), 'either': (0.0, 0.5, 1.0, 1.5)}
+MEASURED_QUANTITIES: Mapping[str, tuple[float, ...]] = {
+    'force': (0.0,),
+    'change': (1.0, 1.5),
+    'either': (0.0, 0.5, 1.0, 1.5),
+}
 WINDOW_S, STEADY_WINDOW_S = 0.05, 0.25
 MIN_STEADY = 8  # samples, for a spectrum
-HOPS_A_WINDOW, ONSETS_A_HOP = 5, 4
+HOPS_PER_WINDOW, ONSETS_PER_HOP = 5, 4
 # Windows that overlap tell much of the same: a Hann window weighs as much as two thirds of its length.
-NEW_IN_WINDOW = 1.5 / HOPS_A_WINDOW
+NEW_IN_WINDOW = 1.5 / HOPS_PER_WINDOW
 SHARES = np.linspace(0.0, 1.0, 41)  # of the steady speed
 # Multiples of the band at which the spectrum above it is looked at.
 ABOVE = np.geomspace(1.2, 1000.0, 12)
@@ -57,8 +61,8 @@ class OnsetModel:
         Power of each channel at rest.
     ramp_s
         Time in which the speed grows, in proportion to time.
-    senses
-        One of `SENSES`.
+    quantity
+        One of `MEASURED_QUANTITIES`.
     smooth_s
         What changes over longer is no vibration.
     """
@@ -66,7 +70,7 @@ class OnsetModel:
     rate_hz: float
     rest: Array
     ramp_s: float
-    senses: str
+    quantity: str
     smooth_s: float
 
     def find(self, around: Samples, known: NDArray[np.bool_], steady: Samples, between_s: tuple[float, float]) -> float:
@@ -86,17 +90,17 @@ class OnsetModel:
         between_s
             Range in which the onset is sought; it may begin before the first sample.
         """
-        length = HOPS_A_WINDOW * max(1, round(WINDOW_S * self.rate_hz / HOPS_A_WINDOW))
-        hop = length // HOPS_A_WINDOW
-        step_s = hop / ONSETS_A_HOP / self.rate_hz
+        length = HOPS_PER_WINDOW * max(1, round(WINDOW_S * self.rate_hz / HOPS_PER_WINDOW))
+        hop = length // HOPS_PER_WINDOW
+        step_s = hop / ONSETS_PER_HOP / self.rate_hz
         onsets = np.arange(round(between_s[0] / step_s), round(between_s[1] / step_s) + 1)  # in steps
         starts = np.flatnonzero(_whole(known, length)[::hop])  # in hops
         if not len(starts) or len(steady) < MIN_STEADY:
             return float(onsets.mean()) * step_s
-        vibration = vibration_of(around, self.rate_hz, self.smooth_s) / np.sqrt(self.rest)
+        vibration = highpass(around, self.rate_hz, self.smooth_s) / np.sqrt(self.rest)
         powers = _spectra(vibration[(starts * hop)[:, None] + np.arange(length)])
         fit = _fit(powers, self._expected(steady, length, self.ramp_s / step_s))  # (n_ways, n_windows, n_ages)
-        ages = np.clip((starts + HOPS_A_WINDOW) * ONSETS_A_HOP - onsets[:, None], 0, fit.shape[2] - 1)
+        ages = np.clip((starts + HOPS_PER_WINDOW) * ONSETS_PER_HOP - onsets[:, None], 0, fit.shape[2] - 1)
         total = NEW_IN_WINDOW * fit[:, np.arange(len(starts)), ages].sum(axis=-1)  # (n_ways, n_onsets)
         likely = np.exp(total - total.max()).sum(axis=0)
         return float(likely @ onsets / likely.sum()) * step_s
@@ -108,21 +112,23 @@ class OnsetModel:
         `length` is that of a window, in samples, `ramp` that of the ramp, in steps.
         """
         steady_length = min(len(steady), round(STEADY_WINDOW_S * self.rate_hz))
-        frequency_hz, density = welch(centred(steady), self.rate_hz, nperseg=steady_length, detrend='linear', axis=0)
-        passed = passed_share(frequency_hz, self.rate_hz, self.smooth_s)
+        frequency_hz, density = welch(
+            median_centred(steady), self.rate_hz, nperseg=steady_length, detrend='linear', axis=0
+        )
+        passed = highpass_gain(frequency_hz, self.rate_hz, self.smooth_s)
         noise = 1.0 / max(float(passed.mean()) * self.rate_hz / 2, TINY)  # white: its density
         texture = np.maximum(density / self.rest - noise, 0.0).mean(axis=1)
         bins_hz = np.fft.rfftfreq(length, 1.0 / self.rate_hz)
         squeezed = self._squeezed(frequency_hz, texture, bins_hz)
-        window = HOPS_A_WINDOW * ONSETS_A_HOP
+        window = HOPS_PER_WINDOW * ONSETS_PER_HOP
         ages = np.arange(window + math.ceil(ramp) + 1)
         shares = np.clip((ages[:, None] - window * (1.0 - POINTS)) / max(ramp, TINY), 0.0, 1.0)
         at = np.rint(shares * (len(SHARES) - 1)).astype(int)
-        sensed = SHARES ** (2.0 * np.array(SENSES[self.senses])[:, None])
+        sensed = SHARES ** (2.0 * np.array(MEASURED_QUANTITIES[self.quantity])[:, None])
         ways = (sensed[:, None, :, None] * squeezed).reshape(-1, len(SHARES), len(bins_hz))
-        felt = np.einsum('wapf,p->waf', ways[:, at], POINT_WEIGHTS)
-        rest = noise * passed_share(bins_hz, self.rate_hz, self.smooth_s)
-        expected: Array = np.maximum(self.rate_hz / 2 * (rest + felt), MIN_POWER)
+        measured = np.einsum('wapf,p->waf', ways[:, at], POINT_WEIGHTS)
+        rest = noise * highpass_gain(bins_hz, self.rate_hz, self.smooth_s)
+        expected: Array = np.maximum(self.rate_hz / 2 * (rest + measured), MIN_POWER)
         return expected
 
     def _squeezed(self, frequency_hz: Array, texture: Array, bins_hz: AnyArray) -> Array:
@@ -137,9 +143,9 @@ class OnsetModel:
         bands_hz = np.clip((np.arange(bands + 1) - 0.5) * bins_hz[1] / QUARTERS, 0.0, half_hz)
         edge = float(texture[len(texture) // 2 : 3 * len(texture) // 4 + 1].mean())
         above = edge * half_hz * (1.0 - 1.0 / ABOVE)
-        squeezed = np.zeros((2, len(SHARES), bands))  # what does not move is not felt
+        squeezed = np.zeros((2, len(SHARES), bands))  # what does not move is not measured
         for i, share in enumerate(SHARES[1:], start=1):
-            passed = texture * passed_share(share * frequency_hz, self.rate_hz, self.smooth_s)
+            passed = texture * highpass_gain(share * frequency_hz, self.rate_hz, self.smooth_s)
             below = np.concatenate([[0.0], np.cumsum(passed * np.diff(lines_hz))])
             squeezed[0, i] = np.diff(np.interp(bands_hz, share * lines_hz, below))
             far_hz, all_below = np.append(lines_hz, half_hz * ABOVE), np.append(below, below[-1] + above)

@@ -1,4 +1,4 @@
-"""When a finger slides, told from what it feels alone: no force sensor, no word from the robot.
+"""Segmentation of sliding from tactile signals alone, without force sensor or robot state.
 
 A finger at rest gives the sensor's noise; a sliding one gives vibration that grows with its speed. So sliding is where
 the power stays above that of rest, and its steady part begins one ramp after the power began to grow as it does while a
@@ -19,11 +19,11 @@ from scipy.ndimage import percentile_filter, uniform_filter1d
 from texture_core.arrays import Array, Samples
 from texture_core.errors import InvalidData
 from texture_core.parameters import param
-from texture_features.segmentation.cell_power import SMOOTH_S, SMOOTHED_CELLS, TINY, cell_power, rest_power
-from texture_features.segmentation.contact_load import Touch, find_touches
-from texture_features.segmentation.onset import SENSES, OnsetModel
+from texture_features.segmentation.cell_power import SMOOTH_S, SMOOTHED_CELLS, TINY, baseline_power, cell_power
+from texture_features.segmentation.contact_intervals import ContactInterval, find_contacts
+from texture_features.segmentation.onset import MEASURED_QUANTITIES, OnsetModel
 
-# Rest and sliding are told apart over 50 ms. A touch or a knock lasts a part of that, sliding most.
+# Rest and sliding are distinguished over 50 ms. A touch or a knock lasts a part of that, sliding most.
 SMOOTHED_PERCENTILE = 70
 KNOCK_S = 0.08
 # In a contact, its knocks left out, less is enough for longer: the mean of 0.25 s of rest scatters by some percent.
@@ -32,44 +32,56 @@ LONG_S, LONG_ON, LONG_OFF = 0.25, 3.0, 1.5
 NEAR_S = 0.18
 # Levels of the vibration channels themselves, where no others tell the load.
 LEVEL_S = 0.01
-UNTOUCHED = Touch(-math.inf, -math.inf, math.inf, math.inf)
+NO_CONTACT = ContactInterval(-math.inf, -math.inf, math.inf, math.inf)
 
 
 @dataclass(frozen=True)
-class SegmentParams:
+class SegmentationParams:
     """How sliding is found. None of it is fitted to recordings: the power of 50 ms of rest scatters by a fifth."""
 
-    cell_s: float = param(0.005, 'Time over which power is taken.', unit='s', low=0.001, high=0.1)
-    on: float = param(6.0, 'Power, in that of rest, above which sliding is certain.', low=1.0, high=1e6)
-    off: float = param(3.0, 'Power, in that of rest, down to which it then goes on.', low=1.0, high=1e6)
-    bridge_s: float = param(0.2, 'A quieter part of a slide is at most so long.', unit='s', low=0.0, high=10.0)
-    least_s: float = param(0.15, 'A slide is at least so long.', unit='s', low=0.0, high=60.0)
+    cell_s: float = param(
+        0.005, 'Length of the frames in which the signal power is computed.', unit='s', low=0.001, high=0.1
+    )
+    on: float = param(
+        6.0, 'Start threshold: power over baseline power above which sliding is detected.', low=1.0, high=1e6
+    )
+    off: float = param(
+        3.0, 'Stop threshold: power over baseline power below which sliding ends (hysteresis).', low=1.0, high=1e6
+    )
+    max_gap_s: float = param(
+        0.2, 'Longest gap below the stop threshold that is still part of one slide.', unit='s', low=0.0, high=10.0
+    )
+    min_duration_s: float = param(
+        0.15, 'Shortest slide that is reported; shorter ones are discarded.', unit='s', low=0.0, high=60.0
+    )
     ramp_s: float = param(
-        0.2, 'Time in which the robot gains its speed, and loses it, from its plan.', unit='s', low=0.0, high=10.0
+        0.2, 'Acceleration and deceleration time of the robot, from its motion plan.', unit='s', low=0.0, high=10.0
     )
     press_s: float = param(
-        0.1, 'Time in which the robot presses on, and lets go, from its plan.', unit='s', low=0.0, high=10.0
+        0.1, 'Time the robot takes to press and to release, from its motion plan.', unit='s', low=0.0, high=10.0
     )
-    senses: str = param(
-        'either', "What the vibration channels feel: the force, its change, or 'either'.", choices=tuple(SENSES)
+    quantity: str = param(
+        'either',
+        "Quantity that the vibration channels measure: 'force', its 'change', or 'either' if unknown.",
+        choices=tuple(MEASURED_QUANTITIES),
     )
     smooth_s: float = param(
         SMOOTH_S,
-        'What changes over longer than this is load, not vibration; more for slow slides.',
+        'Time constant of the high-pass filter that removes the load; longer for slow slides.',
         unit='s',
         low=0.01,
         high=1.0,
     )
-    rest_rms: float = param(
-        0.0, "The sensor's noise at rest, in its unit; 0: that of the quietest tenth of the recording.", low=0.0
+    noise_rms: float = param(
+        0.0, 'Baseline noise of the sensor, rms; 0: estimated from the quietest tenth of the recording.', low=0.0
     )
 
 
 @dataclass(frozen=True)
-class Sliding:
+class SlidingInterval:
     """One stretch of sliding, s from the first sample: when the finger sets off, and where its speed is steady."""
 
-    moving_s: float
+    motion_start_s: float
     start_s: float
     end_s: float
 
@@ -77,13 +89,13 @@ class Sliding:
 def find_sliding(
     fast: Samples,
     rate_hz: float,
-    params: SegmentParams,
+    params: SegmentationParams,
     *,
     slow: Samples | None = None,
     slow_rate_hz: float = math.nan,
     slow_from_s: float = 0.0,
     rest: Array | None = None,
-) -> list[Sliding]:
+) -> list[SlidingInterval]:
     """Return the stretches of sliding in a recording that holds some rest, in order.
 
     A surface that makes no more vibration than the sensor has noise is not found to slide.
@@ -99,7 +111,7 @@ def find_sliding(
     slow_rate_hz, slow_from_s
         Its sampling rate, and when its first sample was taken after the first of `fast`.
     rest : (n_channels,), optional
-        Power of each channel at rest, if it is known; see `rest_power`.
+        Power of each channel at rest, if it is known; see `baseline_power`.
 
     Raises
     ------
@@ -115,31 +127,31 @@ def find_sliding(
     if len(powers) < SMOOTHED_CELLS:
         return []
     if rest is None:
-        rest = rest_power(powers)
-    if params.rest_rms:
-        rest = np.full(fast.shape[1], params.rest_rms**2)
+        rest = baseline_power(powers)
+    if params.noise_rms:
+        rest = np.full(fast.shape[1], params.noise_rms**2)
     power = _mean(powers / rest)
     if slow is None:
-        slow, slow_rate_hz, slow_from_s = levels_of(fast, rate_hz)
-    touches = _touches(slow, slow_rate_hz, slow_from_s, power, cell_s)
-    known = np.where(_unchanged(len(power), cell_s, touches, params), power, np.nan)
-    model = OnsetModel(rate_hz, rest, params.ramp_s, params.senses, params.smooth_s)
+        slow, slow_rate_hz, slow_from_s = channel_means(fast, rate_hz)
+    contacts = _find_contacts(slow, slow_rate_hz, slow_from_s, power, cell_s)
+    known = np.where(_unchanged(len(power), cell_s, contacts, params), power, np.nan)
+    model = OnsetModel(rate_hz, rest, params.ramp_s, params.quantity, params.smooth_s)
     found = []
-    for run in active_runs(known, cell_s, touches, params):
-        touch, steady = _steady(run, touches, cell_s)
+    for run in active_runs(known, cell_s, contacts, params):
+        contact, steady = _steady(run, contacts, cell_s)
         vibration = _Vibration(fast, round(cell_s * rate_hz), np.isfinite(known), steady, model)
-        found.append(_refined(vibration, cell_s, run, touch, params))
-    return [sliding for sliding in _joined(found) if sliding.end_s - sliding.start_s >= params.least_s]
+        found.append(_refined(vibration, cell_s, run, contact, params))
+    return [interval for interval in _joined(found) if interval.end_s - interval.start_s >= params.min_duration_s]
 
 
-def _joined(found: Sequence[Sliding]) -> list[Sliding]:
+def _joined(found: Sequence[SlidingInterval]) -> list[SlidingInterval]:
     """Return the stretches with those as one that overlap."""
-    apart: list[Sliding] = []
-    for sliding in found:
-        if apart and sliding.start_s <= apart[-1].end_s:
-            apart[-1] = replace(apart[-1], end_s=max(apart[-1].end_s, sliding.end_s))
+    apart: list[SlidingInterval] = []
+    for interval in found:
+        if apart and interval.start_s <= apart[-1].end_s:
+            apart[-1] = replace(apart[-1], end_s=max(apart[-1].end_s, interval.end_s))
         else:
-            apart.append(sliding)
+            apart.append(interval)
     return apart
 
 
@@ -150,7 +162,7 @@ def _mean(ratios: Array) -> Array:
     return np.where(known.any(axis=1), means, 1.0)
 
 
-def levels_of(fast: Samples, rate_hz: float) -> tuple[Samples, float, float]:
+def channel_means(fast: Samples, rate_hz: float) -> tuple[Samples, float, float]:
     """Return the means of 10 ms of vibration channels, their rate, and the time of the first."""
     width = max(1, round(LEVEL_S * rate_hz))
     count = len(fast) // width
@@ -160,7 +172,9 @@ def levels_of(fast: Samples, rate_hz: float) -> tuple[Samples, float, float]:
     return means, rate_hz / width, 0.5 * (width - 1) / rate_hz
 
 
-def active_runs(power: Array, cell_s: float, touches: Sequence[Touch], params: SegmentParams) -> list[tuple[int, int]]:
+def active_runs(
+    power: Array, cell_s: float, contacts: Sequence[ContactInterval], params: SegmentationParams
+) -> list[tuple[int, int]]:
     """Return the stretches of cells, first and one past the last, in which the power stays above that of rest, 1.
 
     NaN for a cell in which a changing load knocks.
@@ -171,7 +185,7 @@ def active_runs(power: Array, cell_s: float, touches: Sequence[Touch], params: S
     width = max(1, round(LONG_S / cell_s))
     share = uniform_filter1d(known.astype(float), width, mode='constant')
     longer = uniform_filter1d(filled, width, mode='constant') / np.maximum(share, 0.5 / width)
-    touched = _touched(len(power), cell_s, touches)
+    touched = _in_contact(len(power), cell_s, contacts)
     active = (smooth > params.off) | (touched & (longer > LONG_OFF))
     certain = (smooth > params.on) | (touched & (longer > LONG_ON))
     edges = np.flatnonzero(np.diff(np.concatenate(([0], active, [0]))))
@@ -179,48 +193,52 @@ def active_runs(power: Array, cell_s: float, touches: Sequence[Touch], params: S
     for first, last in edges.reshape(-1, 2).tolist():
         if (last - first) * cell_s < KNOCK_S or not certain[first:last].any():
             continue
-        if runs and (first - runs[-1][1]) * cell_s <= params.bridge_s:
+        if runs and (first - runs[-1][1]) * cell_s <= params.max_gap_s:
             runs[-1] = (runs[-1][0], last)
         else:
             runs.append((first, last))
-    return [run for run in runs if (run[1] - run[0]) * cell_s >= params.least_s]
+    return [run for run in runs if (run[1] - run[0]) * cell_s >= params.min_duration_s]
 
 
-def _touches(slow: Samples, rate_hz: float, from_s: float, power: Array, cell_s: float) -> list[Touch]:
+def _find_contacts(slow: Samples, rate_hz: float, from_s: float, power: Array, cell_s: float) -> list[ContactInterval]:
     """Return the contacts, in the time of the vibration."""
     smooth = uniform_filter1d(np.log(power + TINY**0.1), SMOOTHED_CELLS)
     vibration = np.interp(from_s + np.arange(len(slow)) / rate_hz, (np.arange(len(power)) + 0.5) * cell_s, smooth)
-    return [touch.later(from_s) for touch in find_touches(slow, rate_hz, vibration)]
+    return [contact.shifted(from_s) for contact in find_contacts(slow, rate_hz, vibration)]
 
 
-def _touched(count: int, cell_s: float, touches: Sequence[Touch]) -> NDArray[np.bool_]:
+def _in_contact(count: int, cell_s: float, contacts: Sequence[ContactInterval]) -> NDArray[np.bool_]:
     """Return which of `count` cells lie in a contact."""
     middle = (np.arange(count) + 0.5) * cell_s
-    inside = [(middle > touch.begins_s) & (middle < touch.ends_s) for touch in touches]
+    inside = [(middle > contact.press_start_s) & (middle < contact.release_end_s) for contact in contacts]
     return np.any(inside, axis=0) if inside else np.zeros(count, dtype=bool)
 
 
-def _unchanged(count: int, cell_s: float, touches: Sequence[Touch], params: SegmentParams) -> NDArray[np.bool_]:
+def _unchanged(
+    count: int, cell_s: float, contacts: Sequence[ContactInterval], params: SegmentationParams
+) -> NDArray[np.bool_]:
     """Return which of `count` cells hold no knock of a changing load."""
     middle = (np.arange(count) + 0.5) * cell_s
     sure = np.ones(count, dtype=bool)
-    for touch in touches:
-        pressed_s = max(touch.pressed_s, touch.begins_s + params.press_s)
-        free_s = max(touch.ends_s, touch.falls_s + params.press_s)
-        for first_s, last_s in ((touch.begins_s, pressed_s), (touch.falls_s, free_s)):
+    for contact in contacts:
+        press_end_s = max(contact.press_end_s, contact.press_start_s + params.press_s)
+        free_s = max(contact.release_end_s, contact.release_start_s + params.press_s)
+        for first_s, last_s in ((contact.press_start_s, press_end_s), (contact.release_start_s, free_s)):
             sure &= (middle < first_s - 0.5 * params.smooth_s) | (middle > last_s + params.smooth_s)
     return sure
 
 
-def _steady(run: tuple[int, int], touches: Sequence[Touch], cell_s: float) -> tuple[Touch, slice]:
+def _steady(run: tuple[int, int], contacts: Sequence[ContactInterval], cell_s: float) -> tuple[ContactInterval, slice]:
     """Return the contact in which the cells of a run lie, and the middle half of what they share with it."""
     first, last = run
     middle_s = 0.5 * (first + last) * cell_s
-    touch = next((touch for touch in touches if touch.pressed_s <= middle_s <= touch.falls_s), UNTOUCHED)
-    begin = max(first, math.floor(max(touch.pressed_s, 0.0) / cell_s))
-    end = min(last, math.ceil(min(touch.falls_s, last * cell_s) / cell_s))
+    contact = next(
+        (contact for contact in contacts if contact.press_end_s <= middle_s <= contact.release_start_s), NO_CONTACT
+    )
+    begin = max(first, math.floor(max(contact.press_end_s, 0.0) / cell_s))
+    end = min(last, math.ceil(min(contact.release_start_s, last * cell_s) / cell_s))
     quarter = (end - begin) // 4
-    return touch, slice(begin + quarter, end - quarter)
+    return contact, slice(begin + quarter, end - quarter)
 
 
 @dataclass(frozen=True)
@@ -259,19 +277,19 @@ class _Vibration:
 
 
 def _refined(
-    vibration: _Vibration, cell_s: float, run: tuple[int, int], touch: Touch, params: SegmentParams
-) -> Sliding:
+    vibration: _Vibration, cell_s: float, run: tuple[int, int], contact: ContactInterval, params: SegmentationParams
+) -> SlidingInterval:
     """Return the sliding whose power stands out in the cells of `run`."""
     first, last = run
     known = vibration.known
     # A run may begin in the knock of the touch, of which nothing is known: it is seen first after that.
-    pressed = max(first, math.floor(max(touch.pressed_s, 0.0) / cell_s))
-    moving_s = vibration.onset_s(pressed + int(known[pressed:].argmax()))
-    start_s = max(moving_s + params.ramp_s, touch.pressed_s, 0.0)
-    if touch.falls_s < last * cell_s + params.ramp_s + params.bridge_s:
-        end_s = touch.falls_s
+    pressed = max(first, math.floor(max(contact.press_end_s, 0.0) / cell_s))
+    motion_start_s = vibration.onset_s(pressed + int(known[pressed:].argmax()))
+    start_s = max(motion_start_s + params.ramp_s, contact.press_end_s, 0.0)
+    if contact.release_start_s < last * cell_s + params.ramp_s + params.max_gap_s:
+        end_s = contact.release_start_s
     elif last >= len(known):
         end_s = len(known) * cell_s
     else:
         end_s = len(known) * cell_s - vibration.reversed().onset_s(len(known) - last) - params.ramp_s
-    return Sliding(moving_s, start_s, end_s)
+    return SlidingInterval(motion_start_s, start_s, end_s)

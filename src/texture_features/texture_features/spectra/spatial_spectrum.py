@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_features.feature import Windows
+from texture_features.feature import WindowBatch
 from texture_features.spectra.spectrum import hann
 
 PADDING = 4  # lines stand so much closer than the window alone resolves, and bands may be narrower than a line
 
 
-def spatial_log_bands(windows: Windows, edges_per_m: Array, floor: float) -> Array:
+def spatial_log_bands(windows: WindowBatch, edges_per_m: Array, floor: float) -> Array:
     """Return log(mean density + floor) between edges of spatial frequency.
 
     The whole window is tapered and transformed at once: for its few waves there is nothing to average. A band beyond
@@ -45,7 +45,7 @@ def spatial_log_bands(windows: Windows, edges_per_m: Array, floor: float) -> Arr
     return np.where(moving[..., None, None], logarithm, np.nan)
 
 
-def without_level(log_bands: Array) -> Array:
+def mean_subtracted(log_bands: Array) -> Array:
     """Return log bands less their mean over the bands: how hard and how fast the finger presses is mostly level."""
     shape: Array = log_bands - np.add.reduce(log_bands, axis=-1, keepdims=True) / log_bands.shape[-1]
     return shape

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_features.feature import Windows, shares
+from texture_features.feature import WindowBatch, mean_weights
 
 
 def segment_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
@@ -42,7 +42,7 @@ def segment_densities(rows: Array, rate_hz: float, segment: int, step: int, bins
 def mean_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
     """Return the mean of `segment_densities` over the segments, (..., bins); it costs less than all of them."""
     squares = _squares(rows, rate_hz, segment, step, bins)
-    means = squares @ shares(squares.shape[-1])
+    means = squares @ mean_weights(squares.shape[-1])
     densities: Array = means[..., :bins] + means[..., bins:]
     return densities
 
@@ -79,7 +79,7 @@ def overlapping(rows: Array, length: int, step: int) -> Array:
     )
 
 
-def densities_of(windows: Windows, segment: int, step: int, bins: int) -> Array:
+def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Array:
     """Return the densities of the segments of windows; features that ask for the same share them."""
     return windows.shared(
         ('densities', segment, step, bins),
@@ -89,7 +89,7 @@ def densities_of(windows: Windows, segment: int, step: int, bins: int) -> Array:
 
 def mean_over_segments(densities: Array) -> Array:
     """Return the mean over the segments, (..., n_bins)."""
-    mean: Array = shares(densities.shape[-2]) @ densities
+    mean: Array = mean_weights(densities.shape[-2]) @ densities
     return mean
 
 
@@ -121,7 +121,7 @@ def long_densities(rows: Array, rate_hz: float, bins: int) -> Array:
     return mean_over_segments(densities)
 
 
-def amplitudes_of(windows: Windows, points: int) -> tuple[Array, float]:
+def amplitudes_of(windows: WindowBatch, points: int) -> tuple[Array, float]:
     """Return the amplitudes of the Fourier transform of the zero-mean windows, and the step between its bins.
 
     Parameters

@@ -18,19 +18,23 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_core.window import Window
-from texture_features.windowing.slide import Slide, Span
-from texture_features.windowing.stream import Run, Stream
+from texture_features.windowing.sample_buffer import BufferedStream, SampleBuffer
+from texture_features.windowing.slide_coverage import CoveredSpan, SlideCoverage
 
-SILENCE_S = 0.3
+TIMEOUT_S = 0.3
 
 
 @dataclass(frozen=True)
 class WindowParams:
     """How the sliding part of a signal is cut."""
 
-    length_s: float = param(0.5, 'Length of one window.', unit='s', low=0.005, high=60.0)
-    hop_s: float = param(0.1, 'Distance between window starts.', unit='s', low=0.001, high=60.0)
-    skip_s: float = param(0.0, 'Time left out at the start of a slide.', unit='s', low=0.0, high=60.0)
+    length_s: float = param(
+        0.5, 'Length of a window; longer ones give more certain decisions, later.', unit='s', low=0.005, high=60.0
+    )
+    hop_s: float = param(0.1, 'Time between the starts of two windows.', unit='s', low=0.001, high=60.0)
+    skip_s: float = param(
+        0.0, 'Time at the start of a slide that is excluded from windows.', unit='s', low=0.0, high=60.0
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,10 +66,10 @@ class SlideEnd:
     skipped: int = 0
 
 
-Piece = CutWindow | SlideEnd
+WindowEvent = CutWindow | SlideEnd
 
 
-class _Absent(enum.Enum):
+class _Missing(enum.Enum):
     """Why a window is not there."""
 
     LATE = enum.auto()  # samples that have not come yet
@@ -76,11 +80,11 @@ class _Absent(enum.Enum):
 class _Input:
     """A stream and what the cutter waits for in it."""
 
-    stream: Stream
+    stream: BufferedStream
     due: float = -math.inf  # index before whose arrival nothing can happen
-    heard: bool = False
-    heard_s: float = math.nan
-    anchors: dict[Run, tuple[int, int]] = field(default_factory=dict)
+    received: bool = False
+    received_s: float = math.nan
+    anchors: dict[SampleBuffer, tuple[int, int]] = field(default_factory=dict)
 
 
 class WindowCutter:
@@ -100,8 +104,8 @@ class WindowCutter:
 
     def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:
         self._params = params
-        self._inputs = {topic: _Input(Stream(keep_s)) for topic in inputs}
-        self._slides: deque[Slide] = deque()
+        self._inputs = {topic: _Input(BufferedStream(keep_s)) for topic in inputs}
+        self._slides: deque[SlideCoverage] = deque()
         self._ready = False
         self._windows = 0
         self._skipped = 0
@@ -113,7 +117,7 @@ class WindowCutter:
         if source is None or not len(signal.samples):
             return
         restarted = source.stream.add(signal)
-        source.heard = True
+        source.received = True
         if restarted or signal.next_sample >= source.due:
             self._ready = True
 
@@ -128,32 +132,32 @@ class WindowCutter:
             slide.ended = True
         if state.phase is Phase.SLIDE:
             length_s, hop_s, skip_s = self._params.length_s, self._params.hop_s, self._params.skip_s
-            self._slides.append(Slide(state, _to_ns(length_s), _to_ns(hop_s), _to_ns(skip_s)))
+            self._slides.append(SlideCoverage(state, _to_ns(length_s), _to_ns(hop_s), _to_ns(skip_s)))
 
-    def take(self) -> list[Piece]:
+    def take(self) -> list[WindowEvent]:
         """Return the windows completed since the last call, and the end of each slide that is over."""
         if not self._ready:
             return []
         self._ready = False
-        pieces: list[Piece] = []
-        while self._slides and self._cut(self._slides[0], pieces):
-            pieces.append(self._end_slide())
-        return pieces
+        events: list[WindowEvent] = []
+        while self._slides and self._cut(self._slides[0], events):
+            events.append(self._end_slide())
+        return events
 
-    def silence(self, now_s: float) -> list[Piece]:
+    def time_out(self, now_s: float) -> list[WindowEvent]:
         """Return what `take` returns, and the ends of slides that are over whose samples have not come for 0.3 s.
 
         Call it some times a second with any clock that runs on.
         """
-        pieces = self.take()
+        events = self.take()
         for source in self._inputs.values():
-            if source.heard or math.isnan(source.heard_s):
-                source.heard, source.heard_s = False, now_s
+            if source.received or math.isnan(source.received_s):
+                source.received, source.received_s = False, now_s
         awaited = [source for source in self._inputs.values() if source.due < math.inf]
-        silent = any(now_s - source.heard_s >= SILENCE_S for source in awaited)
-        return pieces + (self._give_up() if silent else [])
+        silent = any(now_s - source.received_s >= TIMEOUT_S for source in awaited)
+        return events + (self._give_up() if silent else [])
 
-    def finish(self) -> list[Piece]:
+    def finish(self) -> list[WindowEvent]:
         """Return what is left of a recording, and the ends of all its slides, without waiting for more."""
         if self._slides:
             self._slides[-1].ended = True
@@ -163,7 +167,7 @@ class WindowCutter:
     @property
     def waiting_for(self) -> tuple[str, ...]:
         """Inputs of which nothing has come yet."""
-        return tuple(topic for topic, source in self._inputs.items() if not source.stream.runs)
+        return tuple(topic for topic, source in self._inputs.items() if not source.stream.buffers)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -177,53 +181,53 @@ class WindowCutter:
             'old_states': self._old_states,
         }
 
-    def _cut(self, slide: Slide, pieces: list[Piece]) -> bool:
+    def _cut(self, slide: SlideCoverage, events: list[WindowEvent]) -> bool:
         """Cut what can be cut of a slide; return whether it is used up."""
         for source in self._inputs.values():
             source.due = math.inf
         while span := slide.window():
             found = self._find(slide, span)
-            if found is _Absent.LATE:
+            if found is _Missing.LATE:
                 return False
-            if isinstance(found, _Absent):
+            if isinstance(found, _Missing):
                 self._skip(slide)
                 continue
             slide.advance()
             self._windows += 1
-            pieces.append(self._piece(slide, span, found))
+            events.append(self._window_event(slide, span, found))
         return slide.ended
 
-    def _find(self, slide: Slide, span: Span) -> dict[str, Window] | _Absent:
+    def _find(self, slide: SlideCoverage, span: CoveredSpan) -> dict[str, Window] | _Missing:
         windows = {}
         for topic, source in self._inputs.items():
             found = self._find_in(source, slide, span)
-            if isinstance(found, _Absent):
+            if isinstance(found, _Missing):
                 return found
             windows[topic] = found
         return windows
 
-    def _find_in(self, source: _Input, slide: Slide, span: Span) -> Window | _Absent:
+    def _find_in(self, source: _Input, slide: SlideCoverage, span: CoveredSpan) -> Window | _Missing:
         """Look for a window in the runs of a stream; only the newest can still grow."""
         source.due = -math.inf
-        state = _Absent.LATE
-        for run in source.stream.runs:
-            anchor = source.anchors.get(run) or run.anchor(slide.start_ns)
+        state = _Missing.LATE
+        for buffer in source.stream.buffers:
+            anchor = source.anchors.get(buffer) or buffer.anchor(slide.start_ns)
             if anchor is None:
-                state, source.due = _Absent.LATE, -math.inf
+                state, source.due = _Missing.LATE, -math.inf
                 continue
-            source.anchors[run] = anchor
-            first = run.index_at(span.start_ns, anchor)
-            count = max(1, round(self._params.length_s * run.rate_hz))
-            if first >= run.first_sample and first + count <= run.next_sample:
+            source.anchors[buffer] = anchor
+            first = buffer.index_at(span.start_ns, anchor)
+            count = max(1, round(self._params.length_s * buffer.rate_hz))
+            if first >= buffer.first_sample and first + count <= buffer.next_sample:
                 source.due = math.inf
-                return _finite_window(run, first, count, span)
-            state = _Absent.LOST if first < run.first_sample else _Absent.LATE
+                return _finite_window(buffer, first, count, span)
+            state = _Missing.LOST if first < buffer.first_sample else _Missing.LATE
             source.due = first + count
-        if state is _Absent.LOST:
+        if state is _Missing.LOST:
             source.due = math.inf
         return state
 
-    def _piece(self, slide: Slide, span: Span, windows: Mapping[str, Window]) -> CutWindow:
+    def _window_event(self, slide: SlideCoverage, span: CoveredSpan, windows: Mapping[str, Window]) -> CutWindow:
         return CutWindow(
             start_ns=span.start_ns,
             exploration_id=slide.exploration_id,
@@ -236,7 +240,7 @@ class WindowCutter:
             skipped=slide.skipped,
         )
 
-    def _skip(self, slide: Slide) -> None:
+    def _skip(self, slide: SlideCoverage) -> None:
         slide.advance()
         slide.skipped += 1
         self._skipped += 1
@@ -247,21 +251,21 @@ class WindowCutter:
             source.anchors.clear()
         return SlideEnd(slide.covered_ns, slide.exploration_id, self._params.hop_s, slide.surface, slide.skipped)
 
-    def _give_up(self) -> list[Piece]:
+    def _give_up(self) -> list[WindowEvent]:
         """End the slides that are over without the samples that have not come."""
-        pieces: list[Piece] = []
+        events: list[WindowEvent] = []
         while self._slides and self._slides[0].ended:
             while self._slides[0].window():
                 self._skip(self._slides[0])
-            pieces.append(self._end_slide())
+            events.append(self._end_slide())
             self._ready = True
-            pieces += self.take()
-        return pieces
+            events += self.take()
+        return events
 
 
 def cut_recording(
     signals: Mapping[str, Iterable[TactileSignal]], states: Iterable[ExplorationState], params: WindowParams
-) -> Iterator[Piece]:
+) -> Iterator[WindowEvent]:
     """Yield the windows of a recording, every topic of `signals` being an input.
 
     Parameters
@@ -280,11 +284,11 @@ def cut_recording(
     yield from cutter.finish()
 
 
-def _finite_window(run: Run, first: int, count: int, span: Span) -> Window | _Absent:
-    samples = run.take(first, count)
+def _finite_window(buffer: SampleBuffer, first: int, count: int, span: CoveredSpan) -> Window | _Missing:
+    samples = buffer.take(first, count)
     if not np.isfinite(samples).all():
-        return _Absent.LOST
-    return Window(samples, run.rate_hz, run.channels, span.start_ns, span.speed_m_s, span.force_n)
+        return _Missing.LOST
+    return Window(samples, buffer.rate_hz, buffer.channels, span.start_ns, span.speed_m_s, span.force_n)
 
 
 def _calls(add: Callable[[Any], None], items: Iterable[Any]) -> Iterator[tuple[int, Callable[[Any], None], Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from texture_core.ros.run_node import run_node
-from texture_recordings.nodes.record import Record
+from texture_recordings.nodes.record import RecordNode
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -16,5 +16,5 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Record until Ctrl-C."""
-    run_node(Record, {'out': options.out}, options.namespace)
+    run_node(RecordNode, {'out': options.out}, options.namespace)
     return 0

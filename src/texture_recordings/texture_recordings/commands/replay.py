@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from texture_core.ros.run_node import run_node
-from texture_recordings.nodes.replay import Replay
+from texture_recordings.nodes.replay import ReplayNode
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -19,5 +19,5 @@ def configure(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Play the bag once."""
     parameters = {'bag': options.bag, 'rate': options.rate, 'slides': options.slides}
-    run_node(Replay, parameters, options.namespace)
+    run_node(ReplayNode, parameters, options.namespace)
     return 0

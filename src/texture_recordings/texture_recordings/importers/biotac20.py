@@ -43,7 +43,7 @@ NORMAL_FORCE = 2  # column of `wrench`: y of the tool, the one component that pr
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class BiotacSlide:
     """One slide as recorded; the fields of the arrays are named as in the files."""
 
     surface: str
@@ -116,14 +116,14 @@ def _import_material(file: Path, out: Path, wanted: frozenset[int] | None, chann
     return out
 
 
-def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[Recording]:
+def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[BiotacSlide]:
     try:
         with open_regular(file) as opened:
             content = Arrays(opened)
             for slide in sorted({key.split('/')[0] for key in content.names}):
                 if wanted is None or int(slide.removeprefix('slide')) in wanted:
                     fields = {name: content[f'{slide}/{name}'] for name in FIELDS}
-                    yield Recording(file.stem, slide, epoch=float(content[f'{slide}/epoch']), **fields)
+                    yield BiotacSlide(file.stem, slide, epoch=float(content[f'{slide}/epoch']), **fields)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it anew") from error
 
@@ -157,7 +157,7 @@ def restore_sign(rectified: AnyArray) -> Array:
     return x * signs
 
 
-def _write_slide(bag: BagWriter, recording: Recording, start_ns: int, indices: AnyArray, channels: str) -> None:
+def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices: AnyArray, channels: str) -> None:
     """Write one slide: a state, then the samples of each batch, then the end; `indices` number the frames."""
     frames = recording.frames[: len(indices)]
     vibration = restore_sign(frames[:, PAC_COLUMNS].ravel()).astype(np.float32)[:, None]
@@ -206,7 +206,7 @@ class _Motion:
     wrench: AnyArray
 
     @classmethod
-    def of(cls, recording: Recording) -> _Motion:
+    def of(cls, recording: BiotacSlide) -> _Motion:
         velocity = recording.velocity[np.isfinite(recording.velocity).all(axis=1)]
         wrench = recording.wrench[np.isfinite(recording.wrench).all(axis=1)]
         x, y = velocity[:, 1:3].mean(axis=0) if len(velocity) else (math.nan, math.nan)

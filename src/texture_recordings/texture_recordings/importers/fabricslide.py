@@ -15,20 +15,22 @@ from typing import NamedTuple
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
 from texture_recordings.importers.slide_file import SlideFile
-from texture_recordings.importers.steady_slides import SteadySlide, Stream
+from texture_recordings.importers.steady_slides import ImportedStream, SteadySlide
 
 FABRIC = re.compile(r'([^/]+)/F(\d+)/V(-?\d+)/(\d+)')
 GRATING = re.compile(r'grating/([^/]+?)_F(\d+)_V(-?\d+)mmps_(\d+)')
 TAXELS = slice(3, 19)  # after the time (ms) and two proximities
 ROW_S = 0.028
-STREAM = Stream('signal_static', 'cpm/taxels', tuple(f'taxel{number}' for number in range(1, 17)), 'count', 1.0 / ROW_S)
+STREAM = ImportedStream(
+    'signal_static', 'cpm/taxels', tuple(f'taxel{number}' for number in range(1, 17)), 'count', 1.0 / ROW_S
+)
 # The finger speeds up along a quarter sine in the time that it then takes for 47 mm, slides 500 mm, and slows down
 # likewise (`setDuration`, `setTimeMax` of the published controller).
 RAMP_M, STEADY_M = 0.03 * math.pi / 2, 0.5
 COUNTS_PER_FORCE = 100.0
 
 
-class Run(NamedTuple):
+class SlideRun(NamedTuple):
     """How one run was made; sorted as the slides are numbered: down before up, then by force, speed and repeat."""
 
     up: bool
@@ -37,16 +39,16 @@ class Run(NamedTuple):
     repeat: int
 
 
-def place(key: str) -> tuple[str, Run] | None:
+def place(key: str) -> tuple[str, SlideRun] | None:
     """Return fabric or grating of a key, and the run."""
     match = GRATING.fullmatch(key) or FABRIC.fullmatch(key)
     if not match:
         return None
     speed = int(match[3])
-    return match[1], Run(speed > 0, int(match[2]), abs(speed), int(match[4]))
+    return match[1], SlideRun(speed > 0, int(match[2]), abs(speed), int(match[4]))
 
 
-def slide(key: str, surface: str, run: Run, recorded: AnyArray) -> SteadySlide:
+def slide(key: str, surface: str, run: SlideRun, recorded: AnyArray) -> SteadySlide:
     """Return a slide, given its rows as recorded."""
     speed_m_s = run.speed_mm_s / 1000.0
     direction_rad = math.pi / 2 if run.up else -math.pi / 2
@@ -69,7 +71,7 @@ def import_fabricslide(
     The runs of a fabric are numbered by direction (down first), then force, speed and repeat: of a complete fabric 1-60
     go down and 61-120 up, and within them each force has twelve in a row. Rows are 28 ms apart and are written as they
     are, on `signal_static`. Force: the grip was regulated to a mean reading of the taxels, not to newtons; `force_n`
-    holds that reading in hundreds of counts, which tells forces apart and orders them, and is no force in newtons.
+    holds that reading in hundreds of counts, which distinguishs forces and orders them, and is no force in newtons.
     Direction: +π/2 up, −π/2 down. The states say `contact` while the finger speeds up and `lift` while it slows down.
 
     Parameters

@@ -17,7 +17,7 @@ import numpy as np
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData
 from texture_recordings.importers.slide_file import SlideFile
-from texture_recordings.importers.steady_slides import SteadySlide, Stream
+from texture_recordings.importers.steady_slides import ImportedStream, SteadySlide
 
 KEY = re.compile(r'([^/]+)/speed(\d+(?:\.\d+)?)/force(\d+(?:\.\d+)?)')
 TAXELS = 9
@@ -25,23 +25,23 @@ TIME = 10  # column of the time, s; the one between is auxiliary and of unknown 
 RATE_HZ = 320.0
 SLOWEST = 10.0  # times the nominal duration; a time stamp that is wrong would ask for any number of samples
 # The published signal has no unit.
-STREAM = Stream('signal', 'ntp/array', tuple(f'taxel{n}' for n in range(1, TAXELS + 1)), '', RATE_HZ)
+STREAM = ImportedStream('signal', 'ntp/array', tuple(f'taxel{n}' for n in range(1, TAXELS + 1)), '', RATE_HZ)
 
 
-class Condition(NamedTuple):
+class SlideCondition(NamedTuple):
     """How one slide was made; sorted as the slides are numbered: by speed, then by force."""
 
     speed_mm_s: float
     force_n: float
 
 
-def place(key: str) -> tuple[str, Condition] | None:
+def place(key: str) -> tuple[str, SlideCondition] | None:
     """Return texture and condition of a key."""
     match = KEY.fullmatch(key)
-    return (match[1], Condition(float(match[2]), float(match[3]))) if match else None
+    return (match[1], SlideCondition(float(match[2]), float(match[3]))) if match else None
 
 
-def slide(key: str, texture: str, condition: Condition, recorded: AnyArray) -> SteadySlide:
+def slide(key: str, texture: str, condition: SlideCondition, recorded: AnyArray) -> SteadySlide:
     """Return a slide, given its rows as recorded."""
     samples = evenly(np.asarray(recorded[:, :TAXELS], dtype=float), float(recorded[-1, TIME] - recorded[0, TIME]))
     return SteadySlide(key, texture, samples, condition.speed_mm_s / 1000.0, condition.force_n, math.nan)

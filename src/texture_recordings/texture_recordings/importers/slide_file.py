@@ -14,7 +14,7 @@ from texture_core.arrays import AnyArray
 from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.files import Arrays, open_regular
-from texture_recordings.importers.steady_slides import SteadySlide, Stream, write_steady_slides
+from texture_recordings.importers.steady_slides import ImportedStream, SteadySlide, write_steady_slides
 from texture_recordings.slides import parse_selection
 
 
@@ -23,7 +23,7 @@ class SlideFile:
     """What the file is called, and how its keys and arrays are read; slides are numbered in order of conditions."""
 
     name: str
-    stream: Stream
+    stream: ImportedStream
     place: Callable[[str], tuple[str, Any] | None]  # surface and condition of a key, None if it is no such key
     slide: Callable[[str, str, Any, AnyArray], SteadySlide]  # of key, surface, condition and array
 

@@ -43,7 +43,7 @@ class SteadySlide:
 
 
 @dataclass(frozen=True)
-class Stream:
+class ImportedStream:
     """The stream that all slides of a data set share: as in a `TactileSignal`."""
 
     topic: str
@@ -57,7 +57,7 @@ class Stream:
         return round(samples * NANOSECONDS / self.rate_hz)
 
 
-def write_steady_slides(path: Path, stream: Stream, slides: Iterable[SteadySlide]) -> Path:
+def write_steady_slides(path: Path, stream: ImportedStream, slides: Iterable[SteadySlide]) -> Path:
     """Write a bag of slides, one after the other in the order given; the stamps are made up.
 
     A state is published at the start of each phase and promises its whole length: speed and force do not change.
@@ -70,7 +70,7 @@ def write_steady_slides(path: Path, stream: Stream, slides: Iterable[SteadySlide
     return path
 
 
-def _write(bag: BagWriter, stream: Stream, slide: SteadySlide, start_ns: int, first: int) -> int:
+def _write(bag: BagWriter, stream: ImportedStream, slide: SteadySlide, start_ns: int, first: int) -> int:
     """Write one slide; return its end."""
     count = len(slide.samples)
     steady = slide.steady or range(count)
@@ -90,7 +90,7 @@ def _write(bag: BagWriter, stream: Stream, slide: SteadySlide, start_ns: int, fi
 
 def _write_phase(
     bag: BagWriter,
-    stream: Stream,
+    stream: ImportedStream,
     slide: SteadySlide,
     state: ExplorationState,
     *,

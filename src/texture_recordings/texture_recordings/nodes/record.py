@@ -33,7 +33,7 @@ class RecordParams:
     out: str = param('', 'Folder of the new bag; nothing may exist there.')
 
 
-class Record(Node):
+class RecordNode(Node):
     """Write every message of the suite's topics to a bag, with the time of its arrival."""
 
     def __init__(self) -> None:
@@ -125,4 +125,4 @@ class Record(Node):
 
 def main() -> None:
     """Run the node."""
-    run(Record)
+    run(RecordNode)

@@ -34,18 +34,20 @@ class ReplayParams:
     """What is published, how fast, and who must be listening."""
 
     bag: str = param('', 'The bag, or a folder of bags, to publish.')
-    rate: float = param(1.0, 'How many times faster than recorded.', low=0.01, high=1000.0)
+    rate: float = param(1.0, 'Playback rate relative to the recording; 2 is twice as fast.', low=0.01, high=1000.0)
     slides: str = param('', "Which slides of each surface, such as '1-30'; '' for the whole recording.")
     from_namespace: str = param('', "Namespace in the bag to publish; '' if it has but one.")
-    longest_pause_s: float = param(1.0, 'Longer pauses in the recording are shortened to this.', unit='s', low=0.0)
-    subscribers: int = param(
-        1, "Subscriptions that 'signal', 'exploration' and 'features' must have each before the start.", low=0, high=100
+    longest_pause_s: float = param(
+        1.0, 'Longest pause that is replayed; longer ones are shortened to it.', unit='s', low=0.0
     )
-    deadline_s: float = param(30.0, 'How long to wait for them.', unit='s', low=0.0)
-    start_delay_s: float = param(1.0, 'Rest between finding them and the start.', unit='s', low=0.0)
+    subscribers: int = param(
+        1, "Number of subscribers that 'signal', 'exploration' and 'features' need before the start.", low=0, high=100
+    )
+    deadline_s: float = param(30.0, 'Time to wait for the subscribers before giving up.', unit='s', low=0.0)
+    start_delay_s: float = param(1.0, 'Time between finding the subscribers and the start.', unit='s', low=0.0)
 
 
-class Replay(Node):
+class ReplayNode(Node):
     """Publish the signals and states of a bag as they were: order, stamps and bytes."""
 
     def __init__(self) -> None:
@@ -136,4 +138,4 @@ class Replay(Node):
 
 def main() -> None:
     """Run the node."""
-    run(Replay)
+    run(ReplayNode)

@@ -1,4 +1,4 @@
-"""Strike a running bench with faults, and see whether all comes back."""
+"""Fault injection into the running emulator, and measurement of the recovery."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 
-from texture_benchmarks.endurance.faults import Strike
+from texture_benchmarks.endurance.endurance_record import FaultEvent
+from texture_benchmarks.endurance.faults import PlannedFault
 from texture_benchmarks.endurance.processes import Processes
-from texture_benchmarks.endurance.record import Struck
 from texture_benchmarks.endurance.ros.watcher import Watcher
 from texture_bringup.ros.operator import Operator
 from texture_core.errors import LaunchFailed
 
-NODES = ('bench', 'sensor', 'explorer', 'feature_extractor', 'classifier')
+NODES = ('emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier')
 BACK_DEADLINE_S = 60.0
 POLL_S = 0.05
 
 
-class Striker:
-    """Let faults strike in a thread of its own; use it in a `with` block.
+class FaultInjector:
+    """Inject faults in a thread of its own; use it in a `with` block.
 
     Parameters
     ----------
-    strikes
+    planned_faults
         Which.
     operator
         For the faults of the bench; used by this thread alone.
@@ -37,26 +37,28 @@ class Striker:
 
     Attributes
     ----------
-    struck
-        What struck so far; the one in force stands in it with an end that is not yet known (inf).
+    fault_events
+        What was injected so far; the one in force stands in it with an end that is not yet known (inf).
     error
         What ended the thread early; None if nothing did.
     """
 
-    def __init__(self, strikes: Iterable[Strike], operator: Operator, processes: Processes, watcher: Watcher) -> None:
-        self.struck: list[Struck] = []
+    def __init__(
+        self, planned_faults: Iterable[PlannedFault], operator: Operator, processes: Processes, watcher: Watcher
+    ) -> None:
+        self.fault_events: list[FaultEvent] = []
         self.error: Exception | None = None
-        self._strikes = strikes
+        self._planned_faults = planned_faults
         self._operator = operator
         self._processes = processes
         self._watcher = watcher
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, name='striker', daemon=True)
-        self._acts: Mapping[str, Callable[[Strike], str]] = {
+        self._thread = threading.Thread(target=self._run, name='fault_injector', daemon=True)
+        self._acts: Mapping[str, Callable[[PlannedFault], str]] = {
             'unplug': self._unplug, 'corrupt': self._corrupt, 'freeze': self._freeze, 'kill': self._kill
         }  # fmt: skip
 
-    def __enter__(self) -> Striker:
+    def __enter__(self) -> FaultInjector:
         self._thread.start()
         return self
 
@@ -71,52 +73,52 @@ class Striker:
 
     def _run(self) -> None:
         try:
-            for strike in self._strikes:
-                if self._stop.wait(strike.quiet_s):
+            for planned_fault in self._planned_faults:
+                if self._stop.wait(planned_fault.quiet_s):
                     return
-                self._strike(strike)
+                self._inject(planned_fault)
         except Exception as error:  # told in the report, which is written in any case
             self.error = error
 
-    def _strike(self, strike: Strike) -> None:
+    def _inject(self, planned_fault: PlannedFault) -> None:
         begin_s = time.monotonic()
-        self.struck.append(Struck(strike.name, begin_s, math.inf, math.inf, ''))
-        detail = self._acts[strike.fault.action](strike)
+        self.fault_events.append(FaultEvent(planned_fault.name, begin_s, math.inf, math.inf, ''))
+        detail = self._acts[planned_fault.fault.action](planned_fault)
         end_s = time.monotonic()
-        self.struck[-1] = Struck(strike.name, begin_s, end_s, math.inf, detail)
-        self.struck[-1] = Struck(strike.name, begin_s, end_s, self._back(end_s), detail)
+        self.fault_events[-1] = FaultEvent(planned_fault.name, begin_s, end_s, math.inf, detail)
+        self.fault_events[-1] = FaultEvent(planned_fault.name, begin_s, end_s, self._back(end_s), detail)
 
-    def _unplug(self, strike: Strike) -> str:
-        self._operator.set_parameters('bench', {'plugged': False})
-        self._stop.wait(strike.hold_s)
-        self._operator.set_parameters('bench', {'plugged': True})
-        return f'for {strike.hold_s:.1f} s'
+    def _unplug(self, planned_fault: PlannedFault) -> str:
+        self._operator.set_parameters('emulator', {'plugged': False})
+        self._stop.wait(planned_fault.hold_s)
+        self._operator.set_parameters('emulator', {'plugged': True})
+        return f'for {planned_fault.hold_s:.1f} s'
 
-    def _corrupt(self, strike: Strike) -> str:
-        self._operator.set_parameters('bench', {'bit_flips': strike.strength})
-        self._stop.wait(strike.hold_s)
-        self._operator.set_parameters('bench', {'bit_flips': 0.0})
-        return f'a bit in {1 / strike.strength:.0f} bytes, for {strike.hold_s:.1f} s'
+    def _corrupt(self, planned_fault: PlannedFault) -> str:
+        self._operator.set_parameters('emulator', {'bit_flips': planned_fault.strength})
+        self._stop.wait(planned_fault.hold_s)
+        self._operator.set_parameters('emulator', {'bit_flips': 0.0})
+        return f'a bit in {1 / planned_fault.strength:.0f} bytes, for {planned_fault.hold_s:.1f} s'
 
-    def _freeze(self, strike: Strike) -> str:
-        pid = self._pid(strike)
+    def _freeze(self, planned_fault: PlannedFault) -> str:
+        pid = self._pid(planned_fault)
         os.kill(pid, signal.SIGSTOP)
         try:
-            self._stop.wait(strike.hold_s)
+            self._stop.wait(planned_fault.hold_s)
         finally:
             os.kill(pid, signal.SIGCONT)
-        return f'for {strike.hold_s:.1f} s'
+        return f'for {planned_fault.hold_s:.1f} s'
 
-    def _kill(self, strike: Strike) -> str:
-        pid = self._pid(strike)
+    def _kill(self, planned_fault: PlannedFault) -> str:
+        pid = self._pid(planned_fault)
         os.kill(pid, signal.SIGKILL)
         return f'process {pid}'
 
-    def _pid(self, strike: Strike) -> int:
+    def _pid(self, planned_fault: PlannedFault) -> int:
         pids = self._processes.update()
-        if strike.fault.node not in pids:
-            raise LaunchFailed(f"node '{strike.fault.node}' does not run any more")
-        return pids[strike.fault.node]
+        if planned_fault.fault.node not in pids:
+            raise LaunchFailed(f"node '{planned_fault.fault.node}' does not run any more")
+        return pids[planned_fault.fault.node]
 
     def _back(self, since_s: float) -> float:
         """Return when all nodes are heard again and samples flow: NaN if not in time, inf if the run ends before."""
@@ -126,8 +128,8 @@ class Striker:
                 return math.inf
             running = self._processes.update()
             if all(name in running for name in NODES):
-                heard_s = [self._watcher.heard_s.get(name, 0.0) for name in awaited]
-                if min(heard_s) > since_s:
-                    return max(heard_s)
+                received_s = [self._watcher.received_s.get(name, 0.0) for name in awaited]
+                if min(received_s) > since_s:
+                    return max(received_s)
             time.sleep(POLL_S)
         return math.nan

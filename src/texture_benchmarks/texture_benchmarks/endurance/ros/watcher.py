@@ -1,4 +1,4 @@
-"""Listen to all that running nodes say, and keep books."""
+"""Record diagnostics, logs, samples and estimates of the running nodes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_msgs import msg
 
-from texture_benchmarks.endurance.books import COUNTERS, Ledger, SignalBook, Totals
+from texture_benchmarks.endurance.accounting import COUNTERS, AnswerAccount, SampleAccount, Totals
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
 from texture_core.ros.time import to_ns
 
@@ -33,21 +33,21 @@ class Watcher:
 
     Attributes
     ----------
-    signal, ledger
+    signal, answers
         Books about samples, and about feature vectors and estimates.
     totals
         Counters of /diagnostics, by node.
     said
         Warnings and errors of the nodes, with how often; numbers in them are left out.
-    heard_s
+    received_s
         When a node was heard last on /diagnostics, and the stream 'signal' (monotonic clock).
     """
 
     def __init__(self, domain_id: int) -> None:
-        self.signal, self.ledger = SignalBook(), Ledger()
+        self.signal, self.answers = SampleAccount(), AnswerAccount()
         self.totals: defaultdict[str, Totals] = defaultdict(Totals)
         self.said: Counter[tuple[str, str, str]] = Counter()
-        self.heard_s: dict[str, float] = {}
+        self.received_s: dict[str, float] = {}
         self._context = Context()
         self._context.init(domain_id=domain_id)
         node = self._node = Node('watcher', context=self._context)
@@ -80,7 +80,7 @@ class Watcher:
             node = status.name.rpartition('/')[2]
             counters = COUNTERS.get(node, ())
             self.totals[node].update({item.key: int(item.value) for item in status.values if item.key in counters})
-            self.heard_s[node] = time.monotonic()
+            self.received_s[node] = time.monotonic()
 
     def _on_log(self, log: Log) -> None:
         if log.level in LEVELS:
@@ -89,10 +89,10 @@ class Watcher:
     def _on_signal(self, batch: msg.TactileSignal) -> None:
         count = len(batch.samples) // max(1, len(batch.channels))
         self.signal.update(batch.first_sample, count, to_ns(batch.header.stamp), batch.sampling_rate_hz)
-        self.heard_s['signal'] = time.monotonic()
+        self.received_s['signal'] = time.monotonic()
 
     def _on_vector(self, vector: msg.FeatureVector) -> None:
-        self.ledger.vectors[vector.exploration_id] += 1
+        self.answers.vectors[vector.exploration_id] += 1
 
     def _on_estimate(self, estimate: msg.TextureEstimate) -> None:
-        self.ledger.estimates[estimate.exploration_id] += 1
+        self.answers.estimates[estimate.exploration_id] += 1

@@ -1,0 +1,33 @@
+from pathlib import Path
+
+import pytest
+
+from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
+from texture_benchmarks.result import BenchmarkOptions
+from texture_core.errors import InvalidData, UnknownName
+
+
+def test_an_unknown_benchmark_and_missing_data_are_refused_with_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="did you mean 'latency'"):
+        run_benchmark('latancy', BenchmarkOptions(tmp_path))
+    for data in (None, tmp_path):
+        with pytest.raises(InvalidData, match='no recorded data'):
+            BENCHMARKS['biotac20'](BenchmarkOptions(tmp_path, data))
+
+
+def test_the_clock_keeps_its_promise_where_arrivals_do_not(tmp_path: Path) -> None:
+    result, _ = run_benchmark('clock', BenchmarkOptions(tmp_path, quick=True))
+    assert max(result.numbers['clock_ms']) < result.numbers['target_ms'] < min(result.numbers['arrival_ms'])
+    assert all(chart.is_file() for chart in result.charts)
+
+
+@pytest.mark.ros
+def test_every_window_is_answered_through_the_graph(tmp_path: Path) -> None:
+    result, path = run_benchmark('latency', BenchmarkOptions(tmp_path, quick=True))
+    assert path.is_file()
+    assert all(chart.is_file() for chart in result.charts)
+    for recipe in ('default', 'vibration-and-taxels'):
+        dds = result.numbers[recipe]['dds']
+        assert dds['estimates'] == dds['expected']
+        assert 0 < dds['median_ms'] <= dds['p99_ms'] <= dds['longest_ms']
+        assert result.numbers[recipe]['cpu_percent']['all'] > 0

@@ -1,0 +1,63 @@
+from pathlib import Path
+
+import pytest
+
+from texture_benchmarks import catalogue
+from texture_benchmarks.commands import benchmark as command
+from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
+from texture_benchmarks.run_all import LONG
+from texture_bringup.command import main
+from texture_core.errors import InvalidData
+
+
+def good(benchmark: BenchmarkOptions) -> BenchmarkResult:
+    return BenchmarkResult('good', 'nothing', 'none', 'none', {})
+
+
+def bad(benchmark: BenchmarkOptions) -> BenchmarkResult:
+    raise ArithmeticError('deliberately, for the test')
+
+
+def missing(benchmark: BenchmarkOptions) -> BenchmarkResult:
+    raise InvalidData("no recorded data in 'no folder'")
+
+
+@pytest.fixture
+def benches(monkeypatch: pytest.MonkeyPatch) -> dict:
+    benches = {'missing': missing, 'recipes': good, 'good': good}
+    monkeypatch.setattr(command, 'BENCHMARKS', benches)
+    monkeypatch.setattr(catalogue, 'BENCHMARKS', benches)
+    return benches
+
+
+def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(benches, tmp_path: Path, capfd) -> None:
+    assert set(LONG) > {'recipes'}
+    for more, count in (([], 1), (['--long'], 2)):
+        assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path), *more]) == 0
+        said = capfd.readouterr().out
+        assert f'{count} benchmarks in ' in said
+        assert "missing: left out: no recorded data in 'no folder'" in said
+        assert 'left out, for their data is missing: missing; failed: none' in said
+
+
+def test_all_go_on_when_one_fails_and_the_command_ends_with_1(benches, tmp_path: Path, capfd) -> None:
+    benches['clock'] = bad
+    benches['last'] = good
+    assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path)]) == 1
+    said = capfd.readouterr()
+    assert '2 benchmarks in ' in said.out
+    assert 'failed: clock' in said.out
+    assert 'deliberately' in said.err
+    assert (tmp_path / 'good.json').is_file()
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [(['benchmark', 'biotc'], "did you mean 'biotac20'?"), (['benchmark', 'biotac20', '--quick'], '--data')],
+)
+def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:
+    monkeypatch.delenv('TEXTURE_DATA', raising=False)
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count('\n') == 1

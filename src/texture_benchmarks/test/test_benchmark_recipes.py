@@ -1,0 +1,141 @@
+import os
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_benchmarks.catalogue import BENCHMARKS
+from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION
+from texture_benchmarks.recipes.trial import (
+    SlideSignals,
+    chronological_split,
+    comparable,
+    evaluate_extracted,
+    every,
+    extract_all,
+    random_splits,
+    read_slide_signals,
+    splits_by,
+    try_recipe,
+)
+from texture_benchmarks.result import BenchmarkOptions
+from texture_core.errors import InvalidData
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_estimation.recipe import load_recipe
+from texture_evaluation.charts import pareto_front
+from texture_recordings.slides import LabelledSlide, find_slides
+
+DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
+SLIDES = [LabelledSlide(Path('bag'), f'{s}/{k}', s, k, k, None) for s in ('cork', 'felt') for k in range(1, 11)]
+
+
+def test_in_random_folds_every_slide_is_tested_once_and_every_surface_alike() -> None:
+    splits = random_splits(SLIDES, 5, np.random.default_rng(0))
+    assert sorted(name for _, tested in splits for name in tested) == sorted(slide.name for slide in SLIDES)
+    for training, tested in splits:
+        assert not training & tested
+        assert sorted(name.split('/')[0] for name in tested) == ['cork', 'cork', 'felt', 'felt']
+
+
+def test_a_division_by_time_learns_from_the_first_slides() -> None:
+    [(training, tested)] = chronological_split(SLIDES, 8)
+    assert len(training) == 16
+    assert tested == {'cork/9', 'cork/10', 'felt/9', 'felt/10'}
+
+
+def test_one_value_after_the_other_is_left_out() -> None:
+    splits = splits_by({'a': 0.1, 'b': 0.2, 'c': 0.1})
+    assert splits == [({'b'}, {'a', 'c'}), ({'a', 'c'}, {'b'})]
+
+
+def slide_signals(gap: int = 0) -> SlideSignals:
+    """Return a tone of 100 Hz at 2200 Hz in batches of 44 samples; `gap` samples are lost after 0.5 s."""
+    rows = [slice(start, start + 44) for start in range(0, 4400, 44)]
+    tone = np.sin(2 * np.pi * 100.0 * np.arange(4400 + gap) / 2200.0).astype(np.float32)[:, None]
+    batches = []
+    for part in rows:
+        first = part.start + (gap if part.start >= 1100 else 0)
+        stamp = round(first / 2200.0 * NANOSECONDS)
+        batches.append(TactileSignal(stamp, 's', ('a',), (), 2200.0, first, tone[first : first + 44]))
+    state = ExplorationState(0, 'e', 'linear_slide', Phase.SLIDE, steady_s=2.0, speed_m_s=0.02, surface='cork')
+    return SlideSignals(SLIDES[0], {'signal': batches}, [state])
+
+
+def test_another_rate_keeps_a_tone_and_its_losses() -> None:
+    for gap in (0, 220):
+        batches = slide_signals(gap).at_rate('signal', 1000.0).signals['signal']
+        assert len(batches) == (2 if gap else 1)
+        assert [after.first_sample - before.next_sample for before, after in pairwise(batches)] == [100] * bool(gap)
+        assert sum(len(batch.samples) for batch in batches) == 2000
+        middle = batches[0].samples[100:400, 0]
+        np.testing.assert_allclose(middle, np.sin(2 * np.pi * 0.1 * np.arange(100, 400)), atol=0.01)
+
+
+def test_recipes_are_compared_on_windows_of_one_length_without_what_the_session_reports() -> None:
+    linear = comparable(load_recipe('ets-linear-svm'), 1000.0, of_motion=False)
+    assert linear.feature_set.as_mapping()['inputs']['signal'].keys() == {'features'}
+    vote = comparable(load_recipe('ets-linear-svm-vote'), 1000.0, of_motion=True)
+    assert vote.feature_set.windows.length_s == 0.1
+    assert vote.feature_set.as_mapping()['inputs']['signal']['stretch_to_m_s'] == 0.15
+    spectrum = comparable(load_recipe('hu-pca-svm'), 1000.0, of_motion=False).feature_set
+    assert (spectrum.windows.length_s, spectrum.inputs[0].features[0][1].points) == (0.5, 250)
+
+
+def test_a_missing_input_is_named() -> None:
+    with pytest.raises(InvalidData, match="no 'signal_static', which recipe 'kaboli-svm' needs"):
+        slide_signals().cut(load_recipe('kaboli-svm'))
+
+
+def test_a_recipe_is_tested_on_slides_it_has_not_learnt(simulated: Path) -> None:
+    slides = read_slide_signals([simulated])
+    recipe = comparable(load_recipe('default'), 1000.0, of_motion=False)
+    outcome = try_recipe(recipe, slides, chronological_split([item.slide for item in slides], 4))
+    assert len(outcome.results) == 6
+    figures = outcome.numbers()
+    assert figures['window_accuracy'] > 0.8
+    assert figures['unclassified_windows'] == 0.0
+    assert len(find_slides([simulated])) == len(slides)
+
+
+def test_windows_learnt_from_may_overlap_where_those_tested_do_not(simulated: Path) -> None:
+    slides = read_slide_signals([simulated])
+    recipe = comparable(load_recipe('jamali-naive-bayes-5'), 1000.0, of_motion=False)
+    splits = chronological_split([item.slide for item in slides], 4)
+    apart = extract_all(recipe, slides)
+    plain = evaluate_extracted(recipe, apart, splits)
+    more = evaluate_extracted(recipe, apart, splits, extract_all(every(0.25, recipe), slides), 0.25)
+    # twelve slides of 1 s, windows of 0.5 s
+    assert (plain.model.training['windows'], more.model.training['windows']) == (24, 36)
+    assert [len(found.estimates) for found in more.results] == [len(found.estimates) for found in plain.results]
+
+
+def test_the_front_holds_what_is_neither_dearer_nor_worse_than_another() -> None:
+    assert pareto_front([(3.0, 0.9), (1.0, 0.5), (2.0, 0.4), (2.0, 0.7), (4.0, 0.9)]) == [1, 3, 0]
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
+def test_recorded_slides_are_recognised_by_all_and_the_table_is_whole(tmp_path: Path) -> None:
+    result = BENCHMARKS['recipes'](BenchmarkOptions(tmp_path, DATA, quick=True))
+    assert all(chart.is_file() for chart in result.charts)
+    for setting in ('biotac20, PAC at 1 kHz', 'biotac20, all channels'):
+        cell = result.numbers[setting]['by time']['default']
+        assert cell['window_accuracy'] > 0.5
+        assert 0 < cell['latency_us']['median'] <= cell['latency_us']['p99']
+        assert cell['train_s'] > 0
+    head, _, *rows = (tmp_path / 'recipes.md').read_text().splitlines()
+    assert 'biotac20, PAC at 1 kHz, random: window; slide (%)' in head
+    assert {row.split(' | ')[0] for row in rows} == {f'| {name}' for name in QUICK_RECIPES}
+    assert 'jamali-naive-bayes-5, overlapping' in result.numbers[VIBRATION]['random']
+    assert 'jamali-naive-bayes-5, overlapping' not in result.numbers['ntp21']['one force out']
+    assert set(result.numbers['ntp21']) == {'one force out', 'one speed out'}
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
+def test_the_shorter_run_tries_the_vibration_of_later_slides(tmp_path: Path) -> None:
+    result = BENCHMARKS['recipes_later'](BenchmarkOptions(tmp_path, DATA, quick=True))
+    assert set(result.numbers) == {'references', 'MiniRocket', VIBRATION}
+    assert set(result.numbers[VIBRATION]) == {'by time'}
+    assert result.split == 'by time: trained on slides 1-30 of each surface, tested on the later ones'
+    assert [chart.name for chart in result.charts] == ['recipes_later.png']

@@ -1,0 +1,71 @@
+"""`texture benchmark_options`: run a benchmark; writes figures and a chart."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import time
+from functools import partial
+from pathlib import Path
+
+from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
+from texture_benchmarks.imported_data import importing_once
+from texture_benchmarks.result import BenchmarkOptions
+from texture_benchmarks.run_all import IMPORTED, LONG, run_all
+from texture_core.command_options import add_seed
+from texture_core.errors import InvalidData
+
+ALL = 'all'
+NO_DATA = 3  # exit code of a process
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the sub-command."""
+    parser.add_argument('name', help=f'one of {", ".join(BENCHMARKS)}, or {ALL}')
+    parser.add_argument('--out', type=Path, default=Path('docs/charts'), metavar='DIR', help='folder for the results')
+    parser.add_argument(
+        '--data',
+        type=Path,
+        default=os.environ.get('TEXTURE_DATA') or None,
+        metavar='DIR',
+        help='folder of the recorded data sets (DIR/biotac20); default: $TEXTURE_DATA',
+    )
+    parser.add_argument('--quick', action='store_true', help='fewer repetitions; not for publishing')
+    parser.add_argument('--long', action='store_true', help=f'with {ALL}: also {", ".join(sorted(LONG))}')
+    parser.add_argument(
+        '--duration', type=float, default=30.0, metavar='S', help='length of the long measurement of `load`, s'
+    )
+    add_seed(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run one benchmark, or all for which the data is there: 1 if one of these fails."""
+    benchmark_options = BenchmarkOptions(options.out, options.data, options.seed, options.quick, options.duration)
+    if options.name != ALL:
+        _run_one(options.name, benchmark_options)
+        return 0
+    began_s = time.monotonic()
+    names = [name for name in BENCHMARKS if options.long or name not in LONG]
+    with importing_once(benchmark_options, IMPORTED) as sharing:
+        codes = run_all(names, partial(_run_to_exit_code, benchmark_options=sharing))
+    failed = [name for name, code in codes.items() if code not in (0, NO_DATA)]
+    without = [name for name, code in codes.items() if code == NO_DATA]
+    print(f'{list(codes.values()).count(0)} benchmarks in {(time.monotonic() - began_s) / 60:.1f} min')
+    print(f'left out, for their data is missing: {", ".join(without) or "none"}; failed: {", ".join(failed) or "none"}')
+    return int(bool(failed))
+
+
+def _run_to_exit_code(name: str, benchmark_options: BenchmarkOptions) -> int:
+    try:
+        _run_one(name, benchmark_options)
+    except InvalidData as error:
+        print(f'{name}: left out: {error}', flush=True)
+        return NO_DATA
+    return 0
+
+
+def _run_one(name: str, benchmark_options: BenchmarkOptions) -> None:
+    began_s = time.monotonic()
+    result, path = run_benchmark(name, benchmark_options)
+    took = f'{name}, {time.monotonic() - began_s:.0f} s: {result.measured}'
+    print('\n  '.join([took, *map(str, (path, *result.charts))]), flush=True)

@@ -1,0 +1,109 @@
+"""The slides of an experiment, simulated, and their features."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_benchmarks.papers.protocol import RecognitionTask, View, Visits
+from texture_core.arrays import Array, Samples
+from texture_core.catalogue import find
+from texture_estimation.learners.learner import Codes
+from texture_estimation.search.feature_cache import FeatureCache
+from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
+from texture_features.feature_set import FeatureSet
+from texture_simulation.offline import simulate_slide_streams
+from texture_simulation.scene import Scene
+from texture_simulation.sensors.catalogue import SENSORS
+
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Slides:
+    """Trials over known surfaces, in a random order.
+
+    Parameters
+    ----------
+    surfaces
+        Names.
+    codes : (n_slides,)
+        Number of the surface of each.
+    conditions : (n_slides,) of text
+        How it was touched.
+    views
+        What each consists of.
+    """
+
+    surfaces: tuple[str, ...]
+    codes: Codes
+    conditions: NDArray[np.str_]
+    views: tuple[SlideArrays, ...]
+
+    @cached_property
+    def _caches(self) -> tuple[FeatureCache, ...]:
+        return tuple(FeatureCache(view) for view in self.views)
+
+    def extract(self, feature_set: FeatureSet, views: Sequence[int] = ()) -> tuple[Array, Codes]:
+        """Return the features of all windows, of some or all views, (n, n_features), and their slides, (n,)."""
+        chosen = [self._caches[number] for number in views or range(len(self.views))]
+        values = np.concatenate([cache.values(feature_set) for cache in chosen], axis=1)
+        return values, self.views[0](feature_set.windows).slides
+
+
+def gather(scene: Scene, task: RecognitionTask, seed: int, *, slow: bool) -> Slides:
+    """Return the slides of a task.
+
+    A slide is the same in all tasks that hold it: its randomness follows from seed, surface and condition.
+
+    Parameters
+    ----------
+    scene
+        What is touched.
+    task
+        How.
+    seed
+        Of everything random.
+    slow
+        Whether the slow stream is needed.
+    """
+    surfaces = task.surfaces or tuple(scene.surfaces)
+    kinds = [(surface, visits) for surface in surfaces for visits in task.visits]
+    counts = [visits.count for _, visits in kinds]
+    order = np.random.default_rng(seed).permutation(sum(counts))
+    codes = np.repeat([surfaces.index(surface) for surface, _ in kinds], counts)[order]
+    conditions = np.repeat([visits.condition for _, visits in kinds], counts)[order]
+    speed = np.repeat([float(visits.sliding.speed_m_s) for _, visits in kinds], counts)[order]
+    force = np.repeat([float(visits.sliding.force_n) for _, visits in kinds], counts)[order]
+    rates = {stream.topic: stream.rate_hz for stream in find(SENSORS, scene.sensor, 'sensor model').streams}
+    views = []
+    for number in range(len(task.visits[0].views)):
+        parts = [_measured(scene, surface, visits, number, seed, slow=slow) for surface, visits in kinds]
+        streams = {
+            topic: ArrayStream(np.concatenate([part[topic] for part in parts])[order], rates[topic])
+            for topic in parts[0]
+        }
+        views.append(SlideArrays(streams, np.asarray(surfaces)[codes], speed, force))
+    return Slides(surfaces, codes, conditions, tuple(views))
+
+
+def _measured(
+    scene: Scene, surface: str, visits: Visits, number: int, seed: int, *, slow: bool
+) -> Mapping[str, Samples]:
+    view: View = visits.views[number]
+    kind = find(SENSORS, scene.sensor, 'sensor model')
+    # A window is cut where every stream has samples: the slowest decides, and a slide ends with one of its samples.
+    slowest_hz = min(stream.rate_hz for stream in kind.streams[: None if slow else 1])
+    duration_s = math.ceil(visits.sliding.duration_s * slowest_hz - ROUNDING) / slowest_hz
+    place = list(scene.surfaces).index(surface)
+    rng = np.random.default_rng([seed, place, zlib.crc32(visits.condition.encode()), number])
+    sliding = replace(
+        visits.sliding, duration_s=duration_s, direction_rad=visits.sliding.direction_rad + view.turned_rad
+    )
+    return simulate_slide_streams(scene, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)

@@ -1,0 +1,91 @@
+import threading
+import time
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from texture_msgs import msg
+
+from texture_bringup.command import main
+from texture_core.features import FeatureVector
+from texture_core.ros.conversions import to_msg
+from texture_core.ros.qos import FEATURE_QOS
+from texture_estimation.classification.training import train
+from texture_estimation.nodes.classifier import Classifier
+from texture_estimation.recipe import load_recipe
+from texture_features.labelled_features import LabelledFeatures
+
+pytestmark = pytest.mark.ros
+DEADLINE_S = 60.0
+NAMES = ('a', 'b', 'c')
+
+
+@pytest.fixture
+def model(tmp_path):
+    rng = np.random.default_rng(0)
+    values = np.repeat([[0.0, 0, 0], [9.0, 0, 0]], 24, axis=0) + rng.normal(size=(48, 3))
+    labels = np.repeat(['cork', 'felt'], 24)
+    groups = np.array([f'{label}/{k // 6}' for k, label in enumerate(labels)])
+    examples = LabelledFeatures(values, labels, groups, NAMES, 'kind', 0.5, 0.25)
+    return train(load_recipe('default'), examples).save(tmp_path / 'model')
+
+
+@pytest.fixture
+def classifier(model, monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '70')
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    rclpy.init(args=['--ros-args', '-p', f'model:={model}'])
+    node, executor = Classifier(), SingleThreadedExecutor()
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin, name='classifier')
+    thread.start()
+    yield node
+    executor.shutdown()
+    thread.join()
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def feel(node, exploration_id):
+    """Publish windows of a new texture as an extractor does, until the classifier has them all."""
+    peer = rclpy.create_node('peer')
+    publisher = peer.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
+    estimates = []
+    subscription = peer.create_subscription(msg.TextureEstimate, 'texture', estimates.append, 10)
+    executor = SingleThreadedExecutor()
+    executor.add_node(peer)
+    deadline = time.monotonic() + DEADLINE_S
+    try:
+        while not (publisher.get_subscription_count() and peer.count_publishers('texture')):
+            assert time.monotonic() < deadline
+            executor.spin_once(timeout_sec=0.05)
+        for k, row in enumerate(np.random.default_rng(1).normal((0, 9, 0), size=(8, 3))):
+            vector = FeatureVector(k * 10**8, exploration_id, 0.5, 0.1, NAMES, row, feature_set='kind')
+            publisher.publish(to_msg(vector))
+        publisher.publish(to_msg(FeatureVector(10**9, exploration_id, 0.0, 0.1, last=True)))
+        while not (estimates and estimates[-1].final):
+            assert time.monotonic() < deadline
+            executor.spin_once(timeout_sec=0.05)
+    finally:
+        executor.shutdown()
+        peer.destroy_subscription(subscription)
+        peer.destroy_node()
+    return estimates[-1].label
+
+
+def test_a_texture_is_taught_and_untaught_from_the_command_line(classifier, capsys):
+    assert feel(classifier, 'slide-1') in ('cork', 'felt', '')
+    assert main(['add', 'silk']) == 0
+    assert "learnt 'silk' from 'slide-1'; 3 textures known" in capsys.readouterr().out
+    assert feel(classifier, 'slide-2') == 'silk'
+    assert main(['add', 'silk', 'slide-9']) == 2
+    assert 'Can be added: slide-1, slide-2' in capsys.readouterr().err
+    assert main(['add', '--undo']) == 0
+    assert feel(classifier, 'slide-3') != 'silk'
+
+
+@pytest.mark.parametrize('arguments', [['add'], ['add', 'silk', '--undo']])
+def test_what_to_learn_must_be_said(arguments, capsys):
+    assert main(arguments) == 2
+    assert 'name of the texture' in capsys.readouterr().err

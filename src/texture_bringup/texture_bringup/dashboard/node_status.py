@@ -1,0 +1,43 @@
+"""One light a node: green, yellow or red; a node that has fallen silent is red."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+SILENT_S = 5.0  # nodes report once a second
+MAX_LIGHTS = 64
+MAX_CHARACTERS = 300
+COLOURS = {'OK': 'green', 'WARN': 'yellow', 'ERROR': 'red'}
+
+
+@dataclass(frozen=True)
+class NodeStatus:
+    """What a node said last, and when (monotonic clock, s)."""
+
+    level: str
+    message: str
+    time_s: float
+
+
+class NodeStatuses:
+    """Keep what each node said last."""
+
+    def __init__(self) -> None:
+        self._lights: dict[str, NodeStatus] = {}
+
+    def update(self, name: str, level: str, message: str, time_s: float) -> None:
+        """Take note of a report; when there are too many names, the one silent for longest is forgotten."""
+        self._lights.pop(name, None)
+        self._lights[name[:MAX_CHARACTERS]] = NodeStatus(level, message[:MAX_CHARACTERS], time_s)
+        if len(self._lights) > MAX_LIGHTS:
+            del self._lights[next(iter(self._lights))]
+
+    def shown(self, time_s: float) -> list[dict[str, str]]:
+        """Return name, colour and sentence of each light, by name."""
+        return [{'name': name, **_look(light, time_s - light.time_s)} for name, light in sorted(self._lights.items())]
+
+
+def _look(light: NodeStatus, age_s: float) -> dict[str, str]:
+    if age_s > SILENT_S:
+        return {'colour': 'red', 'message': f'silent for {age_s:.0f} s; it said last: {light.message}'}
+    return {'colour': COLOURS.get(light.level, 'red'), 'message': light.message}

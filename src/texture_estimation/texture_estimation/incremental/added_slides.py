@@ -1,0 +1,86 @@
+"""Slides added to a model after its training, stored in the folder NAME.added beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.errors import ModelMismatch
+from texture_core.files import MB
+from texture_core.plain_data import load_json
+from texture_estimation import model_files
+
+FORMAT = 1
+MAX_BYTES = 20 * MB  # of a file; a slide of a minute with 200 features has 5
+
+
+@dataclass(frozen=True, eq=False)
+class AddedSlide:
+    """One slide over a known surface: its label, and the features of its windows, (n, n_features)."""
+
+    label: str
+    exploration_id: str
+    values: Array
+
+
+def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, feature_set: str) -> Path:
+    """Write an added slide of a model by its number, from 1, atomically."""
+    content = {
+        'format': FORMAT,
+        'feature_set': feature_set,
+        'label': added_slide.label,
+        'exploration_id': added_slide.exploration_id,
+        'values': added_slide.values.tolist(),
+    }
+    path = _folder(model) / f'{number:05d}.json'
+    path.parent.mkdir(parents=True, exist_ok=True)
+    model_files.replace(path, (json.dumps(content) + '\n').encode())
+    return path
+
+
+def remove_added_slide(model: str | Path, number: int) -> None:
+    """Remove an added slide if it exists."""
+    (_folder(model) / f'{number:05d}.json').unlink(missing_ok=True)
+
+
+def read_added_slides(model: str | Path, feature_set: str, names: Sequence[str]) -> tuple[AddedSlide, ...]:
+    """Return the added slides of a model in their order; none if there is no folder.
+
+    They hold features, so they stay valid when the model is trained anew with the same features.
+
+    Raises
+    ------
+    ModelMismatch
+        If one is damaged, or holds features of another kind.
+    """
+    return tuple(_read(path, feature_set, len(names)) for path in sorted(_folder(model).glob('*.json')))
+
+
+def _read(path: Path, feature_set: str, n_features: int) -> AddedSlide:
+    try:
+        content = load_json(path, MAX_BYTES)
+        values = np.array(content['values'], dtype=np.float64)
+        added_slide = AddedSlide(str(content['label']), str(content['exploration_id']), values)
+        of = str(content['feature_set'])
+        if not np.isfinite(values).all():
+            raise ValueError('it holds values that are not finite')
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+        raise ModelMismatch(
+            f"added slide '{path}' cannot be read: {type(error).__name__}: {error}; remove it and add it again"
+        ) from error
+    if of != feature_set or values.ndim != 2 or values.shape[1] != n_features or not added_slide.label:
+        raise ModelMismatch(
+            f"added slide '{path}' is of the features '{of}', the model has '{feature_set}'; "
+            f"move the folder '{path.parent.name}' away, or use the model to which it was added"
+        )
+    return added_slide
+
+
+def _folder(model: str | Path) -> Path:
+    stem = model_files.stem(model)
+    return stem.with_name(f'{stem.name}.added')

@@ -1,0 +1,38 @@
+"""Protocol of roughness regressors: parameters that fit graded windows and export a predictor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_estimation.learners.learner import Codes
+
+GRADES: Array = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
+SMOOTH, ROUGH = 1.0, 5.0
+
+
+class RegressorPredictor(Protocol):
+    """Predict grades of windows, as plain arrays."""
+
+    def __call__(self, values: Array) -> tuple[Array, Array]:
+        """Return grade and its standard deviation, (...,) each, of (..., n_features).
+
+        The grade is NaN where the regressor has no answer; the standard deviation is 0 if the regressor does not know
+        it.
+        """
+
+
+class RoughnessRegressor(Protocol):
+    """Frozen parameters of a regressor."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
+        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,); return plain arrays."""
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> RegressorPredictor:
+        """Return the predictor made from the stored parameters."""

@@ -1,1 +1,0 @@
-"""What judges a half in a search, one learner a file; `catalogue` lists them."""

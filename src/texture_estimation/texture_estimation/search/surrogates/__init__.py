@@ -1,0 +1,1 @@
+"""What classifies a half in a search, one learner a file; `catalogue` lists them."""

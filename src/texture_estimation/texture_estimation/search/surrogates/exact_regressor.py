@@ -1,0 +1,19 @@
+"""The head itself, fitted to each half as `train` would."""
+
+from __future__ import annotations
+
+from texture_core.arrays import Array
+from texture_estimation.learners.learner import Codes
+from texture_estimation.roughness.regressor import RoughnessRegressor
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.surrogates.regressor_surrogate import GradesOfHalf
+
+
+def exact_grades(regressor: RoughnessRegressor, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
+    """Return what fits the head to a half, standardisation included, and lets its exported predictor grade."""
+
+    def graded(training: Mask) -> Array:
+        parameters = regressor.fit(values[training], grades[training], textures[training])
+        return regressor.predictor(parameters)(values)[0]
+
+    return graded

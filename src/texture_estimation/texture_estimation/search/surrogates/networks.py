@@ -1,0 +1,120 @@
+"""Small neural networks trained together, from few examples and in few steps: quick, and good enough to compare by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+from texture_estimation.learners.learner import Codes
+from texture_estimation.search.halves import Mask
+
+STEPS = 10
+FIRST_DAMPING, MORE, LESS = 1e-2, 10.0, 0.2
+
+
+@dataclass(eq=False)
+class SurrogateNetworks:
+    """Networks of one hidden layer and one output each, over the same features: out · tanh(hidden x + bias) + out_bias.
+
+    Parameters
+    ----------
+    hidden : (n_networks, n_features, n_hidden)
+    bias, out : (n_networks, 1, n_hidden)
+    out_bias : (n_networks, 1)
+    """
+
+    hidden: Array
+    bias: Array
+    out: Array
+    out_bias: Array
+
+    @classmethod
+    def fitted(cls, values: Array, targets: Array, n_hidden: int, rng: np.random.Generator) -> SurrogateNetworks:
+        """Return networks after their training.
+
+        Parameters
+        ----------
+        values : (n_networks, n, n_features), or (1, n, n_features) if all train on the same examples
+        targets : (n_networks, n)
+        n_hidden
+            Neurons of the hidden layer.
+        rng
+            Draws the first weights.
+        """
+        networks = cls.random(len(targets), values.shape[-1], n_hidden, rng)
+        networks.train(values, targets, STEPS)
+        return networks
+
+    @classmethod
+    def random(cls, n_networks: int, n_features: int, n_hidden: int, rng: np.random.Generator) -> SurrogateNetworks:
+        """Return networks before their training, alike for all."""
+        hidden = rng.normal(size=(1, n_features, n_hidden)) / np.sqrt(n_features)
+        bias = rng.uniform(-1.0, 1.0, (1, 1, n_hidden))
+        out = rng.normal(size=(1, 1, n_hidden)) / np.sqrt(n_hidden)
+        copies = (n_networks, 1, 1)
+        return cls(np.tile(hidden, copies), np.tile(bias, copies), np.tile(out, copies), np.full((n_networks, 1), 0.5))
+
+    def outputs(self, standard: Array) -> Array:
+        """Return the output of each network, (n, n_networks), of standardised values, (n, n_features)."""
+        n_networks, n_features, n_hidden = self.hidden.shape
+        active = standard @ self.hidden.transpose(1, 0, 2).reshape(n_features, -1)
+        active += self.bias.reshape(-1)
+        np.tanh(active, out=active)
+        active *= self.out.reshape(-1)
+        outputs: Array = np.add.reduce(active.reshape(len(standard), n_networks, n_hidden), axis=-1)
+        outputs += self.out_bias[:, 0]
+        return outputs
+
+    def train(self, values: Array, targets: Array, steps: int) -> None:
+        """Make Levenberg-Marquardt steps towards targets (n_networks, n) of values (n_networks or 1, n, n_features).
+
+        There are fewer examples than weights, mostly. So with the Jacobian J and the residual r, the step
+        (JᵀJ + μ)⁻¹ Jᵀ r is taken as Jᵀ (J Jᵀ + μ)⁻¹ r, where J Jᵀ is a sum of products of small matrices.
+        """
+        n_networks, n = targets.shape
+        products = values @ values.swapaxes(-1, -2) + 1.0
+        damping = np.full((n_networks, 1, 1), FIRST_DAMPING * n)
+        active, residual = self._forward(values, targets)
+        error = (residual * residual).sum(axis=1)
+        diagonal = np.arange(n)
+        for _ in range(steps):
+            slopes = (1.0 - active * active) * self.out
+            gram = slopes @ slopes.swapaxes(-1, -2)
+            gram *= products
+            gram += active @ active.swapaxes(-1, -2)
+            gram += 1.0
+            gram[:, diagonal, diagonal] += damping[..., 0]
+            dual = np.linalg.solve(gram, residual[..., None])
+            weighted = slopes * dual
+            moved = SurrogateNetworks(
+                self.hidden + values.swapaxes(-1, -2) @ weighted,
+                self.bias + weighted.sum(axis=1, keepdims=True),
+                self.out + dual.swapaxes(-1, -2) @ active,
+                self.out_bias + dual.sum(axis=1),
+            )
+            new_active, new_residual = moved._forward(values, targets)
+            new_error = (new_residual * new_residual).sum(axis=1)
+            better = new_error < error
+            damping *= np.where(better, LESS, MORE)[:, None, None]
+            self._take(moved, better)
+            active = np.where(better[:, None, None], new_active, active)
+            residual = np.where(better[:, None], new_residual, residual)
+            error = np.where(better, new_error, error)
+
+    def _forward(self, values: Array, targets: Array) -> tuple[Array, Array]:
+        active = np.tanh(values @ self.hidden + self.bias)
+        return active, targets - (active * self.out).sum(axis=-1) - self.out_bias
+
+    def _take(self, other: SurrogateNetworks, which: Mask) -> None:
+        for name in ('hidden', 'bias', 'out', 'out_bias'):
+            getattr(self, name)[which] = getattr(other, name)[which]
+
+
+def sample_rows(codes: Codes, training: Mask, most: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Return the rows of `most` learnt examples of each label, of the rarest one all, (n_labels, count)."""
+    members = [np.flatnonzero(training & (codes == label)) for label in np.unique(codes)]
+    count = min(most, *map(len, members))
+    return np.array([rng.choice(of_label, count, replace=False) for of_label in members])

@@ -1,0 +1,98 @@
+"""One slide in one picture: signal, spectrum, growing evidence, and how often such decisions are right."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.signal import welch
+
+from texture_core.arrays import AnyArray, Array, Samples
+from texture_core.estimates import TextureEstimate
+from texture_evaluation.charts import COLOURS, chart, draw_confusion, line_styles
+
+SHOWN_LABELS = 4
+SHOWN_S = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class SlideOverview:
+    """One slide from the first sample to the decision, and how often such decisions are right.
+
+    Parameters
+    ----------
+    source
+        Where the signal comes from, in words, such as 'simulated TSF-85'.
+    surface
+        What the finger slid over.
+    samples : (n_samples,)
+        One channel of the slide.
+    rate_hz, unit
+        Of the samples.
+    estimates
+        The growing evidence, after each window.
+    labels, table
+        Confusion of test windows, as `metrics.confusion` counts it.
+    others
+        Slides over other surfaces, (n_samples,) each, whose spectra are drawn beside for comparison.
+    """
+
+    source: str
+    surface: str
+    samples: Array
+    rate_hz: float
+    unit: str
+    estimates: Sequence[TextureEstimate]
+    labels: Sequence[str]
+    table: AnyArray
+    others: Mapping[str, Array] = field(default_factory=dict)
+
+
+def picture(overview: SlideOverview, path: str | Path) -> Path:
+    """Draw one slide in four panels: signal, spectrum, evidence and confusion."""
+    with chart(path, (11.0, 8.0), f'How a slide over {overview.surface} is recognised ({overview.source})') as figure:
+        (signal, spectrum), (evidence, table) = figure.subplots(2, 2)
+        _signal(signal, overview)
+        _spectrum(spectrum, overview)
+        _evidence(evidence, overview)
+        draw_confusion(table, overview.labels, overview.table)
+        table.set_title('4. All test slides: what each single window was taken for')
+    return Path(path)
+
+
+def _signal(axes: Any, overview: SlideOverview) -> None:
+    shown = overview.samples[: round(SHOWN_S * overview.rate_hz)]
+    axes.plot(np.arange(len(shown)) / overview.rate_hz, shown, color=COLOURS[0], linewidth=0.8)
+    axes.set(xlabel='time since the slide began (s)', ylabel=f'signal ({overview.unit or "no unit"})')
+    axes.set_title(f'1. The fingertip vibrates while it slides: the first {SHOWN_S} s')
+
+
+def _spectrum(axes: Any, overview: SlideOverview) -> None:
+    slides = {overview.surface: overview.samples, **overview.others}
+    for (name, slide), colour in zip(slides.items(), COLOURS, strict=False):
+        samples: Samples = np.asarray(slide, dtype=float)
+        n_segment = min(len(samples), round(overview.rate_hz / 2))
+        hertz, power = welch(samples, fs=overview.rate_hz, nperseg=n_segment)
+        own = name == overview.surface
+        axes.semilogy(hertz[1:], power[1:], color=colour, linewidth=1.4 if own else 0.7, label=name, zorder=2 + own)
+    unit = f'{overview.unit}²/Hz' if overview.unit else '1/Hz'
+    axes.set(xlabel='frequency (Hz)', ylabel=f'power density ({unit})')
+    axes.set_title('2. Its spectrum is the mark of the surface')
+    if overview.others:
+        axes.legend(loc='upper right')
+
+
+def _evidence(axes: Any, overview: SlideOverview) -> None:
+    labels = overview.estimates[-1].labels
+    seconds = [estimate.evidence_s for estimate in overview.estimates]
+    probabilities = 100 * np.array([estimate.probabilities for estimate in overview.estimates])
+    shown = np.argsort(-probabilities.max(axis=0))[:SHOWN_LABELS]
+    for column, style in zip(sorted(shown, key=lambda c: -probabilities[-1, c]), line_styles(), strict=False):
+        axes.plot(seconds, probabilities[:, column], marker='.', label=labels[column], **style)
+    axes.set(xlabel='sliding time used (s)', ylabel='probability (%)', ylim=(-3, 103))
+    axes.set_xlim(left=0)
+    axes.set_title(f'3. Evidence grows until it says: {overview.estimates[-1].label}')
+    axes.legend(loc='center right', title='surface')

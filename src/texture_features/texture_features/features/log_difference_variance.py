@@ -1,0 +1,31 @@
+"""Logarithm of the variance of the steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_features.feature import WindowBatch, centred, first_difference, power
+
+
+@dataclass(frozen=True)
+class LogDifferenceVariance:
+    """Logarithm of the variance of the steps from sample to sample of each channel."""
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    floor: float = param(
+        1e-20,
+        'Power added before the logarithm, unit²; use 1/12 for signals quantised to integers.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(variance of the steps + floor)."""
+        return np.log(power(centred(first_difference(windows.rows))) + self.floor)[..., None]

@@ -1,0 +1,145 @@
+"""One slide: which time is covered, and how fast and hard the finger moved."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+from texture_core.exploration import ExplorationState
+from texture_core.signal import NANOSECONDS
+
+# Two slide states at most so far apart cover the time between them.
+LINK_NS = NANOSECONDS // 2
+# No promise is believed for longer: a wrong one must not make millions of windows.
+MAX_STEADY_S = 3600.0
+MAX_STATES = 20_000
+LOST_SHARE = 0.5  # of the mean force; below, a state without promise is one in the air
+
+
+@dataclass(frozen=True)
+class CoveredSpan:
+    """A covered stretch of time with the mean speed and force in it."""
+
+    start_ns: int
+    end_ns: int
+    speed_m_s: float
+    force_n: float
+
+
+class SlideCoverage:
+    """The covered time of consecutive `slide` states, handed out window by window.
+
+    After a state that promises nothing, though others did, the time up to the next state is not covered: the finger has
+    lost the surface or turns. If its force is far below that of the slide so far, the finger is in the air, and what is
+    left of the promise is not covered either; windows that were already handed out on it are not taken back.
+
+    All it says depends on the order of the states alone, never on when they arrived: the mean speed and force of a
+    window are those of the shortest beginning of the states that covers it.
+
+    Parameters
+    ----------
+    state
+        The first slide state.
+    length_ns, hop_ns, skip_ns
+        Of the windows; `skip_ns` is left out at the start.
+    """
+
+    def __init__(self, state: ExplorationState, length_ns: int, hop_ns: int, skip_ns: int) -> None:
+        self.exploration_id = state.exploration_id
+        self.surface = state.surface
+        self.start_ns = state.stamp_ns
+        self.ended = False
+        self.skipped = 0
+        self._length_ns = length_ns
+        self._hop_ns = hop_ns
+        self._next_ns = state.stamp_ns + skip_ns
+        self._intervals: deque[list[int]] = deque()
+        # stamp, end of the covered time known with this state, speed, force
+        self._states: deque[tuple[int, int, float, float]] = deque(maxlen=MAX_STATES)
+        self._promising = False
+        self._withdrawn = False
+        self._force = _Mean()
+        self.add(state)
+
+    def add(self, state: ExplorationState) -> bool:
+        """Take the next slide state; return False, and ignore it, if it is older than the last one."""
+        stamp = state.stamp_ns
+        start = stamp
+        if self._states:
+            before = self._states[-1][0]
+            if stamp < before:
+                return False
+            start = before if stamp - before <= LINK_NS and not self._withdrawn else stamp
+        self._promising |= state.steady_s > 0
+        self._cover(start, stamp + _steady_ns(state.steady_s))
+        self._withdrawn = self._promising and not state.steady_s > 0
+        if self._withdrawn and state.force_n < LOST_SHARE * self._force.value:
+            self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
+        self._force.add(state.force_n, float(state.steady_s > 0))
+        self._states.append((stamp, self._intervals[-1][1], state.speed_m_s, state.force_n))
+        return True
+
+    @property
+    def covered_ns(self) -> int:
+        """End of the covered time."""
+        return self._intervals[-1][1]
+
+    def window(self) -> CoveredSpan | None:
+        """Return the present window if it is covered, else None; windows that never can be are passed over."""
+        while True:
+            start, end = self._intervals[0]
+            if self._next_ns < start:
+                self._next_ns += -(-(start - self._next_ns) // self._hop_ns) * self._hop_ns
+            if self._next_ns + self._length_ns <= end:
+                return self._span(self._next_ns, self._next_ns + self._length_ns)
+            if len(self._intervals) == 1:
+                return None
+            self._intervals.popleft()
+
+    def advance(self) -> None:
+        """Go on to the next window."""
+        self._next_ns += self._hop_ns
+
+    def _cover(self, start: int, end: int) -> None:
+        if self._intervals and start <= self._intervals[-1][1]:
+            self._intervals[-1][1] = max(self._intervals[-1][1], end)
+        else:
+            self._intervals.append([start, end])
+
+    def _span(self, start: int, end: int) -> CoveredSpan:
+        states = self._states
+        while len(states) > 1 and states[1][0] <= start and states[0][1] < end:
+            states.popleft()
+        speeds = _Mean()
+        forces = _Mean()
+        for number, (stamp, covered, speed, force) in enumerate(states):
+            enough = covered >= end
+            until = end if enough else min(states[number + 1][0], end)
+            weight = until - max(stamp, start)
+            speeds.add(speed, weight)
+            forces.add(force, weight)
+            if enough or until >= end:
+                break
+        return CoveredSpan(start, end, speeds.value, forces.value)
+
+
+class _Mean:
+    """Weighted mean of what is known."""
+
+    def __init__(self) -> None:
+        self._sum = 0.0
+        self._weight = 0.0
+
+    def add(self, value: float, weight: float) -> None:
+        if weight > 0 and math.isfinite(value):
+            self._sum += weight * value
+            self._weight += weight
+
+    @property
+    def value(self) -> float:
+        return self._sum / self._weight if self._weight else math.nan
+
+
+def _steady_ns(steady_s: float) -> int:
+    return round(min(steady_s, MAX_STEADY_S) * NANOSECONDS) if steady_s > 0 else 0
