@@ -3,6 +3,7 @@ import pytest
 from texture_core.errors import DeviceError, MotionRefused, UnknownName
 from texture_core.exploration import ExplorationRequest, Phase
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.arms.ur import UrArm
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
@@ -104,3 +105,7 @@ def test_an_arm_that_cannot_be_reached_refuses_in_a_sentence():
     with pytest.raises(MotionRefused, match='the arm is not ready: the arm does not answer'):
         explorer.begin('one', QUICK)
     assert explorer.fault() == 'not connected'
+
+
+def test_an_arm_that_is_not_connected_counts_nothing_and_ends_nothing():
+    assert Explorer(UrArm(), TouchParams(), SafetyLimits(), lambda state: None).arm_counts() == {}

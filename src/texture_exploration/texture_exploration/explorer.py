@@ -93,8 +93,9 @@ class Explorer:
 
     def arm_counts(self) -> Mapping[str, int]:
         """Return what the arm counts by itself, nothing if it counts nothing or cannot be reached."""
-        if isinstance(self.arm, Counting):
-            with contextlib.suppress(DeviceError):
+        with contextlib.suppress(DeviceError):
+            # Up to Python 3.11 also this check reads the property, which an arm that is not connected refuses.
+            if isinstance(self.arm, Counting):
                 return self.arm.counts
         return {}
 
