@@ -123,6 +123,18 @@ def test_the_dashboard_answers_line_by_line(controller):
     assert dashboard.receive(b'emulate offline soon\n').startswith(b"came 'soon'")
     dashboard.receive(b'emulate offline 1.5\n')
     assert offline == [1.5]
+    assert dashboard.receive(b'emulate drop deep\n') == b"came 'deep'; a number of metres is needed\n"
+
+
+def test_a_surface_that_drops_is_not_touched_any_more_until_it_is_back(controller):
+    dashboard = DashboardSession(controller, lambda _seconds: None)
+    plane = controller.robot.surface
+    pressed = plane.origin - (0.0, 0.0, 0.001)
+    forces = []
+    for drop in (b'0', b'0.012', b'0'):
+        dashboard.receive(b'emulate drop ' + drop + b'\n')
+        forces.append(float(plane.force_n(pressed, np.zeros(3))[2]))
+    assert forces == [pytest.approx(2.0), 0.0, pytest.approx(2.0)]
 
 
 def test_a_script_starts_when_its_last_line_is_there(controller):

@@ -13,10 +13,17 @@ STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no 
 
 
 class ContactPlane:
-    """Contact force on a finger at a position and velocity, in the base frame of the robot."""
+    """Contact force on a finger at a position and velocity, in the base frame of the robot.
+
+    Attributes
+    ----------
+    drop_m
+        The whole surface lies lower by this: set while the finger slides, the surface is lost as behind an edge.
+    """
 
     def __init__(self, params: UrControllerParams) -> None:
         self._params = params
+        self.drop_m = 0.0
         self.origin = np.array([params.surface_x_m, params.surface_y_m, params.surface_z_m])
 
     def force_n(self, position_m: Array, velocity_m_s: Array) -> Array:
@@ -48,6 +55,6 @@ class ContactPlane:
         slope_x = params.slope_x - bump * x / (width * width)
         slope_y = params.slope_y - bump * y / (width * width)
         steepness = math.sqrt(1.0 + slope_x * slope_x + slope_y * slope_y)
-        height = params.slope_x * x + params.slope_y * y + bump
+        height = params.slope_x * x + params.slope_y * y + bump - self.drop_m
         normal = np.array([-slope_x, -slope_y, 1.0]) / steepness
         return float(height - z) / steepness, normal

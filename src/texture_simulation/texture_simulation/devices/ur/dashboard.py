@@ -1,8 +1,9 @@
 """The dashboard server: one line asks, one line answers.
 
 Beside the real commands it obeys the fault switches of the emulator: `emulate protective stop`,
-`emulate offline SECONDS` and `emulate slow SECONDS`, which lets stops, the end of force control and zeroing be
-acknowledged so much later. `load NAME` and `play` start a program of somebody else, which takes no commands.
+`emulate offline SECONDS`, `emulate slow SECONDS`, which lets stops, the end of force control and zeroing be
+acknowledged so much later, and `emulate drop METRES`, which lowers the surface under the finger by so much.
+`load NAME` and `play` start a program of somebody else, which takes no commands.
 """
 
 from __future__ import annotations
@@ -98,15 +99,22 @@ class DashboardSession:
     def _emulate_slow(self, argument: str) -> str:
         return self._with_seconds(argument, partial(setattr, self._controller, 'acknowledge_s'), 'Acknowledging late')
 
+    def _emulate_drop(self, argument: str) -> str:
+        plane = self._controller.robot.surface
+        return self._with_number(argument, partial(setattr, plane, 'drop_m'), 'The surface was moved', 'metres')
+
+    def _with_seconds(self, argument: str, use: Callable[[float], None], done: str) -> str:
+        return self._with_number(argument, use, done, 'seconds')
+
     @staticmethod
-    def _with_seconds(argument: str, use: Callable[[float], None], done: str) -> str:
+    def _with_number(argument: str, use: Callable[[float], None], done: str, unit: str) -> str:
         try:
-            seconds = float(argument)
+            number = float(argument)
         except ValueError:
-            seconds = math.nan
-        if not 0 <= seconds < math.inf:
-            return f"came '{argument}'; a number of seconds is needed"
-        use(seconds)
+            number = math.nan
+        if not 0 <= number < math.inf:
+            return f"came '{argument}'; a number of {unit} is needed"
+        use(number)
         return done
 
 
@@ -144,4 +152,5 @@ ANSWERS: Mapping[str, Answer] = {
     'emulate protective stop': DashboardSession._emulate_stop,
     'emulate offline': DashboardSession._emulate_offline,
     'emulate slow': DashboardSession._emulate_slow,
+    'emulate drop': DashboardSession._emulate_drop,
 }
