@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +46,8 @@ class NodeProcess:
         Where its relative topics are.
     domain_id
         ROS domain; that of the environment if None.
+    program
+        Command to run instead of the installed executable.
     """
 
     def __init__(
@@ -56,10 +58,17 @@ class NodeProcess:
         *,
         namespace: str = '/',
         domain_id: int | None = None,
+        program: Sequence[str] = (),
     ) -> None:
         self.name = node
         given = [part for name, value in (parameters or {}).items() for part in ('-p', f'{name}:={json.dumps(value)}')]
-        self._command = [str(executable(package, node)), '--ros-args', '-r', f'__ns:={namespace}', *given]
+        self._command = [
+            *(program or [str(executable(package, node))]),
+            '--ros-args',
+            '-r',
+            f'__ns:={namespace}',
+            *given,
+        ]
         domain = {} if domain_id is None else {'ROS_DOMAIN_ID': str(domain_id)}
         self._environment = {**os.environ, 'PYTHONUNBUFFERED': '1', **domain}
         self._process: subprocess.Popen[bytes] | None = None

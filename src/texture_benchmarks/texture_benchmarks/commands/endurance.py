@@ -1,20 +1,33 @@
-"""`texture endurance`: explore on the emulated rig for hours under random fault injection."""
+"""`texture endurance`: explore on emulated devices for hours while faults are injected at random."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from texture_benchmarks.endurance.report import write
-from texture_benchmarks.endurance.requirements import check_requirements
+from texture_benchmarks.endurance.requirements import RequirementResult, check_requirements
+from texture_benchmarks.endurance.robot_report import write_robots
+from texture_benchmarks.endurance.robot_requirements import check_robots
+from texture_benchmarks.endurance.robot_run import RobotPlan, endure_robots
 from texture_benchmarks.endurance.run import EndurancePlan, endure
 from texture_core.command_options import add_seed
 from texture_core.errors import InvalidData
+
+ROBOT_SHARE = 2 / 3  # of the time of a run of both parts
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument('--duration', type=float, default=3600.0, metavar='S', help='how long, s (default: an hour)')
+    parser.add_argument(
+        '--part',
+        choices=('all', *PARTS),
+        default='all',
+        help='sensor: all nodes with emulated sensor and the simulated arm; robots: the explorer with the emulated UR, '
+        'the emulated hand and the simulated arm; all: a third of the time the first, then the second (default)',
+    )
     parser.add_argument('--quiet', type=float, default=20.0, metavar='S', help='mean time between two faults, s')
     parser.add_argument('--model', type=Path, help='trained model; one of simulated slides is trained if not given')
     parser.add_argument(
@@ -29,15 +42,37 @@ def run(options: argparse.Namespace) -> int:
         options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InvalidData(f"'{options.out}' cannot be used: {error.strerror}; name another with --out") from error
-    plan = EndurancePlan(options.duration, options.quiet, options.seed, options.model)
+    parts = tuple(PARTS) if options.part == 'all' else (options.part,)
+    results = [result for part in parts for result in PARTS[part](options, len(parts) > 1)]
+    return int(not all(result.holds for result in results))
+
+
+def _run_sensor(options: argparse.Namespace, shared: bool) -> Sequence[RequirementResult]:
+    duration_s = options.duration * (1 - ROBOT_SHARE if shared else 1.0)
+    plan = EndurancePlan(duration_s, options.quiet, options.seed, options.model)
     record = endure(plan, options.out / 'nodes.log', _say)
-    results = check_requirements(record)
+    return _report(check_requirements(record), write(record, options.out))
+
+
+def _run_robots(options: argparse.Namespace, shared: bool) -> Sequence[RequirementResult]:
+    plan = RobotPlan(options.duration * (ROBOT_SHARE if shared else 1.0), options.seed)
+    record = endure_robots(plan, options.out / 'explorers.log', _say)
+    return _report(check_robots(record), write_robots(record, options.out))
+
+
+def _report(results: Sequence[RequirementResult], files: Sequence[Path]) -> Sequence[RequirementResult]:
     for result in results:
         _say(f'{"holds" if result.holds else "FAILS"}: {result.asked}: {result.seen}')
-    for path in write(record, options.out):
+    for path in files:
         _say(f'  {path}')
-    return int(not all(result.holds for result in results))
+    return results
 
 
 def _say(line: str) -> None:
     print(line, flush=True)
+
+
+PARTS: Mapping[str, Callable[[argparse.Namespace, bool], Sequence[RequirementResult]]] = {
+    'sensor': _run_sensor,
+    'robots': _run_robots,
+}
