@@ -1,4 +1,5 @@
 import os
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -8,14 +9,13 @@ import pytest
 from texture_benchmarks.catalogue import BENCHMARKS
 from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION
 from texture_benchmarks.recipes.trial import (
-    SlideSignals,
+    at_rate,
     chronological_split,
     comparable,
     evaluate_extracted,
     every,
     extract_all,
     random_splits,
-    read_slide_signals,
     splits_by,
     try_recipe,
 )
@@ -25,6 +25,7 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import pareto_front
+from texture_recordings.slide_dataset import SlideDataset, cut_slide
 from texture_recordings.slides import LabelledSlide, find_slides
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
@@ -50,7 +51,7 @@ def test_one_value_after_the_other_is_left_out() -> None:
     assert splits == [({'b'}, {'a', 'c'}), ({'a', 'c'}, {'b'})]
 
 
-def slide_signals(gap: int = 0) -> SlideSignals:
+def slide_signals(gap: int = 0) -> LabelledSlide:
     """Return a tone of 100 Hz at 2200 Hz in batches of 44 samples; `gap` samples are lost after 0.5 s."""
     rows = [slice(start, start + 44) for start in range(0, 4400, 44)]
     tone = np.sin(2 * np.pi * 100.0 * np.arange(4400 + gap) / 2200.0).astype(np.float32)[:, None]
@@ -60,12 +61,12 @@ def slide_signals(gap: int = 0) -> SlideSignals:
         stamp = round(first / 2200.0 * NANOSECONDS)
         batches.append(TactileSignal(stamp, 's', ('a',), (), 2200.0, first, tone[first : first + 44]))
     state = ExplorationState(0, 'e', 'linear_slide', Phase.SLIDE, steady_s=2.0, speed_m_s=0.02, surface='cork')
-    return SlideSignals(SLIDES[0], {'signal': batches}, [state])
+    return replace(SLIDES[0], signals={'signal': batches}, states=[state])
 
 
 def test_another_rate_keeps_a_tone_and_its_losses() -> None:
     for gap in (0, 220):
-        batches = slide_signals(gap).at_rate('signal', 1000.0).signals['signal']
+        batches = at_rate(slide_signals(gap), 'signal', 1000.0).signals['signal']
         assert len(batches) == (2 if gap else 1)
         assert [after.first_sample - before.next_sample for before, after in pairwise(batches)] == [100] * bool(gap)
         assert sum(len(batch.samples) for batch in batches) == 2000
@@ -85,13 +86,13 @@ def test_recipes_are_compared_on_windows_of_one_length_without_what_the_session_
 
 def test_a_missing_input_is_named() -> None:
     with pytest.raises(InvalidData, match="no 'signal_static', which recipe 'kaboli-svm' needs"):
-        slide_signals().cut(load_recipe('kaboli-svm'))
+        cut_slide(slide_signals(), load_recipe('kaboli-svm').feature_set)
 
 
 def test_a_recipe_is_tested_on_slides_it_has_not_learnt(simulated: Path) -> None:
-    slides = read_slide_signals([simulated])
+    slides = SlideDataset.from_bags([simulated]).slides
     recipe = comparable(load_recipe('default'), 1000.0, of_motion=False)
-    outcome = try_recipe(recipe, slides, chronological_split([item.slide for item in slides], 4))
+    outcome = try_recipe(recipe, slides, chronological_split(slides, 4))
     assert len(outcome.results) == 6
     figures = outcome.numbers()
     assert figures['window_accuracy'] > 0.8
@@ -100,9 +101,9 @@ def test_a_recipe_is_tested_on_slides_it_has_not_learnt(simulated: Path) -> None
 
 
 def test_windows_learnt_from_may_overlap_where_those_tested_do_not(simulated: Path) -> None:
-    slides = read_slide_signals([simulated])
+    slides = SlideDataset.from_bags([simulated]).slides
     recipe = comparable(load_recipe('jamali-naive-bayes-5'), 1000.0, of_motion=False)
-    splits = chronological_split([item.slide for item in slides], 4)
+    splits = chronological_split(slides, 4)
     apart = extract_all(recipe, slides)
     plain = evaluate_extracted(recipe, apart, splits)
     more = evaluate_extracted(recipe, apart, splits, extract_all(every(0.25, recipe), slides), 0.25)

@@ -18,8 +18,8 @@ from texture_core.ros.conversions import to_msg
 from texture_estimation.model import TextureModel, load_model
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
-from texture_recordings.dataset import cut_slides
 from texture_recordings.importers.biotac20 import import_biotac20
+from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import find_slides
 
 pytestmark = pytest.mark.ros
@@ -29,7 +29,7 @@ Estimates = dict[str, list[TextureEstimate]]
 
 
 def offline(model: TextureModel, bags: Path, slides: str) -> Estimates:
-    cut = cut_slides(find_slides([bags], slides), model.recipe.feature_set)
+    cut = SlideDataset.from_bags([bags], slides).windows(model.recipe.feature_set)
     return {slide.exploration_id: run_model(model, events)[1] for slide, events in cut}
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import BENCHMARKS
-from texture_benchmarks.recipes.trial import SlideSignals, comparable, extract_features
+from texture_benchmarks.recipes.trial import comparable, extract_features
 from texture_benchmarks.result import BenchmarkOptions
 from texture_benchmarks.robustness.chart import Curve, Panel, robustness_chart, robustness_tables
 from texture_benchmarks.robustness.degradations import DEGRADATIONS, Degradation, breakdown, rms
@@ -84,7 +84,7 @@ def test_a_curve_breaks_down_where_it_crosses_nine_tenths_of_its_start(strengths
     assert breakdown(strengths, shares, 0.9) == (expected and pytest.approx(expected))
 
 
-def slide_signals(samples: np.ndarray, rate_hz: float, batch: int) -> SlideSignals:
+def slide_signals(samples: np.ndarray, rate_hz: float, batch: int) -> LabelledSlide:
     """Return a slide that came in batches."""
     slide = LabelledSlide(Path(), 'a/1', 'a', 1, 0, None)
     state = ExplorationState(0, 'a/1', 'linear_slide', Phase.SLIDE, steady_s=len(samples) / rate_hz, surface='a')
@@ -92,7 +92,7 @@ def slide_signals(samples: np.ndarray, rate_hz: float, batch: int) -> SlideSigna
         TactileSignal(0, 'pac', ('pac',), (), rate_hz, first, samples[first : first + batch].astype(np.float32))
         for first in range(0, len(samples), batch)
     ]
-    return SlideSignals(slide, {TOPIC: signals}, [state])
+    return dataclasses.replace(slide, signals={TOPIC: signals}, states=[state])
 
 
 def test_a_slide_is_degraded_as_a_whole_though_it_came_in_batches() -> None:
@@ -108,9 +108,7 @@ def test_a_slide_is_degraded_as_a_whole_though_it_came_in_batches() -> None:
 def test_recipes_of_the_same_features_count_the_same_windows_and_lost_ones_are_not_cut() -> None:
     rng = np.random.default_rng(0)
     slides = [
-        dataclasses.replace(
-            item, slide=dataclasses.replace(item.slide, surface=name, exploration_id=f'{name}/{number}', number=number)
-        )
+        dataclasses.replace(item, surface=name, exploration_id=f'{name}/{number}', number=number)
         for name, size in (('weak', 1.0), ('strong', 5.0))
         for number in range(3)
         for item in [slide_signals(size * rng.normal(size=(2000, 1)), RATE_HZ, 2000)]

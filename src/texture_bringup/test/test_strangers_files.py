@@ -60,10 +60,9 @@ from texture_features.labelled_features import LabelledFeatures
 from texture_launch.reader import all_arguments
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.cdr import TYPES, decode, encode, typestore
-from texture_recordings.dataset import cut_slides
 from texture_recordings.importers.biotac20 import import_biotac20
 from texture_recordings.importers.ntp21 import import_ntp21
-from texture_recordings.slides import find_slides
+from texture_recordings.slide_dataset import SlideDataset
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))
@@ -241,7 +240,7 @@ def make_recording(ending: str) -> Callable[[Path], None]:
 
 
 def read_slides(folder: Path) -> object:
-    return list(cut_slides(find_slides([folder / 'bag']), FeatureSet.load('default')))
+    return list(SlideDataset.from_bags([folder / 'bag']).windows(FeatureSet.load('default')))
 
 
 def read_message(kind: type) -> Callable[[Path], object]:

@@ -8,7 +8,7 @@ from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import cut_recording
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import read_bag
-from texture_recordings.dataset import extract_features
+from texture_recordings.slide_dataset import SlideDataset
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
 FEATURES = FeatureSet.load('vibration-and-taxels')
@@ -21,7 +21,7 @@ def test_a_bag_gives_the_features_of_the_recording_itself(simulated: Path) -> No
     }
     states = recording.pop('exploration')
     direct = [FEATURES.extract(event) for event in cut_recording(recording, states, FEATURES.windows)]
-    from_bag = extract_features([simulated / 'glass'], FEATURES)
+    from_bag = SlideDataset.from_bags([simulated / 'glass']).features(FEATURES)
     np.testing.assert_array_equal(from_bag.values, [vector.values for vector in direct if not vector.last])
     assert from_bag.names == direct[0].names
     # Windows of 0.5 s every 0.1 s in 1.2 s: the first starts at 0, the last at 0.7 s.
@@ -29,7 +29,7 @@ def test_a_bag_gives_the_features_of_the_recording_itself(simulated: Path) -> No
 
 
 def test_slides_are_chosen_for_each_surface(simulated: Path) -> None:
-    examples = extract_features([simulated], FEATURES, '2,5-6')
+    examples = SlideDataset.from_bags([simulated], '2,5-6').features(FEATURES)
     assert set(examples.groups) == {f'{surface}/{k}' for surface in set(examples.labels) for k in (2, 5, 6)}
 
 
@@ -38,13 +38,13 @@ def test_a_missing_input_is_named(simulated: Path, tmp_path: Path) -> None:
         for topic, log_ns, value in read_bag(simulated / 'glass', ('signal', 'exploration')):
             bag.write(topic, value, log_ns)
     with pytest.raises(ModelMismatch, match="has no 'signal_static', only signal; the windows need"):
-        extract_features([tmp_path / 'bag'], FEATURES)
+        SlideDataset.from_bags([tmp_path / 'bag']).features(FEATURES)
 
 
 def test_slides_without_a_whole_window_are_refused_with_a_sentence(tmp_path: Path) -> None:
     bags = write_simulated(tmp_path, SlidePlan(slides=1, slide_s=0.3), np.random.default_rng(0), surfaces=('glass',))
     with pytest.raises(InvalidData, match='none of the 1 slides has a whole window'):
-        extract_features(bags, FEATURES)
+        SlideDataset.from_bags(bags).features(FEATURES)
 
 
 def test_lost_samples_leave_windows_out_and_no_more(simulated: Path, tmp_path: Path) -> None:
@@ -52,7 +52,9 @@ def test_lost_samples_leave_windows_out_and_no_more(simulated: Path, tmp_path: P
         for count, (topic, log_ns, value) in enumerate(read_bag(simulated / 'glass')):
             if not (topic == 'signal' and 30 <= count < 40):
                 bag.write(topic, value, log_ns)
-    whole, broken = extract_features([simulated / 'glass'], FEATURES), extract_features([tmp_path / 'bag'], FEATURES)
+    whole, broken = (
+        SlideDataset.from_bags([path]).features(FEATURES) for path in (simulated / 'glass', tmp_path / 'bag')
+    )
     assert 0 < len(broken.labels) < len(whole.labels)
     kept = {row.tobytes() for row in whole.values}
     assert all(row.tobytes() in kept for row in broken.values)

@@ -9,7 +9,7 @@ from texture_core.resources import folder
 from texture_estimation.classification.training import train
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.evaluate import evaluate
-from texture_recordings.dataset import extract_features
+from texture_recordings.slide_dataset import SlideDataset
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 
@@ -20,7 +20,9 @@ def test_each_recipe_learns_distinct_simulated_surfaces_and_recognises_them(name
     # The slides are shorter than the windows of some papers.
     windows = replace(recipe.feature_set.windows, length_s=min(0.5, recipe.feature_set.windows.length_s))
     recipe = replace(recipe, feature_set=replace(recipe.feature_set, windows=windows))
-    examples = extract_features([simulated], replace(recipe.feature_set, windows=recipe.training_windows), '1-4')
+    examples = SlideDataset.from_bags([simulated], '1-4').features(
+        replace(recipe.feature_set, windows=recipe.training_windows)
+    )
     figures = evaluate(train(recipe, examples), [simulated], '5-6').as_json()
     assert figures['window_accuracy'] > 0.6
     assert figures['accuracy_at_s']['1.0'] > 0.6

@@ -12,7 +12,7 @@ from texture_recordings.bags import read_bag
 from texture_recordings.importers.catalogue import IMPORTS
 from texture_recordings.importers.fabricslide import import_fabricslide
 from texture_recordings.importers.ntp21 import evenly, import_ntp21
-from texture_recordings.slide_samples import read_slide_samples
+from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import find_slides
 
 PITCH_M = 10e-3
@@ -59,7 +59,7 @@ def run(rows: int, speed: int, force: int) -> np.ndarray:
 
 
 def conditions(bag: Path, topic: str) -> list[tuple[float, float]]:
-    return [(round(1000 * slide.speed_m_s), slide.force_n) for slide in read_slide_samples([bag], topic)]
+    return [(round(1000 * slide.speed_m_s), slide.force_n) for slide in SlideDataset.from_bags([bag]).samples(topic)]
 
 
 def test_slides_of_a_texture_are_numbered_by_speed_then_force(tmp_path: Path) -> None:
@@ -71,7 +71,7 @@ def test_slides_of_a_texture_are_numbered_by_speed_then_force(tmp_path: Path) ->
 
 def test_a_slide_is_even_at_its_rate_and_covers_all_of_its_time(tmp_path: Path) -> None:
     (bag,) = import_ntp21(make_ntp21(tmp_path / 'in'), tmp_path / 'out', slides='1', materials=['texture07'])
-    (slide,) = read_slide_samples([bag], 'signal')
+    (slide,) = SlideDataset.from_bags([bag]).samples('signal')
     batches = [value for _, _, value in read_bag(bag, ('signal',))]
     assert lost_samples(batches) == 0
     assert (slide.rate_hz, len(slide.channels), len(slide.before)) == (320.0, 9, 0)
@@ -88,7 +88,7 @@ def test_a_slow_wave_passes_the_change_of_rate_unharmed() -> None:
 
 def test_runs_of_a_fabric_are_numbered_by_direction_force_speed_and_repeat(tmp_path: Path) -> None:
     board, canvas = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out')
-    slides = read_slide_samples([canvas], 'signal_static')
+    slides = SlideDataset.from_bags([canvas]).samples('signal_static')
     assert [slide.slide.exploration_id for slide in slides][:5] == [
         'Canvas/F120/V-10/0', 'Canvas/F120/V-10/1', 'Canvas/F120/V-50/0', 'Canvas/F120/V-50/1', 'Canvas/F150/V-10/0',
     ]  # fmt: skip
@@ -99,7 +99,7 @@ def test_runs_of_a_fabric_are_numbered_by_direction_force_speed_and_repeat(tmp_p
 
 def test_speeding_up_is_contact_and_no_slide(tmp_path: Path) -> None:
     (canvas,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Canvas'])
-    for slide in read_slide_samples([canvas], 'signal_static'):
+    for slide in SlideDataset.from_bags([canvas]).samples('signal_static'):
         assert slide.distance_m == pytest.approx(0.5, abs=2e-3)
         assert len(slide.before) / slide.rate_hz * slide.speed_m_s == pytest.approx(0.047, abs=2e-3)
 
@@ -107,7 +107,7 @@ def test_speeding_up_is_contact_and_no_slide(tmp_path: Path) -> None:
 def test_the_line_of_a_printed_grating_stands_at_one_over_its_pitch_at_every_speed(tmp_path: Path) -> None:
     (board,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Board10mm'])
     bands = SpatialBands(bands=40, longest_m=0.05, shortest_m=2.5e-3, floor=1e-3)
-    for slide in read_slide_samples([board], 'signal_static'):
+    for slide in SlideDataset.from_bags([board]).samples('signal_static'):
         highest = bands(slide.windows()).argmax(axis=-1)
         assert bands.edges_per_m[highest] == pytest.approx(1 / PITCH_M, rel=0.1)
 
@@ -148,4 +148,4 @@ def test_wrong_sources_names_numbers_and_channels_are_refused_with_a_sentence(tm
 def test_a_slide_without_the_topic_is_refused(tmp_path: Path) -> None:
     bags = import_ntp21(make_ntp21(tmp_path / 'in'), tmp_path / 'out', slides='1')
     with pytest.raises(InvalidData, match='name another topic'):
-        read_slide_samples(bags, 'signal_static')
+        SlideDataset.from_bags(bags).samples('signal_static')

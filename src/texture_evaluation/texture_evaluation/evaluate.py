@@ -21,8 +21,8 @@ from texture_estimation.model import TextureModel, load_model
 from texture_evaluation import metrics
 from texture_evaluation.metrics import SlideResult
 from texture_features.windowing.windows import WindowEvent
-from texture_recordings.dataset import cut_slides, no_window
-from texture_recordings.slides import LabelledSlide, find_slides
+from texture_recordings.slide_dataset import SlideDataset, no_window
+from texture_recordings.slides import LabelledSlide
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,11 +112,30 @@ def evaluate(
     InvalidData
         If a bag cannot be read or no slide is usable.
     """
-    chosen = find_slides(bags, slides, namespace)
-    tested = {slide: _test(model, slide, events) for slide, events in cut_slides(chosen, model.recipe.feature_set)}
+    return evaluate_dataset(model, SlideDataset.from_bags(bags, slides, namespace, model.recipe.feature_set.topics))
+
+
+def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationReport:
+    """Return how a model does on labelled slides.
+
+    Parameters
+    ----------
+    model
+        Whose feature set cuts and describes the windows.
+    dataset
+        The slides; surfaces that were not in the training set are unknown ones.
+
+    Raises
+    ------
+    ModelMismatch
+        If inputs, rates or channels are not those that the model was trained on.
+    InvalidData
+        If no slide is usable.
+    """
+    tested = {slide: _test(model, slide, events) for slide, events in dataset.windows(model.recipe.feature_set)}
     results = {slide: result for slide, (result, _) in tested.items() if result.estimates}
     if not results:
-        raise no_window(chosen, model.recipe.feature_set)
+        raise no_window(dataset, model.recipe.feature_set)
     return EvaluationReport(
         labels=model.labels,
         known=[result for slide, result in results.items() if slide.surface in model.labels],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -27,8 +27,7 @@ from texture_evaluation.optimise_charts import convergence_chart, search_front_c
 from texture_evaluation.train import with_channels
 from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import CutWindow, WindowParams
-from texture_recordings.dataset import cut_slides
-from texture_recordings.slides import find_slides
+from texture_recordings.slide_dataset import SlideDataset
 
 # The search space of a recipe, or else of its learner.
 OF_RECIPES: Mapping[str, str] = {
@@ -98,10 +97,9 @@ class Written:
 
 @dataclass(frozen=True, eq=False)
 class BagSlides:
-    """The labelled slides of bags; called with window parameters it gives their windows."""
+    """The labelled slides of a data set; called with window parameters it gives their windows."""
 
-    bags: Sequence[str]
-    slides: str
+    dataset: SlideDataset
     feature_set: FeatureSet
     _known: dict[WindowParams, LabelledWindows] = field(default_factory=dict, repr=False)
 
@@ -113,7 +111,7 @@ class BagSlides:
 
     def _events(self, windows: WindowParams) -> Iterator[CutWindow]:
         plan = replace(self.feature_set, windows=windows, _layouts={})
-        for slide, events in cut_slides(find_slides(self.bags, self.slides), plan):
+        for slide, events in self.dataset.windows(plan):
             for event in events:
                 if isinstance(event, CutWindow):
                     # unlike ids of explorations, names of slides are unique over all bags
@@ -155,9 +153,9 @@ def optimise_from_bags(
     if not target.parent.is_dir():
         raise InvalidParameter(f"there is no folder '{target.parent}' for '{target.name}'; name another place")
     space = _space(wanted)
-    search_slides = SearchSlides(
-        BagSlides(wanted.bags, wanted.slides, space.base.feature_set), params.halves, params.seed
-    )
+    feature_set = space.base.feature_set
+    dataset = SlideDataset.from_bags(wanted.bags, wanted.slides, topics=feature_set.topics)
+    search_slides = SearchSlides(BagSlides(dataset, feature_set), params.halves, params.seed)
     checkpoint = checkpoint_of(target)
     if resume and not _checkpoints(checkpoint):
         raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to begin anew")

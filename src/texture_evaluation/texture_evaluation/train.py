@@ -11,7 +11,7 @@ from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_recordings.bags import find_bags
-from texture_recordings.dataset import extract_features
+from texture_recordings.slide_dataset import SlideDataset
 
 FAST_TOPIC = 'signal'
 CHANNELS = ('fast', 'all')
@@ -53,7 +53,7 @@ def train_from_bags(
     """
     plan = with_channels(load_recipe(recipe), channels)
     windows = replace(plan.feature_set, windows=plan.training_windows)
-    examples = extract_features(bags, windows, slides, namespace)
+    examples = SlideDataset.from_bags(bags, slides, namespace, windows.topics).features(windows)
     default = Path(out).name.removesuffix('.skops') if out else plan.name
     model = train(plan, examples, name or default)
     if out is not None:

@@ -12,7 +12,7 @@ from texture_estimation.roughness.model import RoughnessModel
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
 from texture_recordings.bags import find_bags
-from texture_recordings.dataset import extract_features
+from texture_recordings.slide_dataset import SlideDataset
 
 
 def train_grades_from_bags(
@@ -51,7 +51,7 @@ def train_grades_from_bags(
     """
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
-    examples = extract_features(bags, windows, slides, namespace)
+    examples = SlideDataset.from_bags(bags, slides, namespace, windows.topics).features(windows)
     model = train_grades(plan, examples, table, name or (Path(out).name.removesuffix('.skops') if out else plan.name))
     if out is not None:
         facts = {'bags': [path.name for path in find_bags(bags)], 'slides': slides or 'all', 'grades': str(grades)}

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from texture_core.arrays import Array
+from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.features import FeatureVector
+from texture_core.signal import NANOSECONDS
 from texture_core.slide_motion import SlideMotion
 
 
@@ -31,6 +32,8 @@ class LabelledFeatures:
         Length and distance of the windows.
     motions
         How slides were made, as far as it is known.
+    start_ns : (n,) int64 or None
+        Start of each window, ns; without it, the windows of a slide are taken to lie `hop_s` apart.
 
     Raises
     ------
@@ -46,6 +49,7 @@ class LabelledFeatures:
     window_s: float
     hop_s: float
     motions: Mapping[str, SlideMotion] = field(default_factory=dict)
+    start_ns: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.labels), len(self.names))
@@ -54,6 +58,44 @@ class LabelledFeatures:
                 f'labelled features have values of shape {self.values.shape}, {len(self.labels)} labels, '
                 f'{len(self.groups)} groups and {len(self.names)} names; shape {shape} and as many groups are needed'
             )
+
+    @property
+    def X(self) -> Array:  # noqa: N802  # scikit-learn's name
+        """Features, (n, n_features), as scikit-learn names them."""
+        return self.values
+
+    @property
+    def y(self) -> NDArray[np.str_]:
+        """Labels, (n,), as scikit-learn names them."""
+        return self.labels
+
+    def take(self, rows: AnyArray) -> LabelledFeatures:
+        """Return the windows of a mask, (n,), or of indices."""
+        return replace(
+            self,
+            values=self.values[rows],
+            labels=self.labels[rows],
+            groups=self.groups[rows],
+            start_ns=None if self.start_ns is None else self.start_ns[rows],
+        )
+
+    def of_slides(self, slides: Iterable[str]) -> LabelledFeatures:
+        """Return the windows of the slides with these names."""
+        return self.take(np.isin(self.groups, list(slides)))
+
+    def vectors(self, slide: str) -> list[FeatureVector]:
+        """Return the windows of one slide, (n_windows,), and its end, as the feature extractor publishes them."""
+        rows = np.flatnonzero(self.groups == slide)
+        hop_ns = self.hop_s * NANOSECONDS
+        starts = (np.arange(len(rows)) * hop_ns).round() if self.start_ns is None else self.start_ns[rows]
+        vectors = [
+            FeatureVector(
+                int(start), slide, self.window_s, self.hop_s, self.names, values, feature_set=self.feature_set
+            )
+            for start, values in zip(starts.tolist(), self.values[rows], strict=True)
+        ]
+        end_ns = vectors[-1].start_ns + round(self.window_s * NANOSECONDS) if vectors else 0
+        return [*vectors, FeatureVector(end_ns, slide, 0.0, self.hop_s, last=True)]
 
     @classmethod
     def from_vectors(cls, vectors: Iterable[FeatureVector], surfaces: Mapping[str, str]) -> LabelledFeatures:
@@ -82,4 +124,5 @@ class LabelledFeatures:
             feature_set=used[0].feature_set,
             window_s=used[0].window_s,
             hop_s=used[0].hop_s,
+            start_ns=np.array([vector.start_ns for vector in used], dtype=np.int64),
         )

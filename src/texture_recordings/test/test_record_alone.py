@@ -79,7 +79,9 @@ def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_o
     assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
 
 
-@pytest.mark.parametrize('module', ['texture_recordings.dataset', 'texture_features.spectra.spectrum', 'scipy.signal'])
+@pytest.mark.parametrize(
+    'module', ['texture_recordings.slide_dataset', 'texture_features.spectra.spectrum', 'scipy.signal']
+)
 def test_what_is_absent_here_cannot_be_imported(module: str) -> None:
     done = subprocess.run([sys.executable, '-c', ALONE, module], check=False, capture_output=True, text=True)
     assert 'ModuleNotFoundError' in done.stderr

@@ -7,7 +7,7 @@ from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_recordings.bag_writer import BagWriter
-from texture_recordings.slides import find_slides, parse_selection, read_slides
+from texture_recordings.slides import find_slides, parse_selection, read_labelled_slides
 
 
 def write(path: Path, surfaces: list[str], start_s: int) -> Path:
@@ -53,12 +53,13 @@ def test_slides_are_counted_for_each_surface_in_the_order_recorded_over_all_bags
 
 def test_a_slide_yields_its_own_messages_only(tmp_path: Path) -> None:
     bags = [write(tmp_path / name, ['cork', 'felt', 'cork'], start_s=0) for name in 'ab']
-    read = list(read_slides(find_slides(bags, '1,3')))
+    read = read_labelled_slides(bags, '1,3')
     assert len(read) == 3
-    for slide, messages in read:
-        (signal,) = [value for topic, _, value in messages if topic == 'signal']
+    for slide in read:
+        assert list(slide.signals) == ['signal']
+        (signal,) = slide.signals['signal']
         assert slide.exploration_id.endswith(f'/{signal.samples[0, 0]:.0f}')
-        assert [topic for topic, _, _ in messages] == ['exploration'] * 3 + ['signal']
+        assert len(slide.states) == 3
 
 
 def test_unlabelled_slides_are_left_out_and_a_bag_without_labels_is_refused(tmp_path: Path) -> None:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
-from texture_core.exploration import ExplorationState, Phase
+from texture_core.exploration import ExplorationState
 from texture_core.signal import NANOSECONDS
 from texture_features.feature import WindowBatch
-from texture_recordings.slides import LabelledSlide, Message, find_slides, read_slides
+from texture_recordings.slides import LabelledSlide
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +53,30 @@ class SlideSamples:
         """How far the finger slid; NaN if the speed is unknown."""
         return len(self.samples) / self.rate_hz * self.speed_m_s
 
+    @classmethod
+    def of(cls, slide: LabelledSlide, topic: str) -> SlideSamples:
+        """Return the samples of one topic of a slide.
+
+        Raises
+        ------
+        InvalidData
+            If it has no samples of the topic or lost some.
+        """
+        batches, states = slide.signals.get(topic, ()), slide.sliding
+        if not batches or not states:
+            raise InvalidData(
+                f"slide '{slide.name}' in '{slide.bag}' has no '{topic}' while sliding; name another topic"
+            )
+        if any(after.first_sample != before.next_sample for before, after in pairwise(batches)):
+            raise InvalidData(f"slide '{slide.name}' in '{slide.bag}' has lost samples; use windows of it instead")
+        rate_hz = batches[0].sampling_rate_hz
+        samples = np.concatenate([batch.samples for batch in batches]).astype(np.float64)
+        first, last = (round((at - batches[0].stamp_ns) * rate_hz / NANOSECONDS) for at in _covered(states))
+        return cls(
+            slide, samples[: max(first, 0)], samples[max(first, 0) : last], rate_hz, batches[0].channels,
+            slide.speed_m_s, slide.force_n, slide.direction_rad,
+        )  # fmt: skip
+
     def windows(self, start: int = 0, count: int | None = None, speed_m_s: float | None = None) -> WindowBatch:
         """Return a stretch of the slide, all of it by default, to be described; at another speed if one is given."""
         samples = self.samples[start : None if count is None else start + count]
@@ -62,37 +84,5 @@ class SlideSamples:
         return WindowBatch(samples, self.rate_hz, np.array(speed), np.array(self.force_n))
 
 
-def read_slide_samples(bags: Iterable[str | Path], topic: str, slides: str = '') -> list[SlideSamples]:
-    """Return the labelled slides of bags.
-
-    Raises
-    ------
-    InvalidData
-        If a bag cannot be read, or a slide has no samples of the topic or lacks some within.
-    """
-    return [_whole(slide, messages, topic) for slide, messages in read_slides(find_slides(bags, slides))]
-
-
-def _whole(slide: LabelledSlide, messages: Sequence[Message], topic: str) -> SlideSamples:
-    batches = [value for name, _, value in messages if name == topic]
-    states = [value for name, _, value in messages if name == 'exploration' and value.phase is Phase.SLIDE]
-    if not batches or not states:
-        raise InvalidData(f"slide '{slide.name}' in '{slide.bag}' has no '{topic}' while sliding; name another topic")
-    if any(after.first_sample != before.next_sample for before, after in pairwise(batches)):
-        raise InvalidData(f"slide '{slide.name}' in '{slide.bag}' has lost samples; use windows of it instead")
-    rate_hz = batches[0].sampling_rate_hz
-    samples = np.concatenate([batch.samples for batch in batches]).astype(np.float64)
-    first, last = (round((at - batches[0].stamp_ns) * rate_hz / NANOSECONDS) for at in _covered(states))
-    return SlideSamples(
-        slide, samples[: max(first, 0)], samples[max(first, 0) : last], rate_hz, batches[0].channels,
-        _mean(state.speed_m_s for state in states), _mean(state.force_n for state in states), states[0].direction_rad,
-    )  # fmt: skip
-
-
 def _covered(states: Sequence[ExplorationState]) -> tuple[int, int]:
     return states[0].stamp_ns, max(state.stamp_ns + round(state.steady_s * NANOSECONDS) for state in states)
-
-
-def _mean(values: Iterable[float]) -> float:
-    known = [value for value in values if not math.isnan(value)]
-    return float(np.mean(known)) if known else math.nan

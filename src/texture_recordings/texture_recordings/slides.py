@@ -2,31 +2,55 @@
 
 from __future__ import annotations
 
+import math
 import re
+from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from texture_core.errors import InvalidData
-from texture_core.exploration import Phase
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import TactileSignal
 from texture_core.slide_motion import SlideMotion
 from texture_recordings.bags import find_bags, read_bag
 from texture_recordings.motion_of_states import motion_made
 
 RANGE = re.compile(r'(\d+)(?:-(\d+))?')
 Message = tuple[str, int, Any]
-STREAMS = ('signal', 'signal_static')
+STREAMS, STATES = ('signal', 'signal_static'), 'exploration'
 
 
 @dataclass(frozen=True)
 class LabelledSlide:
-    """One exploration with a slide, as it lies in a bag.
+    """One exploration with a slide: its label, its conditions, and its signals if they were read.
 
-    `number` counts the slides of this surface from 1 in the order recorded; what belongs to the slide was logged
-    from `start_ns` to before `stop_ns` (None: the end of the bag). `motion` is None if it is unknown or not straight.
+    Parameters
+    ----------
+    bag
+        Bag in which it lies, or the name of the recording of arrays.
+    exploration_id
+        As recorded.
+    surface
+        The label.
+    number
+        Counts the slides of this surface from 1 in the order recorded.
+    start_ns, stop_ns
+        What belongs to the slide was logged from `start_ns` to before `stop_ns` (None: the end of the bag).
+    namespace
+        Namespace of the finger; None if the bag has but one.
+    motion
+        How the slide was made; None if that is unknown or it was not straight.
+    signals
+        Batches of each topic in the order of time; empty if only the places of the slides were read.
+    states
+        Exploration states, in the order of time.
     """
 
     bag: Path
@@ -37,38 +61,53 @@ class LabelledSlide:
     stop_ns: int | None
     namespace: str | None = None
     motion: SlideMotion | None = None
+    signals: Mapping[str, Sequence[TactileSignal]] = field(default_factory=dict, compare=False, repr=False)
+    states: Sequence[ExplorationState] = field(default=(), compare=False, repr=False)
 
     @property
     def name(self) -> str:
         """Surface and number, such as 'cork/3': unlike exploration ids, unique over all bags."""
         return f'{self.surface}/{self.number}'
 
+    @property
+    def session(self) -> str:
+        """Name of the bag without its ending: slides of one bag were recorded in one session."""
+        return self.bag.name.removesuffix('.mcap')
 
-def read_slides(
-    slides: Sequence[LabelledSlide], streams: Sequence[str] = STREAMS
-) -> Iterator[tuple[LabelledSlide, list[Message]]]:
-    """Yield each slide with its (topic, log time in ns, data class) of streams and states; each bag is read once.
+    @property
+    def sliding(self) -> Sequence[ExplorationState]:
+        """States while sliding."""
+        return [state for state in self.states if state.phase is Phase.SLIDE]
 
-    Slides of one bag come in the order recorded.
-    """
-    for bag in dict.fromkeys(slide.bag for slide in slides):
-        inside = sorted((slide for slide in slides if slide.bag == bag), key=lambda slide: slide.start_ns)
-        first, last = inside[0], inside[-1]
-        messages = read_bag(bag, (*streams, 'exploration'), first.namespace, first.start_ns, last.stop_ns)
-        yield from _share_out(messages, inside)
+    @property
+    def speed_m_s(self) -> float:
+        """Mean speed over the states while sliding; NaN if unknown."""
+        return _mean(state.speed_m_s for state in self.sliding)
+
+    @property
+    def force_n(self) -> float:
+        """Mean normal force over the states while sliding; NaN if unknown."""
+        return _mean(state.force_n for state in self.sliding)
+
+    @property
+    def direction_rad(self) -> float:
+        """Direction at the start of the slide; NaN if unknown."""
+        return next((state.direction_rad for state in self.sliding), math.nan)
+
+    @property
+    def motion_name(self) -> str:
+        """Name of the motion in the catalogue of motions; '' if unknown."""
+        return next((state.motion for state in self.sliding), '')
+
+    @property
+    def sensor(self) -> str:
+        """Name of the sensor of the first topic; '' if no signal was read."""
+        return next((batches[0].sensor for batches in self.signals.values() if batches), '')
 
 
-def _share_out(
-    messages: Iterator[Message], slides: Sequence[LabelledSlide]
-) -> Iterator[tuple[LabelledSlide, list[Message]]]:
-    following = next(messages, None)
-    for slide in slides:
-        mine: list[Message] = []
-        while following and (slide.stop_ns is None or following[1] < slide.stop_ns):
-            if following[1] >= slide.start_ns:
-                mine.append(following)
-            following = next(messages, None)
-        yield slide, mine
+def _mean(values: Iterable[float]) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return float(np.mean(known)) if known else math.nan
 
 
 def parse_selection(text: str) -> frozenset[int] | None:
@@ -92,7 +131,7 @@ def parse_selection(text: str) -> frozenset[int] | None:
 
 
 def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | None = None) -> list[LabelledSlide]:
-    """Return the labelled slides in bags that `slides` names ('' for all), by bag and time.
+    """Return the labelled slides in bags that `slides` names ('' for all), by bag and time, without signals.
 
     Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
 
@@ -101,14 +140,38 @@ def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | N
     InvalidData
         If a bag cannot be read, no slide is labelled, or none has a number asked for.
     """
+    return read_labelled_slides(bags, slides, namespace, ())
+
+
+def read_labelled_slides(
+    bags: Iterable[str | Path], slides: str = '', namespace: str | None = None, topics: Sequence[str] = STREAMS
+) -> list[LabelledSlide]:
+    """Return the labelled slides in bags with their states and signals; each bag is read once.
+
+    Parameters
+    ----------
+    bags
+        Bags, or folders of bags.
+    slides
+        Slides of each surface to keep, such as '1-30', counted from 1 in the order recorded; '' keeps all.
+    namespace
+        Namespace of the finger, if bags hold several.
+    topics
+        Signals to read.
+
+    Raises
+    ------
+    InvalidData
+        If a bag cannot be read, no slide is labelled, or none has a number asked for.
+    """
     wanted = parse_selection(slides)
     paths = find_bags(bags)
-    labelled = [slide for path in paths for slide in _slides_of(path, namespace)]
+    labelled = [slide for path in paths for slide in _slides_of(path, namespace, topics)]
     if not labelled:
         raise InvalidData(
             f"no slide in {_named(paths)} is labelled; give the surface's name with each exploration you record"
         )
-    numbered = _number(labelled)
+    numbered = number_slides(labelled)
     found = [slide for slide in numbered if wanted is None or slide.number in wanted]
     if not found:
         most = max(slide.number for slide in numbered)
@@ -116,24 +179,42 @@ def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | N
     return found
 
 
-def _slides_of(path: Path, namespace: str | None) -> list[LabelledSlide]:
+def _slides_of(path: Path, namespace: str | None, topics: Sequence[str]) -> list[LabelledSlide]:
     """Return the labelled slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
-    reported = (
-        (log_ns, state) for _, log_ns, state in read_bag(path, ('exploration',), namespace) if state.exploration_id
-    )
-    begun: list[tuple[int, LabelledSlide | None]] = []
-    for name, group in groupby(reported, key=lambda one: one[1].exploration_id):
-        logged, states = zip(*group, strict=True)
-        surface = next((state.surface for state in reversed(states) if state.phase is Phase.SLIDE), None)
-        slide = (
-            LabelledSlide(path, name, surface, 0, logged[0], None, namespace, motion_made(states)) if surface else None
-        )
-        begun.append((logged[0], slide))
-    stops = [*(start_ns for start_ns, _ in begun[1:]), None][: len(begun)]  # a bag may have no exploration at all
-    return [replace(slide, stop_ns=stop_ns) for (_, slide), stop_ns in zip(begun, stops, strict=True) if slide]
+    messages = list(read_bag(path, (*topics, STATES), namespace))
+    reported = [message for message in messages if message[0] == STATES and message[2].exploration_id]
+    groups = [list(group) for _, group in groupby(reported, key=lambda message: message[2].exploration_id)]
+    starts: list[int | None] = [group[0][1] for group in groups]
+    return [
+        slide
+        for group, stop_ns in zip(groups, [*starts[1:], None][: len(groups)], strict=True)
+        if (slide := _slide(path, namespace, group, stop_ns, messages))
+    ]
 
 
-def _number(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
+def _slide(
+    path: Path, namespace: str | None, reported: Sequence[Message], stop_ns: int | None, messages: Sequence[Message]
+) -> LabelledSlide | None:
+    """Return the slide of one exploration with its messages; None if it has no label."""
+    states = [state for _, _, state in reported]
+    surface = next((state.surface for state in reversed(states) if state.phase is Phase.SLIDE), None)
+    if not surface:
+        return None
+    start_ns = reported[0][1]
+    first = bisect_left(messages, start_ns, key=itemgetter(1))
+    last = len(messages) if stop_ns is None else bisect_left(messages, stop_ns, key=itemgetter(1))
+    streams: defaultdict[str, list[Any]] = defaultdict(list)
+    for topic, _, value in messages[first:last]:
+        streams[topic].append(value)
+    heard = streams.pop(STATES)
+    return LabelledSlide(
+        path, states[0].exploration_id, surface, 0, start_ns, stop_ns, namespace, motion_made(states), dict(streams),
+        heard,
+    )  # fmt: skip
+
+
+def number_slides(slides: Sequence[LabelledSlide]) -> list[LabelledSlide]:
+    """Return slides numbered for each surface by itself from 1, in the order of their start."""
     by_surface: defaultdict[str, list[LabelledSlide]] = defaultdict(list)
     for slide in slides:
         by_surface[slide.surface].append(slide)

@@ -18,7 +18,7 @@ from texture_benchmarks.recipes.run import (
     VIBRATION,
     biotac20_settings,
 )
-from texture_benchmarks.recipes.trial import SlideSignals, comparable, examples_of, extract_all, latency_us
+from texture_benchmarks.recipes.trial import at_rate, comparable, examples_of, extract_all, latency_us
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData
 from texture_estimation.classification.training import DEFAULT_TEMPERING_EXPONENT
@@ -27,6 +27,7 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.train import with_channels
 from texture_features.labelled_features import LabelledFeatures
+from texture_recordings.slides import LabelledSlide
 
 Changes = Mapping[str, Mapping[str, Any] | None]  # feature or learner → parameters that differ; None leaves it out
 
@@ -79,7 +80,7 @@ class _Case:
     """One way to recognise."""
 
     recipe: Recipe
-    slide_signals: Sequence[SlideSignals]
+    slide_signals: Sequence[LabelledSlide]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,14 +119,14 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def _vibration_cases(slide_signals: Sequence[SlideSignals]) -> dict[str, _Case]:
+def _vibration_cases(slide_signals: Sequence[LabelledSlide]) -> dict[str, _Case]:
     recipe = with_channels(load_recipe('default'), 'fast')
     cases = {name: _case(recipe, changes, RATE_HZ, slide_signals) for name, changes in VARIANTS.items()}
-    slower = [item.at_rate('signal', RATE_HZ / 2) for item in slide_signals]
+    slower = [at_rate(item, 'signal', RATE_HZ / 2) for item in slide_signals]
     return {**cases, HALVED: _case(recipe, {}, RATE_HZ / 2, slower)}
 
 
-def _channel_cases(slide_signals: Sequence[SlideSignals]) -> dict[str, _Case]:
+def _channel_cases(slide_signals: Sequence[LabelledSlide]) -> dict[str, _Case]:
     recipe = load_recipe('vibration-and-taxels')
     rate_hz = slide_signals[0].signals['signal'][0].sampling_rate_hz
     cases = {name: _case(recipe, changes, rate_hz, slide_signals) for name, changes in SLOW_VARIANTS.items()}
@@ -134,7 +135,7 @@ def _channel_cases(slide_signals: Sequence[SlideSignals]) -> dict[str, _Case]:
     return cases
 
 
-def _case(recipe: Recipe, changes: Changes, rate_hz: float, slide_signals: Sequence[SlideSignals]) -> _Case:
+def _case(recipe: Recipe, changes: Changes, rate_hz: float, slide_signals: Sequence[LabelledSlide]) -> _Case:
     return _Case(comparable(changed(recipe, changes), rate_hz, of_motion=False), slide_signals)
 
 
@@ -164,7 +165,7 @@ def _by_name(section: Mapping[str, Any]) -> dict[str, Any]:
     return {name: parameters for feature in section['features'] for name, parameters in feature.items()}
 
 
-def _with_slow_channels(item: SlideSignals, channels: Sequence[str]) -> SlideSignals:
+def _with_slow_channels(item: LabelledSlide, channels: Sequence[str]) -> LabelledSlide:
     slow = item.signals['signal_static']
     places = [slow[0].channels.index(name) for name in channels]
     chosen = [replace(batch, channels=tuple(channels), samples=batch.samples[:, places]) for batch in slow]

@@ -17,10 +17,10 @@ from texture_estimation.model import TextureModel
 from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, NoveltyDetector
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import line_chart
-from texture_evaluation.evaluate import evaluate
+from texture_evaluation.evaluate import evaluate_dataset
 from texture_evaluation.metrics import SlideResult, decided_at
 from texture_features.labelled_features import LabelledFeatures
-from texture_recordings.dataset import extract_features
+from texture_recordings.slide_dataset import SlideDataset
 
 RECIPES = ('default', 'vibration-and-taxels')
 TRAINED, TESTED = '1-30', '31-40'
@@ -68,10 +68,12 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
 def _try(recipe: Recipe, bags: list[Path], options: BenchmarkOptions) -> _Trial:
     first, last = (QUICK_TRAINED, QUICK_TESTED) if options.quick else (TRAINED, TESTED)
-    trained = extract_features(bags, replace(recipe.feature_set, windows=recipe.training_windows), first)
+    dataset = SlideDataset.from_bags(bags, topics=recipe.feature_set.topics)
+    later = dataset.select(last)
+    trained = dataset.select(first).features(replace(recipe.feature_set, windows=recipe.training_windows))
     model = train(recipe, trained)
-    report = evaluate(model, bags, last)
-    tested = extract_features(bags, recipe.feature_set, last)
+    report = evaluate_dataset(model, later)
+    tested = later.features(recipe.feature_set)
     unknown, draws = (1, 2) if options.quick else (UNKNOWN, DRAWS)
     labels, rng = np.unique(trained.labels), np.random.default_rng(options.seed)
     return _Trial(

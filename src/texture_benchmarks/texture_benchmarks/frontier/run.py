@@ -24,13 +24,12 @@ from texture_benchmarks.recipes.run import (
 )
 from texture_benchmarks.recipes.trial import (
     LENGTH_S,
-    SlideSignals,
     Split,
+    at_rate,
     chronological_split,
     comparable,
     every,
     latency_us,
-    read_slide_signals,
     try_recipe,
 )
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
@@ -41,6 +40,8 @@ from texture_estimation.search.parallel import single_blas_thread
 from texture_evaluation import metrics
 from texture_evaluation.charts import evidence_chart, line_chart
 from texture_evaluation.train import with_channels
+from texture_recordings.slide_dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide
 
 # Ours with windows of all lengths, and of each paper the recipe that recognises most, of those that train in seconds.
 LENGTHS_S, FEW_LENGTHS_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0), (0.1, 0.5, 2.0)
@@ -97,7 +98,7 @@ _Points = Mapping[str, Mapping[float, _Point]]  # by recipe and length (s) of it
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Try recipes with windows of many lengths on recorded slides, and learners with trainings of many sizes."""
     slide_signals = _recorded(options)
-    slides = [item.slide for item in slide_signals]
+    slides = slide_signals
     splits = chronological_split(slides, QUICK_LAST_TRAINED if options.quick else LAST_TRAINED)
     recipes = QUICK_RECIPES if options.quick else RECIPES
     name = SHOWN if SHOWN in recipes else next(iter(recipes))
@@ -172,14 +173,14 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def _recorded(options: BenchmarkOptions) -> list[SlideSignals]:
+def _recorded(options: BenchmarkOptions) -> list[LabelledSlide]:
     slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ('', ())
     with imported(options, 'biotac20', slides, materials) as bags:
-        slide_signals = read_slide_signals(bags, ('signal',))
-    return [item.at_rate('signal', RATE_HZ) for item in slide_signals]
+        slide_signals = SlideDataset.from_bags(bags, topics=('signal',)).slides
+    return [at_rate(item, 'signal', RATE_HZ) for item in slide_signals]
 
 
-def _try(slide_signals: Sequence[SlideSignals], splits: Sequence[Split], job: _FrontierJob) -> _Point:
+def _try(slide_signals: Sequence[LabelledSlide], splits: Sequence[Split], job: _FrontierJob) -> _Point:
     outcome = try_recipe(job.recipe(), slide_signals, splits)
     results = outcome.results
     early = metrics.decided_at(results, CONFIDENCES)
@@ -187,7 +188,7 @@ def _try(slide_signals: Sequence[SlideSignals], splits: Sequence[Split], job: _F
 
 
 def _try_all(
-    jobs: Sequence[_FrontierJob], slide_signals: Sequence[SlideSignals], splits: Sequence[Split]
+    jobs: Sequence[_FrontierJob], slide_signals: Sequence[LabelledSlide], splits: Sequence[Split]
 ) -> dict[_FrontierJob, _Point]:
     """Return what comes of each job, one on each core; the computing time of windows is taken alone, at the end."""
     tried = dict(zip(jobs, map_forked(partial(_try, slide_signals, splits), jobs), strict=True))
@@ -198,7 +199,7 @@ def _try_all(
 
 
 def _rocket(
-    slide_signals: Sequence[SlideSignals], splits: Sequence[Split], options: BenchmarkOptions
+    slide_signals: Sequence[LabelledSlide], splits: Sequence[Split], options: BenchmarkOptions
 ) -> dict[float, dict[str, Any]]:
     """Return the figures of MiniRocket by the length of the window; none where it is not installed."""
     if options.quick or not minirocket.installed():

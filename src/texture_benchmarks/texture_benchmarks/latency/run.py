@@ -15,8 +15,7 @@ from texture_core.arrays import Array
 from texture_evaluation.charts import histogram_chart
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
-from texture_recordings.dataset import cut_slides
-from texture_recordings.slides import find_slides
+from texture_recordings.slide_dataset import SlideDataset
 from texture_simulation.scene import load_scene
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
@@ -92,7 +91,7 @@ def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: Ben
     from texture_benchmarks.ros.live_latency import measure  # noqa: PLC0415
 
     model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
-    cut = [list(events) for _, events in cut_slides(find_slides(bags, str(slides)), model.recipe.feature_set)]
+    cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
     # The last of each is the end of the slide, which is no window; the first pass warms up.
     passes = [[run_model(model, events)[2][:-1] for events in cut] for _ in range(1 + PASSES)]
     alone_us = np.concatenate([taken for one in passes[1:] for taken in one])

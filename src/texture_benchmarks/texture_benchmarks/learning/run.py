@@ -17,7 +17,7 @@ from texture_core.arrays import Array
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import line_chart
-from texture_recordings.dataset import extract_features
+from texture_recordings.slide_dataset import SlideDataset
 
 RECIPE = 'default'
 TRAINED, STAGES, NEW, DRAWS = 30, (1, 2, 5, 10, 30), 5, 3
@@ -33,7 +33,9 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     stages, last_training = (QUICK_STAGES, QUICK_TRAINED) if options.quick else (STAGES, TRAINED)
     slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ('', ())
     with imported(options, 'biotac20', slides, materials) as bags, tempfile.TemporaryDirectory() as folder:
-        examples = extract_features(bags, replace(recipe.feature_set, windows=recipe.training_windows))
+        examples = SlideDataset.from_bags(bags, topics=recipe.feature_set.topics).features(
+            replace(recipe.feature_set, windows=recipe.training_windows)
+        )
         labels, rng = np.unique(examples.labels), np.random.default_rng(options.seed)
         draws = [rng.permutation(labels)[: 1 if options.quick else NEW] for _ in range(1 if options.quick else DRAWS)]
         incremental_runs = [

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from texture_benchmarks.recipes.trial import LENGTH_S, SlideSignals, Split
+from texture_benchmarks.recipes.trial import LENGTH_S, Split
 from texture_core.arrays import AnyArray, Array
 from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
+from texture_recordings.slides import LabelledSlide
 
 ABSENT = 'not measured: aeon is not installed (pip install aeon)'
 # Of the ridge, tried on a fifth of the slides for training; the transform's values have unit variance.
@@ -34,7 +35,11 @@ def installed() -> bool:
 
 
 def try_minirocket(
-    slide_signals: Sequence[SlideSignals], folds: Sequence[Split], seed: int, length_s: float = LENGTH_S, every: int = 1
+    slide_signals: Sequence[LabelledSlide],
+    folds: Sequence[Split],
+    seed: int,
+    length_s: float = LENGTH_S,
+    every: int = 1,
 ) -> dict[str, Any]:
     """Return the figures of MiniRocket on the vibration, the vote being one window, one vote.
 
@@ -80,10 +85,10 @@ class _Windows:
     slides: AnyArray
 
 
-def _cut(slide_signals: Sequence[SlideSignals], length_s: float) -> _Windows:
+def _cut(slide_signals: Sequence[LabelledSlide], length_s: float) -> _Windows:
     params = WindowParams(length_s=length_s, hop_s=LENGTH_S)
     found = [
-        (event.windows['signal'].samples[:, 0], item.slide.surface, item.slide.name)
+        (event.windows['signal'].samples[:, 0], item.surface, item.name)
         for item in slide_signals
         for event in cut_recording({'signal': item.signals['signal']}, item.states, params)
         if isinstance(event, CutWindow)

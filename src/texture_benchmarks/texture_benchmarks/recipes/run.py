@@ -18,8 +18,8 @@ from texture_benchmarks.recipes import minirocket
 from texture_benchmarks.recipes.table import recipe_table
 from texture_benchmarks.recipes.trial import (
     LENGTH_S,
-    SlideSignals,
     Split,
+    at_rate,
     chronological_split,
     comparable,
     evaluate_extracted,
@@ -27,7 +27,6 @@ from texture_benchmarks.recipes.trial import (
     extract_all,
     latency_us,
     random_splits,
-    read_slide_signals,
     splits_by,
 )
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
@@ -38,6 +37,8 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import front_chart
 from texture_evaluation.train import with_channels
 from texture_features.feature_set import FeatureSet
+from texture_recordings.slide_dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide
 
 VIBRATION, ALL_CHANNELS, ARRAY = 'biotac20, PAC at 1 kHz', 'biotac20, all channels', 'ntp21'
 DATA = {
@@ -126,7 +127,7 @@ class Setting:
         Whether recipes may use speed and force.
     """
 
-    slide_signals: Sequence[SlideSignals]
+    slide_signals: Sequence[LabelledSlide]
     splits: Mapping[str, Sequence[Split]]
     rate_hz: float
     of_motion: bool
@@ -229,12 +230,12 @@ def biotac20_settings(options: BenchmarkOptions) -> dict[str, Setting]:
     """Return the vibration alone and all channels of the BioTac's slides."""
     some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
     with imported(options, 'biotac20', *some) as bags:
-        slide_signals = read_slide_signals(bags)
-    slides = [item.slide for item in slide_signals]
+        slide_signals = SlideDataset.from_bags(bags).slides
+    slides = slide_signals
     by_time = {LATER: chronological_split(slides, QUICK_LAST_TRAINED if options.quick else LAST_TRAINED)}
     rng = np.random.default_rng(options.seed)
     at_random = {'random': random_splits(slides, QUICK_FOLDS if options.quick else FOLDS, rng)}
-    vibration = [item.at_rate('signal', RATE_HZ) for item in slide_signals]
+    vibration = [at_rate(item, 'signal', RATE_HZ) for item in slide_signals]
     return {
         VIBRATION: Setting(vibration, {**at_random, **by_time}, RATE_HZ, of_motion=False),
         ALL_CHANNELS: Setting(slide_signals, by_time, 2200.0, of_motion=False),
@@ -243,10 +244,10 @@ def biotac20_settings(options: BenchmarkOptions) -> dict[str, Setting]:
 
 def _ntp21(options: BenchmarkOptions) -> dict[str, Setting]:
     with imported(options, 'ntp21') as bags:
-        slide_signals = read_slide_signals(bags[:3] if options.quick else bags)
+        slide_signals: Sequence[LabelledSlide] = SlideDataset.from_bags(bags[:3] if options.quick else bags).slides
     if options.quick:  # fast slides are the short ones
         slide_signals = [item for item in slide_signals if item.states[0].speed_m_s > QUICK_FASTER_M_S]
-    first = {item.slide.name: item.states[0] for item in slide_signals}
+    first = {item.name: item.states[0] for item in slide_signals}
     splits = {
         'one force out': splits_by({name: state.force_n for name, state in first.items()}),
         'one speed out': splits_by({name: round(state.speed_m_s, 3) for name, state in first.items()}),

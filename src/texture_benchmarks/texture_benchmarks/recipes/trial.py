@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.signal import resample_poly
 
 from texture_core.errors import InvalidData
-from texture_core.exploration import ExplorationState
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.classification.training import train
@@ -32,42 +30,13 @@ from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.speed import Speed
 from texture_features.labelled_features import LabelledFeatures
 from texture_features.windowing.time_stretch import Stretched
-from texture_features.windowing.windows import WindowEvent, WindowParams, cut_recording
-from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, read_slides
+from texture_recordings.slide_dataset import cut_slide
+from texture_recordings.slides import LabelledSlide
 
 # Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and is trained on
 # windows this far apart.
 LENGTH_S = 0.5
 TIMED_SLIDES = 40
-
-
-@dataclass(frozen=True, eq=False)
-class SlideSignals:
-    """One slide in memory."""
-
-    slide: LabelledSlide
-    signals: Mapping[str, Sequence[TactileSignal]]
-    states: Sequence[ExplorationState]
-    _cut: dict[tuple[WindowParams, tuple[str, ...]], list[WindowEvent]] = dataclasses.field(
-        default_factory=dict, init=False, repr=False
-    )
-
-    def at_rate(self, topic: str, rate_hz: float) -> SlideSignals:
-        """Return the slide with one topic brought to another rate, stretch by stretch between losses."""
-        return dataclasses.replace(self, signals={topic: _at_rate(self.signals[topic], rate_hz)})
-
-    def cut(self, recipe: Recipe) -> list[WindowEvent]:
-        """Return the windows that a recipe asks for, and the end."""
-        features = recipe.feature_set
-        missing = [topic for topic in features.topics if topic not in self.signals]
-        if missing:
-            raise InvalidData(f"slide '{self.slide.name}' has no '{missing[0]}', which recipe '{recipe.name}' needs")
-        asked = features.windows, features.topics
-        if asked not in self._cut:
-            used = {topic: self.signals[topic] for topic in features.topics}
-            self._cut.clear()  # the last ones alone: those of all recipes would fill the memory
-            self._cut[asked] = list(cut_recording(used, self.states, features.windows))
-        return self._cut[asked]
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +73,9 @@ Described = Mapping[LabelledSlide, Sequence[FeatureVector]]
 Split = tuple[frozenset[str], frozenset[str]]  # names of the training slides, and tested on
 
 
-def read_slide_signals(bags: Iterable[str | Path], streams: Sequence[str] = STREAMS) -> list[SlideSignals]:
-    """Return the labelled slides of bags with all messages of some streams."""
-    return [_recorded(*read) for read in read_slides(find_slides(bags), streams)]
+def at_rate(slide: LabelledSlide, topic: str, rate_hz: float) -> LabelledSlide:
+    """Return the slide with one topic alone, brought to another rate, stretch by stretch between losses."""
+    return dataclasses.replace(slide, signals={topic: _at_rate(slide.signals[topic], rate_hz)})
 
 
 def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: float | None = None) -> Recipe:
@@ -141,14 +110,14 @@ def every(hop_s: float, recipe: Recipe) -> Recipe:
     return dataclasses.replace(recipe, feature_set=feature_set)
 
 
-def try_recipe(recipe: Recipe, slide_signals: Sequence[SlideSignals], folds: Sequence[Split]) -> RecipeResult:
+def try_recipe(recipe: Recipe, slide_signals: Sequence[LabelledSlide], folds: Sequence[Split]) -> RecipeResult:
     """Train and test a recipe on each split of the slides."""
     return evaluate_extracted(recipe, extract_all(recipe, slide_signals), folds)
 
 
-def extract_all(recipe: Recipe, slide_signals: Sequence[SlideSignals]) -> Described:
+def extract_all(recipe: Recipe, slide_signals: Sequence[LabelledSlide]) -> Described:
     """Return the features of all windows of all slides."""
-    return {item.slide: extract_features(recipe, item) for item in slide_signals}
+    return {item: extract_features(recipe, item) for item in slide_signals}
 
 
 def evaluate_extracted(
@@ -181,10 +150,10 @@ def evaluate_extracted(
     return RecipeResult([result for result in results if result.estimates], taken, model)
 
 
-def extract_features(recipe: Recipe, item: SlideSignals) -> list[FeatureVector]:
+def extract_features(recipe: Recipe, item: LabelledSlide) -> list[FeatureVector]:
     """Return the features of all windows of a slide, named after it."""
-    vectors = recipe.feature_set.extract_many(item.cut(recipe))
-    return [dataclasses.replace(vector, exploration_id=item.slide.name) for vector in vectors if not vector.last]
+    vectors = recipe.feature_set.extract_many(cut_slide(item, recipe.feature_set))
+    return [dataclasses.replace(vector, exploration_id=item.name) for vector in vectors if not vector.last]
 
 
 def examples_of(extracted: Described, apart_s: float = LENGTH_S) -> LabelledFeatures:
@@ -196,12 +165,12 @@ def examples_of(extracted: Described, apart_s: float = LENGTH_S) -> LabelledFeat
     return dataclasses.replace(examples, hop_s=max(apart_s, examples.hop_s))
 
 
-def latency_us(recipe: Recipe, model: TextureModel, slide_signals: Sequence[SlideSignals]) -> dict[str, float]:
+def latency_us(recipe: Recipe, model: TextureModel, slide_signals: Sequence[LabelledSlide]) -> dict[str, float]:
     """Return median and 99th percentile of the computing time of windows one by one; the first slide warms up.
 
     By the clock of the processor, which other work on the machine lengthens little.
     """
-    cut = [item.cut(recipe) for item in slide_signals[:: max(1, len(slide_signals) // TIMED_SLIDES)]]
+    cut = [cut_slide(item, recipe.feature_set) for item in slide_signals[:: max(1, len(slide_signals) // TIMED_SLIDES)]]
     taken = [run_model(model, events, time.process_time)[2][:-1] for events in (cut[0], *cut)][1:]
     median, p99 = np.percentile(np.concatenate(taken), (50, 99))
     return {'median': round(float(median), 1), 'p99': round(float(p99), 1)}
@@ -230,15 +199,6 @@ def splits_by(values: Mapping[str, float]) -> list[Split]:
 def _split(part: Mapping[str, int], held: int) -> Split:
     tested = frozenset(name for name, own in part.items() if own == held)
     return frozenset(part) - tested, tested
-
-
-def _recorded(slide: LabelledSlide, messages: Sequence[tuple[str, int, Any]]) -> SlideSignals:
-    states = [value for _, _, value in messages if isinstance(value, ExplorationState)]
-    signals: dict[str, list[TactileSignal]] = {}
-    for topic, _, value in messages:
-        if isinstance(value, TactileSignal):
-            signals.setdefault(topic, []).append(value)
-    return SlideSignals(slide, signals, states)
 
 
 def _at_rate(batches: Sequence[TactileSignal], rate_hz: float) -> list[TactileSignal]:

@@ -19,7 +19,7 @@ from texture_benchmarks.recipes.run import (
     QUICK_SLIDES,
     RATE_HZ,
 )
-from texture_benchmarks.recipes.trial import SlideSignals, comparable, read_slide_signals
+from texture_benchmarks.recipes.trial import at_rate, comparable
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.robustness.chart import KEPT, Curve, Panel, robustness_chart, robustness_tables
 from texture_benchmarks.robustness.degradations import DEGRADATIONS, Degradation, breakdown
@@ -37,6 +37,8 @@ from texture_benchmarks.robustness.trial import TOPIC, Count, TrainedModels, deg
 from texture_core.resources import folder
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.train import with_channels
+from texture_recordings.slide_dataset import SlideDataset
+from texture_recordings.slides import LabelledSlide
 
 # By how the names of recipes begin; what begins otherwise is in the first.
 FAMILIES: Mapping[str, tuple[str, ...]] = {
@@ -118,13 +120,11 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train recipes on clean slides and test them on degraded ones."""
     size = QUICK if options.quick else WHOLE
     with imported(options, 'biotac20', size.slides, size.materials) as bags:
-        slide_signals = read_slide_signals(bags, (TOPIC,))
+        slide_signals = SlideDataset.from_bags(bags, topics=(TOPIC,)).slides
     recipes = [_recipe(name) for name in size.recipes]
-    vibration = [item.at_rate(TOPIC, RATE_HZ) for item in slide_signals]
-    trained_models = TrainedModels.trained(
-        recipes, [item for item in vibration if item.slide.number <= size.last_training]
-    )
-    slides = [item for item in slide_signals if item.slide.number > size.last_training][:: size.every_slide]
+    vibration = [at_rate(item, TOPIC, RATE_HZ) for item in slide_signals]
+    trained_models = TrainedModels.trained(recipes, [item for item in vibration if item.number <= size.last_training])
+    slides = [item for item in slide_signals if item.number > size.last_training][:: size.every_slide]
     panels = {
         **{
             name: _degraded(trained_models, slides, each, size, options.seed)
@@ -146,7 +146,7 @@ def _recipe(name: str) -> Recipe:
 
 
 def _degraded(
-    trained_models: TrainedModels, slides: Sequence[SlideSignals], degradation: Degradation, size: _Size, seed: int
+    trained_models: TrainedModels, slides: Sequence[LabelledSlide], degradation: Degradation, size: _Size, seed: int
 ) -> Panel:
     """Return how recipes do on slides that are made worse."""
 
@@ -159,13 +159,13 @@ def _degraded(
     return _panel(degradation.axis, strengths, score, 'recorded', of_all=degradation.loses)
 
 
-def _later(recipes: Sequence[Recipe], slide_signals: Sequence[SlideSignals], size: _Size) -> Panel:
+def _later(recipes: Sequence[Recipe], slide_signals: Sequence[LabelledSlide], size: _Size) -> Panel:
     """Return how recipes that learnt at the beginning of the session do further and further on."""
-    trained_models = TrainedModels.trained(recipes, [item for item in slide_signals if item.slide.number in size.early])
+    trained_models = TrainedModels.trained(recipes, [item for item in slide_signals if item.number in size.early])
     groups = {max(0.0, float(np.mean(group)) - max(size.early)): group for group in size.later}
 
     def score(since: float) -> Mapping[str, Count]:
-        return trained_models.counts([item for item in slide_signals if item.slide.number in groups[since]])
+        return trained_models.counts([item for item in slide_signals if item.number in groups[since]])
 
     return _panel('slides since the last one learnt', tuple(groups), score, 'recorded')
 

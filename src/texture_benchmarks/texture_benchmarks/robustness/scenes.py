@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from texture_benchmarks.recipes.trial import SlideSignals
 from texture_benchmarks.robustness.trial import TOPIC
 from texture_core.arrays import Samples
 from texture_core.catalogue import find
@@ -114,7 +113,7 @@ CONDITIONS: Mapping[str, ShiftedCondition] = {
 
 def simulate_slide_signals(
     touch_conditions: TouchConditions, count: int, rng: np.random.Generator
-) -> list[SlideSignals]:
+) -> list[LabelledSlide]:
     """Return `count` slides over each surface, assigned to the fingers, at the rate of the sensor."""
     stream = find(SENSORS, touch_conditions.scene.sensor, 'sensor model').fast
     each = max(1, count // len(touch_conditions.fingers))
@@ -133,7 +132,7 @@ def simulate_slide_signals(
 
 def _recorded(
     stream: SimulatedStream, surface: str, sliding: SimulatedSlide, number: int, samples: Samples
-) -> SlideSignals:
+) -> LabelledSlide:
     slide = LabelledSlide(Path(), f'{surface}/{number}', surface, number, 0, None)
     state = ExplorationState(
         0, slide.exploration_id, 'linear_slide', Phase.SLIDE, steady_s=sliding.duration_s, surface=surface
@@ -147,4 +146,4 @@ def _recorded(
         0,
         samples.astype(np.float32),
     )
-    return SlideSignals(slide, {TOPIC: [signal]}, [state])
+    return replace(slide, signals={TOPIC: [signal]}, states=[state])

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from texture_benchmarks.recipes.trial import SlideSignals, examples_of, extract_all, extract_features
+from texture_benchmarks.recipes.trial import at_rate, examples_of, extract_all, extract_features
 from texture_benchmarks.robustness.degradations import Degradation
 from texture_core.arrays import Array
 from texture_core.signal import TactileSignal
@@ -18,6 +18,7 @@ from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_features.feature_set import FeatureSet
+from texture_recordings.slides import LabelledSlide
 
 TOPIC = 'signal'
 AT_ONCE = 512  # windows evaluated together: many for speed, few enough for the memory
@@ -37,7 +38,7 @@ class TrainedModels:
     models: Sequence[TextureModel]
 
     @classmethod
-    def trained(cls, recipes: Iterable[Recipe], slides: Sequence[SlideSignals]) -> TrainedModels:
+    def trained(cls, recipes: Iterable[Recipe], slides: Sequence[LabelledSlide]) -> TrainedModels:
         """Train each recipe on all slides."""
         models = []
         for group in _sharing({recipe.name: recipe for recipe in recipes}):
@@ -45,13 +46,13 @@ class TrainedModels:
             models += [train(recipe, examples_of(extracted)) for recipe in group]
         return cls(models)
 
-    def counts(self, slides: Sequence[SlideSignals], length: float = 1.0) -> dict[str, Count]:
+    def counts(self, slides: Sequence[LabelledSlide], length: float = 1.0) -> dict[str, Count]:
         """Return what each recipe recognises, by its name, in windows `length` times as long as those trained."""
         models = {model.recipe.name: model for model in self.models}
         found: dict[str, Count] = {}
         for group in _sharing({name: with_windows(model.recipe, length) for name, model in models.items()}):
             extracted = [
-                (item.slide.surface, vector.values) for item in slides for vector in extract_features(group[0], item)
+                (item.surface, vector.values) for item in slides for vector in extract_features(group[0], item)
             ]
             found |= {recipe.name: _count(models[recipe.name], extracted) for recipe in group}
         return found
@@ -66,15 +67,15 @@ def with_windows(recipe: Recipe, length: float) -> Recipe:
 
 
 def degraded(
-    item: SlideSignals, degradation: Degradation, strength: float, rate_hz: float, rng: np.random.Generator
-) -> SlideSignals:
+    item: LabelledSlide, degradation: Degradation, strength: float, rate_hz: float, rng: np.random.Generator
+) -> LabelledSlide:
     """Return the vibration of a slide at a rate, as bad as the strength says."""
-    whole = item.at_rate(TOPIC, _native_hz(item) if degradation.of_the_world else rate_hz)
+    whole = at_rate(item, TOPIC, _native_hz(item) if degradation.of_the_world else rate_hz)
     signals = [_changed(run, degradation, strength, rng) for run in whole.signals[TOPIC]]
-    return dataclasses.replace(item, signals={TOPIC: signals}).at_rate(TOPIC, rate_hz)
+    return at_rate(dataclasses.replace(item, signals={TOPIC: signals}), TOPIC, rate_hz)
 
 
-def _native_hz(item: SlideSignals) -> float:
+def _native_hz(item: LabelledSlide) -> float:
     return item.signals[TOPIC][0].sampling_rate_hz
 
 

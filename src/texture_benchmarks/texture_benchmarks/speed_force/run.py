@@ -13,7 +13,7 @@ from texture_benchmarks.speed_force.fabricslide import COMPLETE, Fabricslide
 from texture_benchmarks.speed_force.held_out import HeldOutResult
 from texture_benchmarks.speed_force.ntp21 import TRAINED, Ntp21
 from texture_estimation.learners.svm_rbf import SvmRbf
-from texture_recordings.slide_samples import read_slide_samples
+from texture_recordings.slide_dataset import SlideDataset
 
 GOALS = {
     'ntp21': {'one speed out': 0.96, 'one force out': 0.98, 'slow to fast': 0.85},
@@ -35,10 +35,14 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Leave out speeds, forces and directions of both data sets."""
     slides, surfaces = (QUICK_SLIDES, QUICK_TEXTURES) if options.quick else ('', ())
     with imported(options, 'ntp21', slides, surfaces) as textures:
-        ntp21 = Ntp21(Conditions(read_slide_samples(textures, 'signal')), **(QUICK_NTP21 if options.quick else {}))
+        ntp21 = Ntp21(
+            Conditions(SlideDataset.from_bags(textures, topics=['signal']).samples('signal')),
+            **(QUICK_NTP21 if options.quick else {}),
+        )
     with imported(options, 'fabricslide', QUICK_RUNS if options.quick else '', COMPLETE) as fabrics:
         fabricslide = Fabricslide(
-            Conditions(read_slide_samples(fabrics, 'signal_static')), **(QUICK_FABRICSLIDE if options.quick else {})
+            Conditions(SlideDataset.from_bags(fabrics).samples('signal_static')),
+            **(QUICK_FABRICSLIDE if options.quick else {}),
         )
     estimated, speed_errors = ntp21.whole_without_speed()
     textures_known = {

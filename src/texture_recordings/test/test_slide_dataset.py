@@ -1,0 +1,181 @@
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidData, ModelMismatch
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_features.feature_set import FeatureSet
+from texture_features.windowing.windows import CutWindow, WindowParams
+from texture_recordings import slides as slides_module
+from texture_recordings.bag_writer import BagWriter
+from texture_recordings.slide_dataset import SlideDataset
+
+RATE_HZ = 1000.0
+FEATURES = FeatureSet.from_mapping(
+    {'windows': {'length_s': 0.5, 'hop_s': 0.25}, 'inputs': {'signal': {'features': ['mean']}}}
+)
+LABELS = ['cork', 'felt', 'cork', 'felt', 'cork', 'felt']
+SPEEDS = [0.02, 0.02, 0.04, 0.0401, 0.04, 0.02]
+
+
+def arrays(seconds: float = 1.0, channels: int = 2) -> list[np.ndarray]:
+    rng = np.random.default_rng(3)
+    return [rng.normal(size=(int(seconds * RATE_HZ), channels)).astype(np.float32) for _ in LABELS]
+
+
+def from_arrays(**conditions: object) -> SlideDataset:
+    return SlideDataset.from_arrays(
+        {'signal': arrays()}, LABELS, {'signal': RATE_HZ}, **{'speed_m_s': SPEEDS, 'force_n': 1.0, **conditions}
+    )
+
+
+def write(path: Path, dataset: SlideDataset) -> Path:
+    with BagWriter(path) as bag:
+        for slide in dataset:
+            for state in slide.states:
+                bag.write('exploration', state, state.stamp_ns)
+            for batch in slide.signals['signal']:
+                bag.write('signal', batch, batch.stamp_ns + 1)
+    return path
+
+
+def test_arrays_come_back_as_they_were_given() -> None:
+    samples, labels = from_arrays().to_numpy('signal')
+    assert labels.tolist() == LABELS
+    for given, returned in zip(arrays(), samples, strict=True):
+        np.testing.assert_array_equal(returned, given)
+
+
+def test_a_bag_gives_the_same_data_set_as_the_arrays_that_it_holds(tmp_path: Path) -> None:
+    given = from_arrays()
+    read = SlideDataset.from_bags([write(tmp_path / 'bag', given)])
+    assert read.names.tolist() == given.names.tolist()
+    assert read.condition('speed').tolist() == given.condition('speed').tolist()
+    one, other = given.features(FEATURES), read.features(FEATURES)
+    np.testing.assert_array_equal(one.X, other.X)
+    assert one.y.tolist() == other.y.tolist()
+    assert one.groups.tolist() == other.groups.tolist()
+    np.testing.assert_array_equal(one.start_ns, other.start_ns)
+
+
+def test_features_are_those_of_each_window_and_of_its_time() -> None:
+    features = from_arrays().features(FEATURES)
+    # 1 s holds windows of 0.5 s at 0, 0.25 and 0.5 s.
+    assert features.X.shape == (3 * len(LABELS), 2)
+    assert features.groups[:6].tolist() == ['cork/1'] * 3 + ['felt/1'] * 3
+    window = arrays()[1][250:750].astype(np.float64)
+    np.testing.assert_allclose(features.X[4], window.mean(axis=0), atol=1e-9)
+    assert np.diff(features.start_ns[3:6]).tolist() == [NANOSECONDS // 4] * 2
+
+
+def test_each_bag_is_opened_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    bags = [write(tmp_path / name, from_arrays()) for name in 'ab']
+    opened: list[Path] = []
+    read_bag = slides_module.read_bag
+
+    def count(path: Path, *arguments: object) -> object:
+        opened.append(path)
+        return read_bag(path, *arguments)
+
+    monkeypatch.setattr(slides_module, 'read_bag', count)
+    dataset = SlideDataset.from_bags(bags, '1-2')
+    dataset.features(FEATURES)
+    dataset.to_numpy()
+    assert opened == bags
+
+
+def test_slides_are_selected_by_number_label_and_condition() -> None:
+    dataset = from_arrays()
+    assert dataset.select('2-3').names.tolist() == ['cork/2', 'felt/2', 'cork/3', 'felt/3']
+    assert dataset.select(labels=['felt']).names.tolist() == ['felt/1', 'felt/2', 'felt/3']
+    assert dataset.select(where=lambda slide: slide.speed_m_s > 0.03).names.tolist() == ['cork/2', 'felt/2', 'cork/3']
+    assert dataset.take(np.array([5, 0])).names.tolist() == ['felt/3', 'cork/1']
+    with pytest.raises(InvalidData, match='the data set has no slide'):
+        dataset.select('9')
+
+
+def test_speeds_within_five_per_cent_are_one_condition() -> None:
+    speed = from_arrays().condition('speed')
+    assert len(set(speed)) == 2
+    np.testing.assert_array_equal(speed, [0.02, 0.02, 0.04, 0.04, 0.04, 0.02])
+
+
+def test_directions_around_the_half_turn_are_one_condition() -> None:
+    direction = from_arrays(direction_rad=[math.pi, -math.pi, 0.0, 0.01, -3.13, 3.13]).condition('direction')
+    assert direction[2] == direction[3]
+    assert len({direction[0], direction[1], direction[4], direction[5]}) == 1
+
+
+def test_an_unknown_condition_or_one_that_slides_do_not_tell_is_refused() -> None:
+    with pytest.raises(InvalidData, match="no condition 'colour'; use one of speed, force"):
+        from_arrays().condition('colour')
+    with pytest.raises(InvalidData, match="slide 'cork/1' and 5 others do not tell their force"):
+        from_arrays(force_n=math.nan).condition('force')
+
+
+def test_conditions_name_motion_sensor_session_and_number() -> None:
+    dataset = from_arrays(sensor='finger', session='monday')
+    assert set(dataset.condition('motion')) == {'linear_slide'}
+    assert set(dataset.condition('sensor')) == {'finger'}
+    assert set(dataset.condition('session')) == {'monday'}
+    assert dataset.condition('number').tolist() == [1, 1, 2, 2, 3, 3]
+
+
+def test_a_missing_input_is_refused_with_what_there_is() -> None:
+    other = FeatureSet.from_mapping({'inputs': {'signal_static': {'features': ['mean']}}})
+    with pytest.raises(ModelMismatch, match=r"slide 'cork/1' .* has no 'signal_static', only signal"):
+        from_arrays().features(other)
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [
+        (({'signal': arrays()[:5]}, LABELS, {'signal': RATE_HZ}), "'signal' has 5 slides"),
+        (({'signal': arrays()}, LABELS, {}), 'the rate None'),
+        (({}, LABELS, {}), 'no signal was given'),
+        (({'signal': []}, [], {'signal': RATE_HZ}), 'the data set has no slide'),
+    ],
+)
+def test_arrays_that_contradict_each_other_are_refused(arguments: tuple, sentence: str) -> None:
+    with pytest.raises(InvalidData, match=sentence):
+        SlideDataset.from_arrays(*arguments)
+
+
+def test_conditions_of_another_length_are_refused() -> None:
+    with pytest.raises(InvalidData, match='speed_m_s has the shape'):
+        from_arrays(speed_m_s=[0.1, 0.2])
+
+
+def test_one_channel_may_be_given_without_its_axis() -> None:
+    dataset = SlideDataset.from_arrays({'signal': [np.arange(700.0)]}, ['cork'], {'signal': RATE_HZ})
+    samples, _ = dataset.to_numpy()
+    assert samples[0].shape == (700, 1)
+
+
+def test_windows_carry_the_speed_and_force_of_the_slide() -> None:
+    [(slide, events), *_] = from_arrays().windows(FEATURES)
+    window = events[0]
+    assert isinstance(window, CutWindow)
+    assert (slide.name, window.speed_m_s, window.force_n) == ('cork/1', 0.02, 1.0)
+
+
+def test_lost_samples_leave_windows_out_but_are_refused_where_all_are_needed(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.write('exploration', ExplorationState(0, 'e', 'linear_slide', Phase.SLIDE, 2.0, surface='cork'), 0)
+        for first in (0, 1000, 1500):  # 500 to 999 are lost
+            samples = np.ones((500, 1), dtype=np.float32)
+            stamp_ns = first * NANOSECONDS // 1000
+            bag.write('signal', TactileSignal(stamp_ns, 's', ('a',), (), RATE_HZ, first, samples), stamp_ns + 1)
+    dataset = SlideDataset.from_bags([tmp_path / 'bag'])
+    windows = WindowParams(length_s=0.5, hop_s=0.5)
+    [(_, events)] = dataset.windows(FeatureSet(windows, FEATURES.inputs))
+    assert [event.start_ns for event in events if isinstance(event, CutWindow)] == [
+        0,
+        NANOSECONDS,
+        3 * NANOSECONDS // 2,
+    ]
+    with pytest.raises(InvalidData, match='has lost samples'):
+        dataset.to_numpy()

@@ -1,0 +1,379 @@
+"""Labelled slides with their signals: read once from bags, or given as arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import AnyArray, Array
+from texture_core.errors import InvalidData, ModelMismatch
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_features.labelled_features import LabelledFeatures
+from texture_features.windowing.windows import WindowEvent, cut_recording
+from texture_recordings.motion_of_states import motion_made
+from texture_recordings.slide_samples import SlideSamples
+from texture_recordings.slides import STREAMS, LabelledSlide, number_slides, parse_selection, read_labelled_slides
+
+if TYPE_CHECKING:  # which needs scipy: reading, selecting and exporting do not
+    from texture_features.feature_set import FeatureSet
+
+GAP_NS = NANOSECONDS  # between two slides that are given as arrays
+# Speeds and forces that differ by less are one condition: an arm does not keep to what it was asked for.
+SAME_RATIO, SAME_RAD = 1.05, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class SlideDataset:
+    """Labelled slides: for training, evaluation and cross-validation, and for export.
+
+    All signals are held in memory, as float32: an hour of one channel at 2200 Hz takes 32 MB.
+
+    Parameters
+    ----------
+    slides
+        In the order of the bags and of time.
+
+    Raises
+    ------
+    InvalidData
+        If there is no slide.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> recordings = {'signal': [rng.normal(size=(2000, 1)) for _ in range(4)]}
+    >>> dataset = SlideDataset.from_arrays(
+    ...     recordings, ['cork', 'cork', 'felt', 'felt'], {'signal': 1000.0}, speed_m_s=[0.02, 0.04, 0.02, 0.04]
+    ... )
+    >>> [slide.name for slide in dataset]
+    ['cork/1', 'cork/2', 'felt/1', 'felt/2']
+    >>> len(dataset.select(labels=['felt'])), dataset.condition('speed').tolist()
+    (2, [0.02, 0.04, 0.02, 0.04])
+    """
+
+    slides: tuple[LabelledSlide, ...]
+
+    def __post_init__(self) -> None:
+        if not self.slides:
+            raise InvalidData('the data set has no slide; select fewer conditions, or record labelled slides')
+
+    @classmethod
+    def from_bags(
+        cls,
+        bags: Iterable[str | Path],
+        slides: str = '',
+        namespace: str | None = None,
+        topics: Sequence[str] = STREAMS,
+    ) -> SlideDataset:
+        """Read the labelled slides of bags; each bag is read once.
+
+        Parameters
+        ----------
+        bags
+            Bags, or folders of bags.
+        slides
+            Slides of each surface to keep, such as '1-30', counted from 1 in the order recorded; '' keeps all.
+        namespace
+            Namespace of the finger, if bags hold several.
+        topics
+            Signals to read.
+
+        Raises
+        ------
+        InvalidData
+            If a bag cannot be read, no slide is labelled, or none has a number asked for.
+        """
+        return cls(tuple(read_labelled_slides(bags, slides, namespace, topics)))
+
+    @classmethod
+    def from_arrays(
+        cls,
+        signals: Mapping[str, Sequence[AnyArray]],
+        labels: Sequence[str],
+        rates_hz: Mapping[str, float],
+        *,
+        speed_m_s: float | Sequence[float] = math.nan,
+        force_n: float | Sequence[float] = math.nan,
+        direction_rad: float | Sequence[float] = math.nan,
+        channels: Mapping[str, Sequence[str]] | None = None,
+        motion: str = 'linear_slide',
+        sensor: str = '',
+        session: str = '',
+    ) -> SlideDataset:
+        """Build a data set from arrays; the finger slides from the first sample of each to the last.
+
+        Parameters
+        ----------
+        signals
+            By topic, such as 'signal': one array (n_samples, n_channels) for each slide.
+        labels : (n_slides,)
+            Surface of each slide.
+        rates_hz
+            Sampling rate of each topic, Hz.
+        speed_m_s, force_n, direction_rad
+            Conditions of all slides, or of each, (n_slides,).
+        channels
+            Names of the channels of each topic; 'c0', 'c1', … if not given.
+        motion, sensor, session
+            Name of the motion, of the sensor and of the recording.
+
+        Raises
+        ------
+        InvalidData
+            If the numbers of slides or channels contradict each other.
+        """
+        count = len(labels)
+        _check_counts(signals, rates_hz, count)
+        numbers = {
+            name: _one_each(name, values, count)
+            for name, values in (('speed_m_s', speed_m_s), ('force_n', force_n), ('direction_rad', direction_rad))
+        }
+        slides, start_ns = [], 0
+        for index, label in enumerate(labels):
+            batches = {
+                topic: _batch(arrays[index], (sensor or topic, (channels or {}).get(topic), rates_hz[topic]), start_ns)
+                for topic, arrays in signals.items()
+            }
+            duration_ns = min(batch.end_ns for batch in batches.values()) - start_ns
+            state = ExplorationState(
+                start_ns,
+                f'{session or "array"}/{index}',
+                motion,
+                Phase.SLIDE,
+                duration_ns / NANOSECONDS,
+                float(numbers['speed_m_s'][index]),
+                float(numbers['force_n'][index]),
+                float(numbers['direction_rad'][index]),
+                surface=str(label),
+            )
+            slides.append(
+                LabelledSlide(
+                    Path(session), state.exploration_id, str(label), 0, start_ns, None,
+                    motion=motion_made([state]),
+                    signals={topic: (batch,) for topic, batch in batches.items()},
+                    states=(state,),
+                )
+            )  # fmt: skip
+            start_ns = max(batch.end_ns for batch in batches.values()) + GAP_NS
+        return cls(tuple(number_slides(slides)))
+
+    def __len__(self) -> int:
+        return len(self.slides)
+
+    def __iter__(self) -> Iterator[LabelledSlide]:
+        return iter(self.slides)
+
+    def __getitem__(self, index: int) -> LabelledSlide:
+        return self.slides[index]
+
+    @property
+    def labels(self) -> NDArray[np.str_]:
+        """Surface of each slide, (n_slides,)."""
+        return np.array([slide.surface for slide in self.slides])
+
+    @property
+    def names(self) -> NDArray[np.str_]:
+        """Name of each slide, such as 'cork/3', (n_slides,)."""
+        return np.array([slide.name for slide in self.slides])
+
+    def condition(self, name: str) -> AnyArray:
+        """Return a condition of each slide, (n_slides,): what `CONDITIONS` lists, such as 'speed' in m/s.
+
+        Speeds and forces within 5 %, and directions within 0.1 rad, of their neighbour in order count as equal: the
+        rounded mean of each group is returned.
+
+        Raises
+        ------
+        InvalidData
+            If there is no such condition, or a slide does not tell it.
+        """
+        if name not in CONDITIONS:
+            raise InvalidData(f"slides have no condition '{name}'; use one of {', '.join(CONDITIONS)}")
+        values = np.array([CONDITIONS[name](slide) for slide in self.slides])
+        if values.dtype.kind != 'f':
+            return values
+        unknown = np.flatnonzero(np.isnan(values))
+        if len(unknown):
+            raise InvalidData(
+                f"slide '{self.slides[unknown[0]].name}' and {len(unknown) - 1} others do not tell their {name}; "
+                f'use slides that were recorded with it, or another condition'
+            )
+        return _grouped(values, circular=name == 'direction')
+
+    def select(
+        self,
+        slides: str = '',
+        *,
+        labels: Iterable[str] | None = None,
+        where: Callable[[LabelledSlide], bool] = lambda _: True,
+    ) -> SlideDataset:
+        """Return some of the slides, which keep their numbers.
+
+        Parameters
+        ----------
+        slides
+            Numbers of the slides of each surface, such as '1-30' or '1,3,5-7'; '' for all.
+        labels
+            Surfaces; None for all.
+        where
+            Says of a slide whether to keep it.
+
+        Raises
+        ------
+        InvalidData
+            If no slide is left.
+        """
+        numbers = parse_selection(slides)
+        surfaces = None if labels is None else set(labels)
+        return SlideDataset(
+            tuple(
+                slide
+                for slide in self.slides
+                if (numbers is None or slide.number in numbers)
+                and (surfaces is None or slide.surface in surfaces)
+                and where(slide)
+            )
+        )
+
+    def take(self, indices: AnyArray) -> SlideDataset:
+        """Return the slides of a mask or of indices, as a splitter gives them; they keep their numbers."""
+        return SlideDataset(tuple(self.slides[int(index)] for index in np.arange(len(self))[indices]))
+
+    def windows(self, feature_set: FeatureSet) -> Iterator[tuple[LabelledSlide, list[WindowEvent]]]:
+        """Yield each slide with its windows and its end, as the feature extractor on the robot cuts them.
+
+        Raises
+        ------
+        ModelMismatch
+            If a slide has nothing of an input.
+        """
+        for slide in self.slides:
+            yield slide, cut_slide(slide, feature_set)
+
+    def features(self, feature_set: FeatureSet) -> LabelledFeatures:
+        """Return features `X`, labels `y` and slides `groups` of all windows, with their times.
+
+        Raises
+        ------
+        InvalidData
+            If no slide has a whole window.
+        ModelMismatch
+            If a slide lacks an input, or the slides differ in rates or channels.
+        """
+        vectors = [
+            replace(vector, exploration_id=slide.name)
+            for slide, events in self.windows(feature_set)
+            for vector in feature_set.extract_many(events)
+            if not vector.last
+        ]
+        if not vectors:
+            raise no_window(self, feature_set)
+        features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})
+        motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
+        return replace(features, motions=motions)
+
+    def samples(self, topic: str) -> list[SlideSamples]:
+        """Return the samples of one topic of each slide without gaps, with speed, force and direction.
+
+        Raises
+        ------
+        InvalidData
+            If a slide has no samples of the topic or lost some.
+        """
+        return [SlideSamples.of(slide, topic) for slide in self.slides]
+
+    def to_numpy(self, topic: str = 'signal') -> tuple[list[Array], NDArray[np.str_]]:
+        """Return the samples of each slide, (n_samples, n_channels) each, and its label, (n_slides,).
+
+        Raises
+        ------
+        InvalidData
+            If a slide has no samples of the topic or lost some.
+        """
+        return [slide.samples for slide in self.samples(topic)], self.labels
+
+
+def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent]:
+    """Return the windows of a slide and its end, as the feature extractor on the robot cuts them.
+
+    Raises
+    ------
+    ModelMismatch
+        If the slide has nothing of an input.
+    """
+    missing = [topic for topic in feature_set.topics if not slide.signals.get(topic)]
+    if missing:
+        raise ModelMismatch(
+            f"slide '{slide.name}' in '{slide.bag}' has no '{missing[0]}', only "
+            f'{", ".join(sorted(topic for topic, batches in slide.signals.items() if batches)) or "states"}; '
+            f'the windows need {", ".join(feature_set.topics)}: use another recipe or record the missing topic'
+        )
+    used = {topic: slide.signals[topic] for topic in feature_set.topics}
+    return list(cut_recording(used, slide.states, feature_set.windows))
+
+
+def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:
+    """Return the error for slides of which not one has a usable window."""
+    return InvalidData(
+        f'none of the {len(dataset)} slides has a whole window of {feature_set.windows.length_s} s; '
+        'record longer slides without losses, or use a recipe with shorter windows'
+    )
+
+
+CONDITIONS: Mapping[str, Callable[[LabelledSlide], Any]] = {
+    'speed': lambda slide: slide.speed_m_s,  # m/s
+    'force': lambda slide: slide.force_n,  # N
+    'direction': lambda slide: slide.direction_rad,  # rad
+    'motion': lambda slide: slide.motion_name,
+    'sensor': lambda slide: slide.sensor,
+    'session': lambda slide: slide.session,
+    'number': lambda slide: slide.number,
+}
+
+
+def _grouped(values: Array, *, circular: bool) -> Array:
+    """Return the rounded mean of the group of each value, (n,): groups end where neighbours in order differ."""
+    order = np.argsort(values, kind='stable')
+    ordered = values[order]
+    apart = np.diff(ordered) > (SAME_RAD if circular else (SAME_RATIO - 1.0) * np.abs(ordered[:-1]))
+    group = np.concatenate(([0], np.cumsum(apart)))
+    if circular and group[-1] and ordered[0] + math.tau - ordered[-1] <= SAME_RAD:  # -π is π
+        ordered = np.where(group == group[-1], ordered - math.tau, ordered)
+        group[group == group[-1]] = 0
+    means = np.bincount(group, ordered) / np.bincount(group)
+    result = np.empty(len(values))
+    result[order] = [float(f'{mean:.3g}') for mean in means[group]]
+    return result
+
+
+def _check_counts(signals: Mapping[str, Sequence[AnyArray]], rates_hz: Mapping[str, float], count: int) -> None:
+    for topic, arrays in signals.items():
+        if len(arrays) != count or topic not in rates_hz:
+            raise InvalidData(
+                f"'{topic}' has {len(arrays)} slides and the rate {rates_hz.get(topic)} for {count} labels; "
+                'give one array (n_samples, n_channels) for each label, and the rate of each topic in Hz'
+            )
+    if not signals:
+        raise InvalidData("no signal was given; give arrays by topic, such as {'signal': [...]}")
+
+
+def _one_each(name: str, values: float | Sequence[float], count: int) -> Array:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape not in ((), (count,)):
+        raise InvalidData(f'{name} has the shape {array.shape}; give one number, or one for each of {count} slides')
+    return np.broadcast_to(array, (count,))
+
+
+def _batch(array: AnyArray, template: tuple[str, Sequence[str] | None, float], start_ns: int) -> TactileSignal:
+    """Return the samples of a slide as a batch; `template` is the sensor, the names of the channels and the rate."""
+    sensor, channels, rate_hz = template
+    samples = np.atleast_2d(np.asarray(array, dtype=np.float32).T).T  # one channel may be given without its axis
+    names = tuple(channels) if channels else tuple(f'c{number}' for number in range(samples.shape[1]))
+    return TactileSignal(start_ns, sensor, names, (), rate_hz, 0, samples)
