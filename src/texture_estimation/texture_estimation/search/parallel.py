@@ -42,12 +42,19 @@ def threaded_map(jobs: int = -1) -> Iterator[ParallelMap]:
 
 @contextmanager
 def dask_map(address: str) -> Iterator[ParallelMap]:
-    """Give what spreads work over the workers of a Dask cluster, which have this suite installed.
+    """Give what spreads work over the workers of a Dask cluster; see `dask_backend`."""
+    with dask_backend(address):
+        yield _Joblib(Parallel())
+
+
+@contextmanager
+def dask_backend(address: str) -> Iterator[None]:
+    """Have joblib use the workers of a Dask cluster, which have this suite installed, within a `with` block.
 
     Parameters
     ----------
     address
-        Of its scheduler, such as 'tcp://192.168.1.5:8786'.
+        Address of its scheduler, such as 'tcp://192.168.1.5:8786'.
 
     Raises
     ------
@@ -67,7 +74,7 @@ def dask_map(address: str) -> Iterator[ParallelMap]:
             "start one with 'dask scheduler', or leave '--dask' out to use this machine's cores"
         ) from error
     with client, client.as_current(), parallel_config(backend='dask', wait_for_workers_timeout=WORKERS_S):
-        yield _Joblib(Parallel())
+        yield
 
 
 class _Joblib:

@@ -1,0 +1,185 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
+
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_estimation.recipe import Recipe
+from texture_evaluation.commands.evaluate import table
+from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
+from texture_evaluation.cross_validation.cross_validate import cross_validate, interval, slide_counts
+from texture_evaluation.cross_validation.splits import parse_split
+from texture_evaluation.evaluate import evaluate_dataset
+from texture_evaluation.metrics import SlideResult
+from texture_evaluation.train import train_from_bags
+from texture_recordings.slide_dataset import SlideDataset
+
+RECIPE = Recipe.from_mapping(
+    {
+        'windows': {'length_s': 0.25, 'hop_s': 0.25},
+        'inputs': {'signal': {'features': ['log_bands']}},
+        'learner': 'naive_bayes',
+        'training': {'hop_s': 0.25},
+    },
+    'small',
+)
+TONES_HZ = {'cork': 60.0, 'felt': 110.0, 'wood': 200.0, 'slate': 350.0}
+SPEEDS_M_S = (0.02, 0.04, 0.08)
+
+
+def tones(slides: int = 6, *, seed: int = 0, shuffled: bool = False) -> SlideDataset:
+    """Return slides of 1 s whose label is the frequency of a tone in little noise."""
+    rng = np.random.default_rng(seed)
+    labels = [label for _ in range(slides) for label in TONES_HZ]
+    time_s = np.arange(1000) / 1000.0
+    samples = [
+        np.sin(2 * np.pi * (TONES_HZ[label] * time_s + rng.random()))[:, None] + 0.1 * rng.normal(size=(1000, 1))
+        for label in labels
+    ]
+    told = rng.permutation(labels).tolist() if shuffled else labels
+    speeds = [SPEEDS_M_S[(number // len(TONES_HZ)) % len(SPEEDS_M_S)] for number in range(len(labels))]
+    return SlideDataset.from_arrays({'signal': samples}, told, {'signal': 1000.0}, speed_m_s=speeds, force_n=1.0)
+
+
+def test_tones_are_told_apart_in_every_fold() -> None:
+    result = cross_validate(RECIPE, tones(), StratifiedGroupKFold(3))
+    figures = result.as_json()
+    assert figures['window_accuracy'] == figures['slide_accuracy'] == 1.0
+    assert [fold['window_accuracy'] for fold in figures['folds']] == [1.0] * 3
+    assert figures['n_slides'] == 24
+    assert figures['window_accuracy_interval'] == [1.0, 1.0]
+
+
+def test_shuffled_labels_are_recognised_by_chance_alone() -> None:
+    figures = cross_validate(RECIPE, tones(15, shuffled=True), StratifiedGroupKFold(5)).as_json()
+    # 60 slides of four labels: 25 % by chance, and 3 standard deviations of a binomial share are 17 %.
+    assert 0.08 < figures['slide_accuracy'] < 0.42
+
+
+@pytest.mark.parametrize(
+    ('splitter', 'groups'),
+    [
+        (StratifiedGroupKFold(3), 'slide'),
+        (GroupShuffleSplit(4, test_size=0.25, random_state=0), 'slide'),
+        (LeaveOneGroupOut(), 'speed'),
+        (ChronologicalSplit(0.5), 'slide'),
+    ],
+)
+def test_a_group_is_never_on_both_sides(splitter: object, groups: str) -> None:
+    dataset = tones()
+    columns = dict(zip(dataset.names, dataset.names if groups == 'slide' else dataset.condition(groups), strict=True))
+    folds = cross_validate(RECIPE, dataset, splitter, groups=groups).folds
+    assert folds
+    for fold in folds:
+        assert fold.results
+        assert not {columns[name] for name in fold.trained_on} & {columns[name] for name in fold.results}
+
+
+def test_each_condition_is_left_out_once_and_names_its_fold() -> None:
+    folds = cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups='speed').folds
+    assert [fold.name for fold in folds] == ['0.02', '0.04', '0.08']
+    assert sorted(name for fold in folds for name in fold.results) == sorted(tones().names)
+
+
+def test_a_chronological_split_tests_later_slides_only() -> None:
+    [fold] = cross_validate(RECIPE, tones(), ChronologicalSplit(0.75)).folds
+    last_trained = {name.split('/')[0]: int(name.split('/')[1]) for name in sorted(fold.trained_on)}
+    assert last_trained == dict.fromkeys(TONES_HZ, 4)
+    assert {int(name.split('/')[1]) for name in fold.results} == {5, 6}
+
+
+def test_a_chronological_split_keeps_the_windows_of_a_slide_together() -> None:
+    slides = np.repeat(['a', 'b', 'c', 'd'], 3)
+    [(train, test)] = ChronologicalSplit(0.75).split(None, np.repeat('cork', 12), slides)
+    assert (train.tolist(), test.tolist()) == (list(range(9)), [9, 10, 11])
+
+
+def test_a_chronological_split_needs_two_slides_of_each_label() -> None:
+    with pytest.raises(InvalidData, match="'felt' has a single slide"):
+        list(ChronologicalSplit().split(None, ['cork', 'cork', 'felt']))
+    with pytest.raises(InvalidParameter, match='above 0 and below 1'):
+        ChronologicalSplit(1.0)
+
+
+def test_several_processes_give_the_results_of_one() -> None:
+    one, two = (cross_validate(RECIPE, tones(), StratifiedGroupKFold(2), n_jobs=jobs).as_json() for jobs in (1, 2))
+    assert one == two
+
+
+def test_a_single_fold_gives_the_figures_of_train_and_evaluate(simulated: Path) -> None:
+    dataset = SlideDataset.from_bags([simulated])
+    model = train_from_bags('default', [simulated], '1-4')
+    report = evaluate_dataset(model, dataset.select('5-6'))
+    result = cross_validate(model.recipe, dataset, ChronologicalSplit(4 / 6))
+    [fold] = result.folds
+    assert [list(one.window_labels) for one in fold.results.values()] == [
+        list(one.window_labels) for one in report.known
+    ]
+    for one, other in zip(fold.results.values(), report.known, strict=True):
+        np.testing.assert_array_equal([e.confidence for e in one.estimates], [e.confidence for e in other.estimates])
+        assert [e.evidence_s for e in one.estimates] == [e.evidence_s for e in other.estimates]
+        assert one.end.prediction_set == other.end.prediction_set
+
+
+def test_impossible_splits_are_refused_with_a_sentence() -> None:
+    with pytest.raises(InvalidData, match="'cork' has 6 slides, too few for 7 folds"):
+        cross_validate(RECIPE, tones(), StratifiedGroupKFold(7))
+    with pytest.raises(InvalidData, match='the slides cannot be split'):
+        cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups='force')
+    with pytest.raises(InvalidData, match='groups have the shape'):
+        cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups=np.zeros(3))
+
+
+def test_a_fold_without_two_surfaces_to_train_on_says_which() -> None:
+    dataset = tones().select(labels=['cork', 'felt'])
+    only = np.array(['x' if label == 'cork' else 'y' for label in dataset.labels])
+    with pytest.raises(InvalidData, match="fold 'x' cannot be trained: all windows are of 'felt'"):
+        cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=only)
+
+
+@pytest.mark.parametrize(
+    ('text', 'kind', 'groups'),
+    [
+        ('stratified:4', StratifiedGroupKFold, 'slide'),
+        ('stratified', StratifiedGroupKFold, 'slide'),
+        ('leave-one-out:speed', LeaveOneGroupOut, 'speed'),
+        ('leave-one-out:session', LeaveOneGroupOut, 'session'),
+        ('chronological:0.6', ChronologicalSplit, 'slide'),
+        ('random:10', GroupShuffleSplit, 'slide'),
+    ],
+)
+def test_a_split_is_named_in_a_word(text: str, kind: type, groups: str) -> None:
+    split = parse_split(text)
+    assert isinstance(split.splitter, kind)
+    assert split.groups == groups
+
+
+@pytest.mark.parametrize(
+    'text',
+    ['stratifed:5', 'stratified:one', 'stratified:1', 'leave-one-out:', 'leave-one-out:colour', 'chronological:2', ''],
+)
+def test_a_split_that_makes_no_sense_is_refused_with_what_is_allowed(text: str) -> None:
+    with pytest.raises(InvalidParameter, match=r'stratified:FOLDS|leave one of speed|above 0 and below 1'):
+        parse_split(text)
+
+
+def test_the_interval_of_one_wrong_slide_in_ten_holds_the_share() -> None:
+    one, dataset = cross_validate(RECIPE, tones(), ChronologicalSplit()).pooled[0], 9
+    wrong = SlideResult('felt', one.window_labels, one.estimates)
+    low, high = interval([*[one] * dataset, wrong], slide_counts)
+    assert one.surface == 'cork'
+    assert 0.6 <= low <= 0.9 <= high == 1.0
+
+
+def test_the_table_has_a_row_for_each_fold_and_the_file_all_figures(tmp_path: Path) -> None:
+    result = cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups='speed')
+    lines = table(result, 'leave-one-out:speed')
+    assert [line.split()[0] for line in lines[2:6]] == ['0.02', '0.04', '0.08', 'all']
+    result.write(tmp_path / 'figures.json')
+    written = json.loads((tmp_path / 'figures.json').read_text())
+    assert written == result.as_json()
+    assert written['folds'][0]['slides']['cork/1'] == 'cork'
+    with pytest.raises(InvalidParameter, match='cannot be written'):
+        result.write(tmp_path / 'nowhere' / 'figures.json')
