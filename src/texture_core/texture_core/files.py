@@ -148,11 +148,11 @@ def take_all(file: Readable, most_bytes: int) -> bytes:
     return b''.join(parts)
 
 
-def read_array(file: Readable, budget: Budget) -> AnyArray:
+def read_array(file: Readable, budget: Budget, *, records: bool = False) -> AnyArray:
     """Return the array in a stream of NumPy's format (.npy); nothing in it is run.
 
     Memory is taken as the values come, and not as the header promises. Each value counts as 8 bytes at least, since
-    it will be computed with as such.
+    it will be computed with as such. With `records`, records of plain numbers are read, too.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def read_array(file: Readable, budget: Budget) -> AnyArray:
     FileRefused
         If it is no such array, its values do not follow, or they are more than the budget allows.
     """
-    shape, fortran, dtype = _array_header(file)
+    shape, fortran, dtype = _array_header(file, records)
     n_bytes = math.prod(shape) * dtype.itemsize
     budget.spend(max(n_bytes, math.prod(shape) * 8))
     content = bytearray()
@@ -221,7 +221,7 @@ class Archive:
         most = self.budget.left if most_bytes is None else min(most_bytes, self.budget.left)
         return self._of_member(name, lambda member: self._whole(member, most))
 
-    def array(self, name: str) -> AnyArray:
+    def array(self, name: str, *, records: bool = False) -> AnyArray:
         """Return the array in a member, see `read_array`; KeyError if there is no such member.
 
         Returns
@@ -229,7 +229,7 @@ class Archive:
         (...)
             Array of the shape that the member states.
         """
-        return self._of_member(name, lambda member: read_array(member, self.budget))
+        return self._of_member(name, lambda member: read_array(member, self.budget, records=records))
 
     def _whole(self, member: _Counted, most_bytes: int) -> bytes:
         content = take_all(member, most_bytes)
@@ -296,7 +296,7 @@ def _check_regular(mode: int) -> None:
     raise FileRefused(f'it is {kind}; a regular file is needed')
 
 
-def _array_header(file: Readable) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+def _array_header(file: Readable, records: bool) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     try:
         version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
         if version not in HEADERS:
@@ -308,8 +308,13 @@ def _array_header(file: Readable) -> tuple[tuple[int, ...], bool, np.dtype[Any]]
         raise FileRefused(f'it has no array header that can be read: {type(error).__name__}: {error}') from error
     if dtype.hasobject:
         raise FileRefused('it is an array of Python objects, which would run code; plain numbers or texts are needed')
-    if dtype.kind not in 'biufcUS':
+    if dtype.kind not in 'biufcUS' and not (records and _is_record(dtype)):
         raise FileRefused(f'it is an array of {dtype}; plain numbers or texts are needed')
     if not dtype.itemsize or any(type(length) is not int or length < 0 for length in shape):
         raise FileRefused(f'it promises an array of shape {shape} of {dtype}, which there is not')
     return shape, fortran, dtype
+
+
+def _is_record(dtype: np.dtype[Any]) -> bool:
+    """Return whether a type is a record of plain numbers."""
+    return bool(dtype.names) and all(dtype[name].kind in 'biuf' for name in dtype.names or ())

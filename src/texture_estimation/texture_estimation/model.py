@@ -220,7 +220,7 @@ def load_model(path: str | Path) -> TextureModel:
         raise ModelMismatch(f"model '{target}' estimates roughness; load it in the roughness_estimator")
     try:
         recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
-        parameters = model_files.load_parameters(content, TRUSTED)
+        parameters = model_files.load_parameters(content, TRUSTED, estimators=recipe.learner_name == 'sklearn')
         examples, novelty_detector, gaussians = (
             parameters.pop(name, None) for name in (EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL)
         )

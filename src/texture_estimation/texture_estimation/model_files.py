@@ -9,10 +9,12 @@ import os
 import struct
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from texture_core.errors import ModelMismatch, TextureError
+from texture_core.errors import InvalidParameter, ModelMismatch, TextureError
 from texture_core.files import MB, Archive, FileRefused, read_bounded
 from texture_core.plain_data import MAX_CARD_BYTES, load_json, parse_json
 from texture_estimation.plain_skops import SCHEMA, read_plain_skops
@@ -20,7 +22,15 @@ from texture_estimation.plain_skops import SCHEMA, read_plain_skops
 FORMAT = 1
 MAX_BYTES = 200 * MB  # of a file of parts; ensembles of networks over many features come to 20 MB
 MAX_SCHEMA_BYTES = 2 * MB  # each node in it becomes objects of 2 kB
+MAX_ESTIMATOR_SCHEMA_BYTES = 10 * MB  # a thousand trees
 NODES = ('DictNode', 'ListNode', 'TupleNode', 'JsonNode', 'NdArrayNode', 'TypeNode', 'ObjectNode')
+# What an estimator of scikit-learn holds beside these; its trees are checked before they are used.
+ESTIMATOR_NODES = ('TreeNode', 'RandomStateNode')
+ESTIMATOR_PARTS = (
+    'sklearn.calibration._CalibratedClassifier',
+    'sklearn.neural_network._stochastic_optimizers.AdamOptimizer',
+    'sklearn.neural_network._stochastic_optimizers.SGDOptimizer',
+)
 # What unpacking, and using what came out, raises at files that are damaged or made to do harm, found by trying.
 BROKEN = (
     TextureError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RuntimeError,
@@ -63,14 +73,29 @@ def read(path: str | Path) -> tuple[dict[str, Any], bytes]:
     return card, _read_parameters(target.with_name(f'{target.name}.skops'), str(card.get('sha256')))
 
 
-def load_parameters(content: bytes, trusted: Sequence[str]) -> dict[str, Any]:
-    """Return what was trained; nothing is built of types that are not `trusted`, and no code of the file is run."""
+def load_parameters(content: bytes, trusted: Sequence[str], *, estimators: bool = False) -> dict[str, Any]:
+    """Return what was trained; nothing is built of types that are not trusted, and no code of the file is run.
+
+    Parameters
+    ----------
+    content
+        Bytes of NAME.skops.
+    trusted
+        Types that it may hold beyond plain values and arrays.
+    estimators
+        Whether it may hold any estimator of scikit-learn and its decision trees, too.
+
+    Raises
+    ------
+    ModelMismatch
+        If it holds something else.
+    """
     with Archive(io.BytesIO(content)) as file:
         plain = read_plain_skops(file)
     if plain is not None:
         return plain
     with Archive(io.BytesIO(content)) as file:
-        _check_parts(file, trusted)
+        trusted = _check_parts(file, trusted, estimators)
     from skops.io import get_untrusted_types, loads  # noqa: PLC0415  # takes seconds, and few models need it
 
     unexpected = sorted(set(get_untrusted_types(data=content)) - set(trusted))
@@ -79,19 +104,57 @@ def load_parameters(content: bytes, trusted: Sequence[str]) -> dict[str, Any]:
     return dict(loads(content, trusted=list(trusted)))
 
 
-def _check_parts(file: Archive, trusted: Sequence[str]) -> None:
-    """Raise ModelMismatch or FileRefused unless skops, which counts nothing, may read the members of an archive.
+def check_storable(parameters: Mapping[str, Any], name: str) -> None:
+    """Raise InvalidParameter if a model file could not hold an estimator of scikit-learn, or not be read again."""
+    from skops.io import dumps  # noqa: PLC0415  # takes a second
+
+    try:
+        content = dumps(dict(parameters))
+        with Archive(io.BytesIO(content)) as file:
+            _check_parts(file, (), estimators=True)
+    except BROKEN as error:
+        raise InvalidParameter(
+            f"'{name}' cannot be stored as a model: {error}; use another estimator or other parameters "
+            '(neighbours with algorithm: brute, fewer trees)'
+        ) from error
+
+
+def _check_parts(file: Archive, trusted: Sequence[str], estimators: bool) -> list[str]:
+    """Return the trusted types; raise ModelMismatch or FileRefused unless skops, which counts nothing, may read a file.
 
     A member may be named by many nodes, each of which makes an array of its own; and some kinds of node would read
     archives within the archive, or call functions.
     """
-    schema = parse_json(file.read(SCHEMA, MAX_SCHEMA_BYTES).decode())
+    schema = parse_json(file.read(SCHEMA, MAX_ESTIMATOR_SCHEMA_BYTES if estimators else MAX_SCHEMA_BYTES).decode())
+    kinds = (*NODES, *ESTIMATOR_NODES) if estimators else NODES
+    found = set(trusted)
     for node in _nodes(schema):
         kind, name = str(node['__loader__']), f'{node.get("__module__")}.{node.get("__class__")}'
-        if kind not in NODES or (kind == 'ObjectNode' and name not in trusted):
+        known = name in found or (estimators and _is_estimator(name))
+        if kind not in kinds or (kind == 'ObjectNode' and not known):
             raise ModelMismatch(f'it holds {name} ({kind}), which no model of this suite holds')
+        if kind in ('ObjectNode', 'TreeNode'):
+            found.add(name)
         if kind == 'NdArrayNode' and node.get('type') == 'numpy':
-            file.array(str(node['file']))
+            file.array(str(node['file']), records=estimators)
+    return sorted(found)
+
+
+@lru_cache(maxsize=1000)
+def _is_estimator(name: str) -> bool:
+    """Return whether a name is that of an estimator of scikit-learn, or of a part of one that holds plain values."""
+    if name in ESTIMATOR_PARTS:
+        return True
+    module, _, cls_name = name.rpartition('.')
+    if not module.startswith('sklearn.'):
+        return False
+    from sklearn.base import BaseEstimator  # noqa: PLC0415  # takes a second
+
+    try:
+        cls = getattr(import_module(module), cls_name, None)
+    except ImportError:
+        return False
+    return isinstance(cls, type) and issubclass(cls, BaseEstimator)
 
 
 def _nodes(value: Any) -> Iterator[Mapping[str, Any]]:

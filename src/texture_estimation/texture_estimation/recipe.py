@@ -14,7 +14,7 @@ from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, Evi
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
 from texture_features.feature_set import FeatureSet
-from texture_features.recipe_entry import choose
+from texture_features.recipe_entry import choose, entry_of
 from texture_features.recipe_file import read_recipe
 from texture_features.windowing.windows import WindowParams
 
@@ -102,7 +102,7 @@ class Recipe:
         return {
             'description': self.description,
             **self.feature_set.as_mapping(),
-            'learner': {self.learner_name: dataclasses.asdict(self.learner)},
+            'learner': {self.learner_name: entry_of(self.learner)},
             'evidence': {self.evidence_name: dataclasses.asdict(self.evidence)},
             'training': dataclasses.asdict(self.training),
         }

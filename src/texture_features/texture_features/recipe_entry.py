@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -32,4 +33,13 @@ def choose(catalogue: Mapping[str, type[T]], entry: Any, kind: str, where: str) 
         cls = find(catalogue, str(name), kind)
     except UnknownName as error:
         raise UnknownName(f'{where}: {error}') from error
-    return str(name), from_mapping(cls, values or {}, f"{where}, {kind} '{name}'")
+    place = f"{where}, {kind} '{name}'"
+    build = getattr(cls, 'from_recipe', None)  # of an entry whose parameters are not known beforehand
+    return str(name), build(values or {}, place) if build else from_mapping(cls, values or {}, place)
+
+
+def entry_of(chosen: Any) -> dict[str, Any]:
+    """Return the parameters of what was chosen, as a recipe writes them."""
+    write = getattr(chosen, 'as_recipe', None)
+    entry: dict[str, Any] = write() if write else dataclasses.asdict(chosen)
+    return entry

@@ -10,6 +10,7 @@ from texture_estimation.learners.learner import Learner
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.learners.naive_bayes import NaiveBayes
 from texture_estimation.learners.passive_aggressive import PassiveAggressive
+from texture_estimation.learners.sklearn_learner import SklearnLearner
 from texture_estimation.learners.svm_linear import SvmLinear
 from texture_estimation.learners.svm_max_wins import SvmMaxWins
 from texture_estimation.learners.svm_pairs import SvmPairs
@@ -25,4 +26,5 @@ LEARNERS: Mapping[str, type[Learner]] = {
     'passive_aggressive': PassiveAggressive,  # Crammer et al. 2006; Kaboli et al. 2015
     'em_mixture': EmMixture,  # Kaboli et al. 2015
     'svm_max_wins': SvmMaxWins,  # Hu et al. 2014
+    'sklearn': SklearnLearner,  # any classifier of scikit-learn
 }

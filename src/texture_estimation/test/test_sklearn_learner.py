@@ -1,0 +1,155 @@
+"""Any classifier of scikit-learn as a learner: what it answers, what is stored, and what is refused."""
+
+import fractions
+import io
+import zipfile
+
+import numpy as np
+import pytest
+import skops.io
+from sklearn.ensemble import ExtraTreesClassifier, RandomForestClassifier
+
+from texture_core.errors import InvalidParameter, ModelMismatch, TextureError
+from texture_estimation import model_files
+from texture_estimation.classification.training import train
+from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.learners.sklearn_learner import SklearnLearner, SklearnPredictor
+from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.model import load_model
+from texture_estimation.recipe import Recipe
+
+INPUTS = {'signal': {'features': ['hjorth']}}
+TREES = {'estimator': 'sklearn.ensemble:ExtraTreesClassifier', 'n_estimators': 20}
+ESTIMATORS = (
+    TREES,
+    {'estimator': 'sklearn.ensemble:RandomForestClassifier', 'n_estimators': 10, 'max_depth': 5},
+    {'estimator': 'sklearn.neighbors:KNeighborsClassifier', 'algorithm': 'brute'},
+    {'estimator': 'sklearn.linear_model:LogisticRegression'},
+    {'estimator': 'sklearn.linear_model:RidgeClassifier'},  # decision values, no probabilities
+    {'estimator': 'sklearn.discriminant_analysis:LinearDiscriminantAnalysis'},
+    {'estimator': 'sklearn.neural_network:MLPClassifier', 'hidden_layer_sizes': [8], 'learning_rate_init': 0.05},
+    {'estimator': 'sklearn.svm:SVC'},
+)
+
+
+def recipe_of(entry):
+    return Recipe.from_mapping({'inputs': INPUTS, 'learner': {'sklearn': entry}}, 'mine')
+
+
+@pytest.fixture(scope='module')
+def trees(examples):
+    return train(recipe_of(TREES), examples)
+
+
+@pytest.mark.parametrize('entry', ESTIMATORS, ids=lambda entry: entry['estimator'].rsplit(':')[1])
+@pytest.mark.filterwarnings('ignore::sklearn.exceptions.ConvergenceWarning')
+def test_a_named_classifier_recognises_is_stored_and_answers_the_same_again(entry, examples, make_examples, tmp_path):
+    model = train(recipe_of(entry), examples)
+    other = make_examples(seed=1)
+    assert np.mean(np.array(model.decide(other.X)) == other.y) > 0.8
+    loaded = load_model(model.save(tmp_path / 'mine'))
+    np.testing.assert_array_equal(loaded.predict_log_proba(other.X), model.predict_log_proba(other.X))
+    assert loaded.recipe.learner == model.recipe.learner
+
+
+def test_the_decisions_are_those_of_scikit_learn_itself(trees, examples, make_examples):
+    mean, scale = standardisation(examples.X)
+    alone = ExtraTreesClassifier(n_estimators=20, random_state=0).fit((examples.X - mean) / scale, examples.y)
+    other = make_examples(seed=1)
+    expected = alone.predict_proba((other.X - mean) / scale)
+    best = expected.max(axis=1)
+    clear = np.count_nonzero(expected == best[:, None], axis=1) == 1
+    labels = np.array(trees.decide(other.X))[clear]
+    assert labels.tolist() == alone.classes_[expected.argmax(axis=1)][clear].tolist()
+
+
+def test_probabilities_are_calibrated_on_slides_held_out(make_examples):
+    examples, other = make_examples(slides=8, spread=2.0), make_examples(seed=1, slides=8, spread=2.0)
+    model = train(recipe_of({'estimator': 'sklearn.naive_bayes:GaussianNB'}), examples)
+    probabilities = np.exp(model.predict_log_proba(other.X))
+    right = np.array(model.decide(other.X)) == other.y
+    assert 'held-out slides' in model.training['calibration']
+    assert abs(probabilities.max(axis=1).mean() - right.mean()) < 0.08
+
+
+def test_evidence_accumulates_over_a_slide_as_with_any_learner(trees, examples):
+    evidence = EvidenceAccumulator(trees)
+    *estimates, last = [evidence.update(vector) for vector in examples.vectors('felt/0')]
+    assert last.final
+    assert last.label == 'felt'
+    assert last.confidence >= estimates[0].confidence
+
+
+def test_the_recipe_in_the_card_names_the_estimator_and_its_parameters(trees):
+    assert trees.card['recipe']['learner'] == {'sklearn': TREES}
+
+
+@pytest.mark.parametrize(
+    ('entry', 'sentence'),
+    [
+        ({'estimator': 'os:system'}, 'a public class of scikit-learn'),
+        ({'estimator': 'sklearn.ensemble._forest:ExtraTreesClassifier'}, 'a public class of scikit-learn'),
+        ({'estimator': 'sklearn.ensemble:ExtraTrees'}, "there is no 'ExtraTrees'"),
+        ({'estimator': 'sklearn.nothing:ExtraTrees'}, "there is no 'ExtraTrees'"),
+        ({'estimator': 'sklearn.ensemble:ExtraTreesRegressor'}, 'is no classifier'),
+        ({'estimator': 'sklearn.ensemble:VotingClassifier'}, 'needs other estimators'),
+        ({**TREES, 'n_trees': 5}, "no parameter of 'sklearn.ensemble:ExtraTreesClassifier' 'n_trees'"),
+        ({**TREES, 'n_estimators': {'a': 1}}, 'a number, a text, true, false, null or a list'),
+        ({'estimator': 3}, 'name an estimator'),
+        ([], 'name an estimator'),
+    ],
+)
+def test_a_recipe_that_names_no_usable_classifier_is_refused(entry, sentence):
+    if entry == []:
+        entry = ['x']
+    with pytest.raises(InvalidParameter, match=sentence):
+        recipe_of(entry)
+
+
+def test_a_value_that_the_estimator_refuses_is_told_when_it_is_trained(examples):
+    with pytest.raises(InvalidParameter, match='cannot be trained'):
+        train(recipe_of({**TREES, 'n_estimators': -1}), examples)
+
+
+@pytest.mark.parametrize(
+    'entry',
+    [
+        {'estimator': 'sklearn.neighbors:KNeighborsClassifier', 'algorithm': 'kd_tree'},
+        {'estimator': 'sklearn.ensemble:HistGradientBoostingClassifier', 'max_iter': 2},
+    ],
+)
+def test_an_estimator_that_cannot_be_stored_safely_is_refused_at_training(entry, examples):
+    with pytest.raises(InvalidParameter, match='cannot be stored as a model: it holds'):
+        train(recipe_of(entry), examples)
+
+
+def test_a_file_with_another_type_is_refused():
+    content = skops.io.dumps({'estimator': fractions.Fraction(1, 2)})
+    with pytest.raises(TextureError, match=r'it holds fractions\.Fraction'):
+        model_files.load_parameters(content, (), estimators=True)
+
+
+def test_estimators_are_refused_in_models_of_other_learners(trees, tmp_path):
+    path = trees.save(tmp_path / 'mine')
+    with pytest.raises(ModelMismatch, match='which no model of this suite holds'):
+        model_files.load_parameters(path.read_bytes(), ())
+
+
+def test_a_tree_that_points_outside_itself_is_refused_before_it_is_used():
+    rng = np.random.default_rng(0)
+    values, codes = rng.normal(size=(40, 3)), np.repeat([0, 1], 20)
+    forest = RandomForestClassifier(n_estimators=2, random_state=0).fit(values + codes[:, None], codes)
+    content = io.BytesIO(skops.io.dumps(forest))
+    with zipfile.ZipFile(content) as file:
+        assert any(name.endswith('.npy') for name in file.namelist())
+    tree = forest.estimators_[1].tree_
+    state = tree.__getstate__()
+    state['nodes']['left_child'][0] = 10**6
+    tree.__setstate__(state)
+    with pytest.raises(ModelMismatch, match='points outside its nodes or features'):
+        SklearnPredictor(forest, np.zeros(3), np.ones(3), 2, 1.0)
+
+
+def test_the_defaults_of_scikit_learn_hold_but_the_seed_is_fixed():
+    learner = SklearnLearner('sklearn.ensemble:RandomForestClassifier')
+    assert learner.new_estimator().get_params() == {**RandomForestClassifier().get_params(), 'random_state': 0}
