@@ -45,21 +45,21 @@ class SlideMotion:
 
 
 def group_similar(motions: Sequence[SlideMotion]) -> list[SlideMotion]:
-    """Return for each motion the middle one of its kind; kinds are founded by the first of them, in their order."""
+    """Return for each motion the median of its group; a motion joins the first group whose first motion is similar."""
     founders: list[SlideMotion] = []
-    places = []
+    groups = []
     for motion in motions:
-        place = next((k for k, founder in enumerate(founders) if motion.is_similar(founder)), len(founders))
-        if place == len(founders):
+        group = next((k for k, founder in enumerate(founders) if motion.is_similar(founder)), len(founders))
+        if group == len(founders):
             founders.append(motion)
-        places.append(place)
-    middles = [
-        _middle([motion for motion, own in zip(motions, places, strict=True) if own == k]) for k in range(len(founders))
+        groups.append(group)
+    medians = [
+        _median([motion for motion, own in zip(motions, groups, strict=True) if own == k]) for k in range(len(founders))
     ]
-    return [middles[place] for place in places]
+    return [medians[group] for group in groups]
 
 
-def _middle(motions: Sequence[SlideMotion]) -> SlideMotion:
+def _median(motions: Sequence[SlideMotion]) -> SlideMotion:
     """Return the motion with the medians of all numbers, rounded to what people would ask for."""
     heading = cmath.phase(sum(cmath.rect(1.0, motion.direction_rad) for motion in motions))
     speed, force, duration = (

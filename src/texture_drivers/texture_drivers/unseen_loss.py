@@ -28,7 +28,7 @@ class UnseenLoss:
         self._rate_hz = rate_hz
         self._window_ns = window_s * NANOSECONDS
         self._end_ns = 0.2 * self._window_ns
-        self._least_ns = min_duration_s * NANOSECONDS
+        self._min_duration_ns = min_duration_s * NANOSECONDS
         self.restart()
 
     def restart(self) -> None:
@@ -46,7 +46,7 @@ class UnseenLoss:
         arrival_ns
             When.
         """
-        if late_ns <= self._least_ns:
+        if late_ns <= self._min_duration_ns:
             self.restart()
             return 0
         if self._since_ns is None:

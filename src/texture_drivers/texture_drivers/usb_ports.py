@@ -55,7 +55,7 @@ def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts =
         raise DeviceError(
             f"device 'auto' may be any of {len(found)} {kind}s: {', '.join(found)}; set the parameter device to one"
         )
-    seen = ', '.join(sorted(_extracted(port) for port in listed)) or 'none'
+    seen = ', '.join(sorted(_description(port) for port in listed)) or 'none'
     wanted = ' or '.join(_numbers(*usb_id) for usb_id in usb_ids)
     raise DeviceError(
         f"device 'auto' is no {kind} ({wanted}): the serial ports here are {seen}; plug it in, or set the parameter "
@@ -69,7 +69,7 @@ def serial_number(device: str, ports: ListPorts = list_ports.comports) -> str:
     return next((port.serial_number or '' for port in ports() if port.device == path), '')
 
 
-def _extracted(port: Port) -> str:
+def _description(port: Port) -> str:
     if port.vid is None or port.pid is None:
         return port.device
     return f'{port.device} ({_numbers(port.vid, port.pid)})'

@@ -8,6 +8,7 @@ import pytest
 from sklearn.preprocessing import StandardScaler
 from skops.io import dumps, loads
 
+from texture_core.files import Archive
 from texture_estimation.plain_skops import read_plain_skops
 
 PLAIN = {
@@ -19,11 +20,11 @@ PLAIN = {
 
 
 def read(content: bytes):
-    with zipfile.ZipFile(io.BytesIO(content)) as file:
+    with Archive(io.BytesIO(content)) as file:
         return read_plain_skops(file)
 
 
-def test_plain_parts_are_read_as_the_library_reads_them() -> None:
+def test_plain_values_are_read_as_the_library_reads_them() -> None:
     content = dumps(PLAIN)
     ours, theirs = read(content), loads(content)
     np.testing.assert_equal(ours, theirs)
@@ -51,7 +52,7 @@ def test_a_file_without_its_arrays_or_its_schema_is_not_plain() -> None:
         assert read(less.getvalue()) is None
 
 
-def test_a_node_that_judges_does_not_wait_for_libraries_of_training(model, tmp_path) -> None:
+def test_a_node_that_classifies_does_not_wait_for_libraries_of_training(model, tmp_path) -> None:
     program = (
         'import sys; from texture_estimation.model import load_model; load_model(sys.argv[1]); '
         "print(sorted({'sklearn', 'skops'} & set(sys.modules)))"

@@ -167,8 +167,16 @@ def _by_name(section: Mapping[str, Any]) -> dict[str, Any]:
 
 def _with_slow_channels(item: LabelledSlide, channels: Sequence[str]) -> LabelledSlide:
     slow = item.signals['signal_static']
-    places = [slow[0].channels.index(name) for name in channels]
-    chosen = [replace(batch, channels=tuple(channels), samples=batch.samples[:, places]) for batch in slow]
+    columns = [slow[0].channels.index(name) for name in channels]
+    chosen = [
+        replace(
+            batch,
+            channels=tuple(channels),
+            units=tuple(batch.units[column] for column in columns) if batch.units else (),
+            samples=batch.samples[:, columns],
+        )
+        for batch in slow
+    ]
     return replace(item, signals={**item.signals, 'signal_static': chosen})
 
 

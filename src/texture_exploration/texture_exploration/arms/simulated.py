@@ -209,12 +209,10 @@ class SimulatedArm:
         command, given_ns = self._last_command if not self._fault else (STANDSTILL, now_ns)
         left_s = self._params.command_timeout_s + (given_ns - now_ns) * 1e-9
         # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
-        motion_start_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
-        moved = (
-            self._velocity_control.moved_m(now_ns) if self._velocity_control else self._moved_m(command, motion_start_s)
-        )
+        moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
+        moved = self._velocity_control.moved_m(now_ns) if self._velocity_control else self._moved_m(command, moving_s)
         x, y, z = (at + step_m for at, step_m in zip(self._state.position, moved, strict=True))
-        velocity = _speed(moved, motion_start_s)
+        velocity = _speed(moved, moving_s)
         if left_s < 0:
             velocity = (0.0, 0.0, 0.0)
             command = STANDSTILL
