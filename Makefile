@@ -1,8 +1,9 @@
 # The set-up is tools/workspace.py; every target below calls it first, and a finished set-up is recognised in a second.
 PYTHON ?= python3
 RUN := .venv/bin/ros-run
-# Most tests of nodes and devices wait for something, so more of them than cores run side by side.
-TEST_JOBS ?= 4
+# Tests that run against the clock mostly wait, but a crowd of them would disturb one another.
+TEST_JOBS ?= 2
+REALTIME_JOBS ?= 2
 # Public recordings for evaluation, if they lie beside the repository or where the user says.
 export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
@@ -20,7 +21,8 @@ lint: setup
 	@$(RUN) mypy
 
 test: setup lint
-	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile
+	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile -m "not realtime"
+	@$(RUN) python -m pytest -n $(REALTIME_JOBS) --dist loadfile -m realtime
 
 benchmark: setup
 	@.venv/bin/texture benchmark all

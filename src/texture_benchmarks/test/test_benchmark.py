@@ -6,6 +6,8 @@ from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.result import BenchmarkOptions
 from texture_core.errors import InvalidData, UnknownName
 
+pytestmark = pytest.mark.realtime
+
 
 def test_an_unknown_benchmark_and_missing_data_are_refused_with_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="did you mean 'latency'"):

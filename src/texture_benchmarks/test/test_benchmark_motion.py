@@ -9,6 +9,8 @@ from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.motion.trial import radius_error_m
 from texture_benchmarks.result import BenchmarkOptions
 
+pytestmark = pytest.mark.realtime
+
 
 def test_force_speed_and_circle_are_kept_and_the_limit_is_foretold(tmp_path: Path) -> None:
     result, path = run_benchmark('motion', BenchmarkOptions(tmp_path, quick=True))

@@ -6,6 +6,8 @@ import pytest
 from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.result import BenchmarkOptions
 
+pytestmark = pytest.mark.realtime
+
 
 def test_where_there_is_a_checksum_nothing_false_is_believed(tmp_path: Path) -> None:
     result, path = run_benchmark('sensors', BenchmarkOptions(tmp_path, quick=True))

@@ -18,6 +18,8 @@ from texture_drivers.params import SensorParams
 from texture_simulation.devices.biotac import BoardFaults, EmulatedBioTac
 from texture_simulation.devices.faults import FrameFaults
 
+pytestmark = pytest.mark.realtime
+
 Make = Callable[..., Rig]
 
 

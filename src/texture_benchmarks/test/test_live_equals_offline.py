@@ -22,7 +22,7 @@ from texture_recordings.importers.biotac20 import import_biotac20
 from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import find_slides
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data') / 'biotac20'
 Estimates = dict[str, list[TextureEstimate]]

@@ -17,6 +17,8 @@ from texture_exploration.arms.simulated_surface import SimulatedSurface
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.stiffness import StiffnessEstimate
 
+pytestmark = pytest.mark.realtime
+
 TILT = math.radians(10)
 
 

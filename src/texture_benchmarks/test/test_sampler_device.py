@@ -16,6 +16,8 @@ from texture_core.signal import lost_samples
 from texture_simulation.devices.daq import EmulatedDaq
 from texture_simulation.devices.faults import ByteFaults, FrameFaults
 
+pytestmark = pytest.mark.realtime
+
 Make = Callable[..., Rig]
 
 

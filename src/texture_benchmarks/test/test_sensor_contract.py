@@ -18,6 +18,8 @@ from texture_drivers.catalogue import SENSORS
 from texture_simulation.devices.catalogue import DEVICES
 from texture_simulation.devices.faults import ByteFaults, FrameFaults
 
+pytestmark = pytest.mark.realtime
+
 WITHOUT_DEVICE = {'file'}
 FAMILIES = ('tsf85', 'biotac', 'daq', 'pvdf')  # the others differ from one of these by a table alone
 CHECKED = ('biotac', 'daq', 'pvdf')  # have a checksum on the line

@@ -19,7 +19,7 @@ from texture_core.ros.qos import SENSOR_QOS
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.devices.faults import FrameFaults
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 OK, WARN, ERROR = b'\x00', b'\x01', b'\x02'
 
 

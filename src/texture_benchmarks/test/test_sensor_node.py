@@ -16,7 +16,7 @@ from texture_core.ros.qos import SENSOR_QOS
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.devices.biotac import EmulatedBioTac
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.recipe import load_recipe
 from texture_features.labelled_features import LabelledFeatures
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 DEADLINE_S = 60.0
 NAMES = ('a', 'b', 'c')
 

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo.isolation import free_port  # noqa: E402

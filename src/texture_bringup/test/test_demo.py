@@ -20,6 +20,8 @@ from texture_bringup.demo.results import Row, table
 from texture_bringup.demo.run import demonstrate
 from texture_core.estimates import TextureEstimate
 
+pytestmark = pytest.mark.realtime
+
 DEADLINE_S = 60.0
 SHORT = DemoPlan(surfaces=('glass', 'ridge_2mm_deep'), learning_slides=2, recognition_slides=1)
 

@@ -14,7 +14,7 @@ from texture_core.errors import MotionAborted
 from texture_core.exploration import ExplorationRequest
 
 # An explorer that answers at the end finds nobody there any more.
-pytestmark = [pytest.mark.ros, pytest.mark.filterwarnings('ignore:failed to send response')]
+pytestmark = [pytest.mark.realtime, pytest.mark.ros, pytest.mark.filterwarnings('ignore:failed to send response')]
 DOMAIN = 62
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup import command  # noqa: E402
@@ -52,7 +52,13 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
     for name, value in {'ROS_DOMAIN_ID': str(ROBOTS[robot]), 'ROS_LOG_DIR': str(tmp_path)}.items():
         monkeypatch.setenv(name, value)
     # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
-    patient = {'state_timeout_s': 1.5, 'estimate_timeout_s': 10.0, 'silence_s': 1.5, 'watchdog_hz': 1.0}
+    patient = {
+        'state_timeout_s': 1.5,
+        'estimate_timeout_s': 10.0,
+        'silence_s': 1.5,
+        'signal_timeout_s': 3.0,
+        'watchdog_hz': 1.0,
+    }
     (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
     place = {'ip': '127.0.0.110'} if robot == 'ur' else {'robot': tmp_path / robot}
     given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'surface': SURFACE, 'model': model, **place}

@@ -15,6 +15,8 @@ from texture_simulation.devices.rails import EmulatedRails
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
+pytestmark = pytest.mark.realtime
+
 
 @contextlib.contextmanager
 def ur_controller():

@@ -12,7 +12,7 @@ from texture_core.ros.waiting_executor import WaitingExecutor
 from texture_exploration.nodes.explore_preset import ExplorePreset
 from texture_exploration.nodes.explorer import ExplorerNode
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 PRESET = 'motion: linear_slide\nspeed_m_s: 0.1\ndistance_m: 0.02\nvary: {direction_deg: [0, 720, .inf]}\n'
 
 

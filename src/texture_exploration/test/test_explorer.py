@@ -8,6 +8,8 @@ from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
+pytestmark = pytest.mark.realtime
+
 QUICK = ExplorationRequest('linear_slide', speed_m_s=0.1, distance_m=0.02)
 SLOW = ExplorationRequest('linear_slide', speed_m_s=0.01, distance_m=0.1)
 DEADLINE_S = 20.0

@@ -34,7 +34,7 @@ QUICK = {'motion': 'linear_slide', 'speed_m_s': 0.1, 'distance_m': 0.02}
 SLOW = {'motion': 'linear_slide', 'speed_m_s': 0.01, 'distance_m': 0.1}
 DEADLINE_S = 20.0
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 
 class Client(Node):

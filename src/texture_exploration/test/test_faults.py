@@ -137,6 +137,8 @@ from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
+
+pytestmark = pytest.mark.realtime
 name, parameters, request = sys.argv[1], eval(sys.argv[2]), eval(sys.argv[3])
 touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.2)
 limits = SafetyLimits(state_timeout_s=1.0)

@@ -38,6 +38,8 @@ THUMB = LEAP.fingers['thumb']['press'].id
 PARENT = """
 import sys, time
 from texture_exploration.hands.dynamixel import DynamixelHand
+
+pytestmark = pytest.mark.realtime
 hand = DynamixelHand('leap', sys.argv[1])
 hand.connect()
 hand.grip({'thumb': 2.0})

@@ -22,6 +22,8 @@ from texture_exploration.safety import SafetyLimits
 from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
 from texture_simulation.devices.dynamixel_motors import DynamixelMotors, PressingMotor
 
+pytestmark = pytest.mark.realtime
+
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')
 OVERLOAD = (

@@ -12,6 +12,8 @@ from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
+pytestmark = pytest.mark.realtime
+
 TOUCH = TouchParams()
 REQUEST = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.03)
 DEADLINE_S = 20.0

@@ -23,6 +23,8 @@ from texture_simulation.devices.faults import ByteFaults
 from texture_simulation.devices.rails import EmulatedRails
 from texture_simulation.devices.rails_firmware import RailsMachine
 
+pytestmark = pytest.mark.realtime
+
 DEADLINE_S = 20.0
 SLIDING = ArmCommand(tangential_m_s=(0.02, 0.01))
 

@@ -10,7 +10,7 @@ from texture_msgs import msg, srv
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 DEADLINE_S = 30.0
 PARAMETERS = {'watch_signal': 'true', 'start_height_m': 0.002, 'state_timeout_s': 1.0}

@@ -31,6 +31,8 @@ from texture_exploration.safety import SafetyLimits
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
+pytestmark = pytest.mark.realtime
+
 PAGE = Path(__file__).parents[3] / 'docs' / 'robots' / 'ur.md'
 PARENT = Path(__file__).with_name('ur_parent.py')
 DEADLINE_S = 20.0

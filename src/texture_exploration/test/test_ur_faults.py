@@ -26,9 +26,10 @@ from texture_exploration.safety import SafetyLimits
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
-pytestmark = pytest.mark.skipif(
-    importlib.util.find_spec('rtde_control') is None, reason='ur-rtde is not installable here'
-)
+pytestmark = [
+    pytest.mark.realtime,
+    pytest.mark.skipif(importlib.util.find_spec('rtde_control') is None, reason='ur-rtde is not installable here'),
+]
 DEADLINE_S = 30.0
 ABOVE_PLANE_M = 0.008  # so much higher than the arm was told is the surface
 PRESSING = ArmCommand(force_n=3.0)

@@ -14,7 +14,7 @@ class SignalWatchParams:
 
     watch_signal: bool = param(True, "Aborts an exploration when no samples arrive on the topic 'signal'.")
     signal_timeout_s: float = param(
-        0.25,
+        0.5,
         'Sets how long no sample may arrive before the exploration is aborted.',
         unit='s',
         low=0.02,

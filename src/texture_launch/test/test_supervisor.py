@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.realtime
+
 GOOD = 'trap "exit 0" INT TERM; echo "ready $$"; while :; do sleep 0.05; done'
 STUBBORN = 'trap "" INT; trap "exit 0" TERM; echo "ready $$"; while :; do sleep 0.05; done'
 PARENT = 'sleep 1000 & trap "exit 0" INT TERM; echo "ready $!"; while :; do sleep 0.05; done'

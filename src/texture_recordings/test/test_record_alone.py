@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from texture_core.ros.local_graph import LocalGraph
 from texture_recordings.bags import read_bag
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 DOMAIN = 96
 STOP_DEADLINE_S = 30.0

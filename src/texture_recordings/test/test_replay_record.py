@@ -13,7 +13,7 @@ from texture_core.signal import TactileSignal
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import read_bag
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 STEP_NS = 10_000_000
 

@@ -17,6 +17,8 @@ from texture_simulation.devices.dynamixel_motors import (
     leap_hand,
 )
 
+pytestmark = pytest.mark.realtime
+
 DEADLINE_S = 20.0
 PING_1 = bytes.fromhex('fffffd00010300 01 194e'.replace(' ', ''))
 

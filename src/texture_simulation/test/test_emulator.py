@@ -17,6 +17,8 @@ from texture_drivers.tsf85.sensor import Tsf85
 from texture_simulation.devices.faults import ByteFaults
 from texture_simulation.emulator import Emulator, EmulatorParams
 
+pytestmark = pytest.mark.realtime
+
 DEADLINE_S = 15.0
 
 

@@ -18,7 +18,7 @@ from texture_core.ros.qos import SENSOR_QOS
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.nodes.emulator import EmulatorNode
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 
 class Bed:

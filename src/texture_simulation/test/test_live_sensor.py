@@ -22,6 +22,8 @@ from texture_simulation.emulator import Emulator, EmulatorParams
 from texture_simulation.live_sensor import live_biotac, live_daq
 from texture_simulation.scene import load_scene
 
+pytestmark = pytest.mark.realtime
+
 DEADLINE_S = 30.0
 SPEED_M_S, FORCE_N = 0.1, 2.0  # over ridges of 2 mm: 50 Hz
 

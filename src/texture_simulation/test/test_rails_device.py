@@ -7,6 +7,8 @@ import pytest
 from texture_core.framing import Frame, pack, unpack
 from texture_simulation.devices.rails_firmware import LOCKED, OVERLOAD, RailsFirmware, RailsMachine
 
+pytestmark = pytest.mark.realtime
+
 HOLD, MOVING, PRESS = 0, 1, 2
 STEP_S = 0.0025
 

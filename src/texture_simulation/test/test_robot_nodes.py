@@ -11,7 +11,7 @@ from texture_core.ros.local_graph import LocalGraph
 from texture_simulation.nodes.leap_hand import LeapHandNode
 from texture_simulation.nodes.rails import RailsNode
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 DEADLINE_S = 20.0
 NODES = {'rails': RailsNode, 'leap_hand': LeapHandNode}

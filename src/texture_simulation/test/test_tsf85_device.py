@@ -10,6 +10,8 @@ from texture_core.errors import DeviceError
 from texture_simulation.devices.faults import ByteFaults, FrameFaults
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 
+pytestmark = pytest.mark.realtime
+
 TEN_MS = np.arange(10, dtype=np.int16)
 NO_IMAGE = np.empty((0, 28), dtype=np.uint16)
 START, STOP = bytes.fromhex('9A 00 58 01 01'), bytes.fromhex('9A 00 58 01 00')

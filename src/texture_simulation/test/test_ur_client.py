@@ -16,6 +16,8 @@ from texture_core.finger_state import FingerState
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
+pytestmark = pytest.mark.realtime
+
 SESSION = Path(__file__).with_name('ur_session.py')
 DEADLINE_S = 60.0
 IP = '127.0.0.60'

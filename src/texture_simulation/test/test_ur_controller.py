@@ -10,6 +10,8 @@ from texture_simulation.devices.ur.dashboard import DashboardSession
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.tables import DONE, READY, SafetyMode, ScriptCommand
 
+pytestmark = pytest.mark.realtime
+
 SCRIPT = 'def rtde_control():\nend\n'
 
 

@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from texture_core.ros.local_graph import LocalGraph
 from texture_simulation.nodes.ur_controller import UrControllerNode
 
-pytestmark = pytest.mark.ros
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 IP = '127.0.0.65'
 

@@ -8,6 +8,8 @@ from texture_simulation.devices.ur.motions import LinearMove, ServoMove, SpeedMo
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.robot import EmulatedRobot, ForceMode
 
+pytestmark = pytest.mark.realtime
+
 STEP_S = 0.002
 ORIGIN = np.array([0.4, 0.0, 0.1])
 REST = np.zeros(3)
