@@ -21,9 +21,10 @@ from texture_exploration.hands.dynamixel_bus import DynamixelBus, MotorState
 from texture_exploration.hands.profile import load_profile, read_profile
 from texture_exploration.hands.simulated import SimulatedHand
 from texture_exploration.hands.torque_guard import torque_off_packet
-from texture_simulation.devices.dynamixel import EmulatedDynamixelBus
+from texture_simulation.devices.dynamixel import PING, READ, EmulatedDynamixelBus
 from texture_simulation.devices.dynamixel_motors import (
     GOAL_CURRENT,
+    GOAL_POSITION,
     OVERLOAD,
     TORQUE,
     TRIPPED,
@@ -260,6 +261,24 @@ def test_a_second_program_on_the_bus_is_refused_and_disturbs_nothing(bus, hand):
         DynamixelHand('leap', str(bus.port.link)).reboot()
     until(lambda: fault_of(hand) == '')
     until(lambda: all(table[TORQUE] for table in bus.motors.tables.values()))
+
+
+def test_a_late_answer_to_a_ping_is_not_taken_for_a_position(bus, hand, monkeypatch):
+    answer, write, goals = bus._one, bus.motors.write, []
+
+    def late(motor, instruction, params):
+        pong = answer(motor, PING, b'') if motor == 1 and instruction == READ else b''
+        return pong + answer(motor, instruction, params)
+
+    def record(motor, address, data):
+        if (motor, address) == (1, GOAL_POSITION):
+            goals.append(int.from_bytes(data, 'little', signed=True))
+        return write(motor, address, data)
+
+    monkeypatch.setattr(bus, '_one', late)
+    monkeypatch.setattr(bus.motors, 'write', record)
+    hand.connect()
+    assert goals[0] == 2048  # where the motor is; three bytes of a pong and one of its checksum are another number
 
 
 def test_two_motors_with_one_id_are_reported(bus, hand):

@@ -28,6 +28,9 @@ PROTOCOL = 2.0
 SUCCESS = 0
 TRIES = 3
 WAIT_S = 0.001
+# A status packet: `FF FF FD 00 | id | length | 55 | error | parameters | CRC`; its length counts from the 55 on.
+PACKET_ID, PACKET_LENGTH, PACKET_PARAMETERS = 4, 5, 9
+NO_PARAMETERS = 4  # length of a status packet without parameters
 FIRMWARE = 6  # address of its version, of one byte, in all control tables of protocol 2.0
 TRIPPED = 0xFF  # the register of the Bus Watchdog after it has stopped the motor
 RESTART_S = 3.0  # a motor has rebooted within
@@ -269,15 +272,14 @@ class DynamixelBus:
             return ''
         motor = present[self._turn % len(present)]
         self._turn += 1
-        with self._line():
-            data, result, _error = self._packets.readTxRx(self._port, motor, *self._health)
-        if result != SUCCESS or len(data) != self._health[1]:
+        data, result = self._read_block(motor, *self._health)
+        if result != SUCCESS:
             return ''  # that it is silent is noticed elsewhere
 
         def value(register: str) -> int:
             address, size = self._profile.table[register]
             at = address - self._health[0]
-            return int.from_bytes(bytes(data[at : at + size]), 'little')
+            return int.from_bytes(data[at : at + size], 'little')
 
         owner, watchdog = self._profile.owner(motor), self._profile.watchdog
         if bits := value('hardware_error'):
@@ -329,13 +331,28 @@ class DynamixelBus:
         """Return one register, signed if it is longer than a byte; None if the motor does not answer."""
         address, size = self._profile.table[register]
         for _ in range(TRIES):
-            with self._line():
-                data, result, _error = self._packets.readTxRx(self._port, motor, address, size)
+            data, result = self._read_block(motor, address, size)
             self._garbled = result == self._sdk.COMM_RX_CORRUPT
-            if result == SUCCESS and len(data) == size:  # or it is a late answer to an earlier question
-                value = int.from_bytes(bytes(data), 'little')
+            if result == SUCCESS:
+                value = int.from_bytes(data, 'little')
                 return signed(value, size) if size > 1 else value
         return None
+
+    def _read_block(self, motor: int, address: int, size: int) -> tuple[bytes, int]:
+        """Return `size` bytes of a motor's table, and the result of the SDK.
+
+        The SDK cuts its data out of any packet of the motor, and out of the checksum if the packet is too short. The
+        late answer to an earlier question, such as a ping, would be taken for a position or a current limit.
+        """
+        with self._line():
+            result = self._packets.readTx(self._port, motor, address, size)
+            while result == SUCCESS:
+                packet, result = self._packets.rxPacket(self._port, False)
+                if result == SUCCESS and packet[PACKET_ID] == motor:
+                    length = packet[PACKET_LENGTH] + (packet[PACKET_LENGTH + 1] << 8)
+                    if length == size + NO_PARAMETERS:
+                        return bytes(packet[PACKET_PARAMETERS : PACKET_PARAMETERS + size]), result
+        return b'', result
 
     def _answers(self, motor: int) -> bool:
         with self._line():
