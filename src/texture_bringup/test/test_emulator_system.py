@@ -64,17 +64,17 @@ def roughness_model(folder, bags):
 
 
 @pytest.fixture(scope='module')
-def bench(folder, roughness_model):
+def emulator(folder, roughness_model):
     with launched(folder, surface='ridge_2mm_deep', roughness_model=roughness_model) as launcher:
         yield launcher
 
 
 @pytest.fixture(scope='module')
-def operator(bench):
-    with Operator('left', DOMAIN, bench.check) as operator:
+def operator(emulator):
+    with Operator('left', DOMAIN, emulator.check) as operator:
         operator.wait_for_explorer(DEADLINE_S)
         operator.wait_for_signal(DEADLINE_S)
-        operator.wait_for_listeners(('features', 'roughness_features'), 1, bench.check)  # who names and who grades
+        operator.wait_for_listeners(('features', 'roughness_features'), 1, emulator.check)  # who names and who grades
         operator.set_parameters('explorer', {'estimate_timeout_s': 10.0})  # this machine may be busy
         yield operator
 
@@ -114,7 +114,7 @@ def test_a_roughness_model_grades_beside_the_classifier(operator) -> None:
     assert roughness.grade_std > 0.0
 
 
-def test_a_model_of_simulated_slides_recognises_the_surface_on_the_bench(operator, models) -> None:
+def test_a_model_of_simulated_slides_recognises_the_surface_of_the_emulator(operator, models) -> None:
     operator.set_parameters('classifier', {'model': str(models['vibration'])})
     explored = operator.explore(SLIDE)
     assert (explored.texture.label, explored.texture.final) == ('ridge_2mm_deep', True)
@@ -151,8 +151,8 @@ def test_nothing_moves_when_stopped(operator) -> None:
     assert operator.stop() == 'nothing is moving'
 
 
-def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operator, bench) -> None:
-    pids = processes(bench)
+def test_the_death_of_a_node_is_noticed_with_its_name_and_nothing_is_left(operator, emulator) -> None:
+    pids = processes(emulator)
     names = ('emulator', 'sensor', 'explorer', 'feature_extractor', 'classifier')
     assert set(pids) == {f'left/{name}' for name in (*names, 'roughness_features', 'roughness_estimator')}
     os.kill(pids['left/classifier'], signal.SIGKILL)

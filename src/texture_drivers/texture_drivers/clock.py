@@ -60,7 +60,7 @@ class StreamClock:
         How long arrivals are observed before a drift is estimated.
     max_drift
         Largest drift accepted; the internal oscillator of a microcontroller on USB is right to 0.25 %.
-    bend
+    slew_rate
         Largest correction per time.
     step_s
         A deviation above this is a step of the host's clock.

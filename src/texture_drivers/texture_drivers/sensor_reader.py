@@ -23,7 +23,7 @@ class SensorReader:
         What is read; used by this thread alone.
     deliver
         Called with topic and batch, in the thread.
-    warn, tell
+    warn, inform
         Called with one sentence when the sensor goes, not at each retry, and when it comes back.
     """
 

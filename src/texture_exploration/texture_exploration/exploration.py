@@ -50,7 +50,7 @@ class Exploration:
         Who moves, how, and what ends it at once.
     clock
         CLOCK_MONOTONIC in ns.
-    silence
+    signal_fault
         Returns in a sentence why the sensor delivers no samples, '' if it does; it is given since when we are awake, in
         ns.
     on_state

@@ -36,7 +36,7 @@ class Explorer:
         Called with each state of each exploration, in the thread that moves; stamps are of `clock`.
     clock
         CLOCK_MONOTONIC in ns.
-    silence
+    signal_fault
         Watches over the sensor; see `Exploration`.
     """
 

@@ -43,7 +43,7 @@ class SlopeObserver:
 
         Parameters
         ----------
-        way_m
+        travelled_m
             That the finger has gone along the surface.
         surface_m
             Height of the untouched surface, z + F/k.

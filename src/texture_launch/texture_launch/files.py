@@ -13,7 +13,7 @@ SUFFIX = '.launch.xml'
 
 
 def find_launch_file(name_or_path: str) -> Path:
-    """Return a launch file: a path, or the name of one of this package, such as 'bench' or 'emulator.launch.xml'.
+    """Return a launch file: a path, or the name of one of this package, such as 'emulator' or 'emulator.launch.xml'.
 
     Raises
     ------

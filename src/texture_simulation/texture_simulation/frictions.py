@@ -56,7 +56,7 @@ def make_drag(friction: Any, rate_hz: float, rng: np.random.Generator, batch_sha
         Points of the path a second.
     rng
         Decides how far the skin is stretched where a slide begins under load.
-    scans
+    batch_shape
         () for one slide, (count,) for many at once.
     """
     return DRAGS[type(friction)](friction, rate_hz, rng, batch_shape)

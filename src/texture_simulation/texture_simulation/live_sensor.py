@@ -43,9 +43,9 @@ class LiveSensor:
     ----------
     model, device
         What senses, and what sends.
-    sense
+    measure
         Measures along a piece of path and sends.
-    pass_by
+    skip
         Lets so many steps pass of which nothing is sent.
     rate_hz
         Steps a second: samples, or frames of them.

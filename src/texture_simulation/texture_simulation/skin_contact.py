@@ -30,7 +30,7 @@ class SkinContact:
         Points of the path a second.
     finger
         Which individual of the sensor.
-    scans
+    batch_shape
         () for one slide at a time, (count,) for many at once.
     """
 

@@ -102,8 +102,8 @@ class Operator:
         LaunchFailed
             If the explorer does not appear in time.
         """
-        self._until(self._explore.server_is_ready, deadline_s, 'no explorer answers; start one, such as the emulated '
-                    'bench with `texture launch emulator`')  # fmt: skip
+        self._until(self._explore.server_is_ready, deadline_s, 'no explorer answers; start one, such as the emulator '
+                    'with `texture launch emulator`')  # fmt: skip
 
     def wait_for_signal(self, deadline_s: float) -> None:
         """Wait until the sensor delivers samples."""
@@ -170,7 +170,7 @@ class Operator:
                 f'no result within the timeout of {request.timeout_s:g} s; the exploration was cancelled'
             )
         if answer.status == GoalStatus.STATUS_UNKNOWN:
-            raise MotionAborted('the explorer was started anew and knows of no such exploration; it was broken off')
+            raise MotionAborted('the explorer was started again and knows of no such exploration; it was broken off')
         result = answer.result
         return ExplorationResult(
             result.success, result.message, result.exploration_id, from_msg(result.texture), from_msg(result.roughness)

@@ -27,7 +27,7 @@ class Converter:
         Of the stream.
     limits
         Least and most count.
-    scans
+    batch_shape
         () for one slide, (count,) for many at once.
     slow
         Whether it is the slow stream beside the fast one.

@@ -26,7 +26,7 @@ from texture_simulation.trajectory import Trajectory
 
 RATE_HZ = tables.RATE_HZ
 # A point a sample: the skin over an element averages over 0.2 mm and more, so that at 0.4 m/s and below nothing is left
-# that 2.5 kHz would fold down; what is faster is blurred more (`touch.py`).
+# that 2.5 kHz would fold down; what is faster is blurred more (`skin_contact.py`).
 OVERSAMPLING = 1
 PATH_RATE_HZ = OVERSAMPLING * RATE_HZ
 FILMS, GAUGES = 4, 4

@@ -67,7 +67,7 @@ class MakeModel(Protocol):
             All randomness: where a sample is touched, what the effects do.
         finger
             Which individual of the sensor: its traits are its own and stay the same.
-        scans
+        batch_shape
             () for one slide at a time, (count,) for many at once.
         settled
             Whether its filters have forgotten how the touch began.
