@@ -19,6 +19,7 @@ lint: setup
 	@$(RUN) ruff check .
 	@$(RUN) ruff format --check .
 	@$(RUN) mypy
+	@$(RUN) python tools/check_terms.py
 
 test: setup lint
 	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile -m "not realtime"

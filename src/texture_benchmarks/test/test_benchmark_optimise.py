@@ -12,7 +12,7 @@ def test_searches_have_the_size_of_the_papers() -> None:
     assert sizes == {(20, 30, 20)}
 
 
-def test_every_search_ends_with_a_recipe_judged_by_its_learner_and_the_charts_are_drawn(tmp_path: Path) -> None:
+def test_every_search_ends_with_a_recipe_evaluated_by_its_learner_and_the_charts_are_drawn(tmp_path: Path) -> None:
     result = BENCHMARKS['optimise_large'](BenchmarkOptions(tmp_path, quick=True))
     assert set(result.numbers['searches']) == set(CASES)
     for figures in result.numbers['searches'].values():

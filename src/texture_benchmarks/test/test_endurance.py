@@ -170,7 +170,7 @@ def test_vectors_that_a_killed_classifier_did_not_answer_are_explained() -> None
     assert unexplained_vectors(record(unanswered={'a': 3}, explored=[killed])) == 0
 
 
-def test_a_process_that_lived_for_minutes_only_is_not_judged_by_its_memory() -> None:
+def test_a_process_that_lived_for_minutes_only_is_not_evaluated_by_its_memory() -> None:
     assert lives(usages(end_s=400)) == []
     assert len(lives([*usages(end_s=400), *usages(pid=2)])) == 1
 

@@ -9,7 +9,7 @@ SPEEDS = np.repeat([20.0, 40.0, 60.0], 4)
 RATE_HZ = 200.0
 
 
-def test_each_condition_is_left_out_once_and_never_taught() -> None:
+def test_each_condition_is_left_out_once_and_never_trained() -> None:
     parts = one_out(SPEEDS, SPEEDS < 60.0)
     assert list(parts) == ['20', '40']
     for name, (train, test) in parts.items():
@@ -36,7 +36,7 @@ def test_what_is_chosen_never_sees_the_slides_that_are_tested() -> None:
     assert outcome.accuracy == 0.0
 
 
-def test_a_rehearsal_judges_in_the_training_and_the_candidate_is_tested() -> None:
+def test_a_rehearsal_is_evaluated_in_the_training_and_the_candidate_is_tested() -> None:
     def wrong(train: Mask, test: Mask) -> Mask:
         return np.zeros(test.sum(), dtype=bool)
 

@@ -30,7 +30,7 @@ def clouds(labels=('cork', 'felt', 'wood'), slides=6, windows=6):
     )
 
 
-def test_a_course_of_lessons_ends_as_good_as_training_again(tmp_path: Path) -> None:
+def test_a_course_of_examples_ends_as_good_as_training_again(tmp_path: Path) -> None:
     incremental_run = run_incremental(
         load_recipe('default'), clouds(), ['wood'], last_training=4, stages=(1, 4), path=tmp_path / 'm'
     )

@@ -106,7 +106,7 @@ def assert_equal(live_estimates: Estimates, offline_estimates: Estimates) -> Non
 
 
 @pytest.mark.parametrize(('rate', 'slides', 'domain_id'), [(1.0, '5', 53), (5.0, '5-6', 54)])
-def test_simulated_slides_are_judged_live_as_offline(
+def test_simulated_slides_are_evaluated_live_as_offline(
     rate: float, slides: str, domain_id: int, simulated: Path, tmp_path: Path
 ) -> None:
     train_from_bags('vibration-and-taxels', [simulated], '1-4', tmp_path / 'model')
@@ -117,7 +117,7 @@ def test_simulated_slides_are_judged_live_as_offline(
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 @pytest.mark.parametrize(('recipe', 'rate'), [('default', 1.0), ('vibration-and-taxels', 5.0)])
-def test_recorded_slides_are_judged_live_as_offline(recipe: str, rate: float, tmp_path: Path) -> None:
+def test_recorded_slides_are_evaluated_live_as_offline(recipe: str, rate: float, tmp_path: Path) -> None:
     materials = ['material03', 'material05', 'material12']
     import_biotac20(DATA, tmp_path / 'bags', '1-4,40', materials)
     train_from_bags(recipe, [tmp_path / 'bags'], '1-4', tmp_path / 'model')

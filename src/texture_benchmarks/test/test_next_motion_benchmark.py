@@ -11,7 +11,7 @@ from texture_estimation.recipe import load_recipe
 from texture_simulation.scene import load_scene
 
 
-def test_every_way_to_choose_is_judged_after_every_slide(tmp_path: Path) -> None:
+def test_every_way_to_choose_is_evaluated_after_every_slide(tmp_path: Path) -> None:
     result, written = run_benchmark('next_motion', BenchmarkOptions(tmp_path, quick=True))
     accuracy = result.numbers['accuracy']
     assert written.is_file()

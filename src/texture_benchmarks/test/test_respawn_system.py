@@ -77,6 +77,6 @@ def times_to_be_ready_again(model, folder, kills):
     return times_s
 
 
-def test_a_killed_classifier_judges_again(model, tmp_path, record_property) -> None:
+def test_a_killed_classifier_predicts_again(model, tmp_path, record_property) -> None:
     (ready_s,) = times_to_be_ready_again(model, tmp_path, 1)
     record_property('ready_again_s', ready_s)

@@ -125,7 +125,7 @@ def test_recipes_of_the_same_features_count_the_same_windows_and_lost_ones_are_n
 
 
 @pytest.mark.parametrize('name', CONDITIONS)
-def test_simulated_slides_have_windows_and_differ_from_those_taught(name: str) -> None:
+def test_simulated_slides_have_windows_and_differ_from_those_trained(name: str) -> None:
     condition = CONDITIONS[name]
     few = {surface: load_scene(SCENE).surfaces[surface] for surface in ('leather', 'ridge_2mm_deep')}
 

@@ -47,7 +47,7 @@ def classifier(model, monkeypatch):
     rclpy.shutdown()
 
 
-def feel(node, exploration_id):
+def classify_slide(node, exploration_id):
     """Publish windows of a new texture as an extractor does, until the classifier has them all."""
     peer = rclpy.create_node('peer')
     publisher = peer.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
@@ -74,15 +74,15 @@ def feel(node, exploration_id):
     return estimates[-1].label
 
 
-def test_a_texture_is_taught_and_untaught_from_the_command_line(classifier, capsys):
-    assert feel(classifier, 'slide-1') in ('cork', 'felt', '')
+def test_a_texture_is_trained_and_forgotten_from_the_command_line(classifier, capsys):
+    assert classify_slide(classifier, 'slide-1') in ('cork', 'felt', '')
     assert main(['add', 'silk']) == 0
     assert "learnt 'silk' from 'slide-1'; 3 textures known" in capsys.readouterr().out
-    assert feel(classifier, 'slide-2') == 'silk'
+    assert classify_slide(classifier, 'slide-2') == 'silk'
     assert main(['add', 'silk', 'slide-9']) == 2
     assert 'Can be added: slide-1, slide-2' in capsys.readouterr().err
     assert main(['add', '--undo']) == 0
-    assert feel(classifier, 'slide-3') != 'silk'
+    assert classify_slide(classifier, 'slide-3') != 'silk'
 
 
 @pytest.mark.parametrize('arguments', [['add'], ['add', 'silk', '--undo']])

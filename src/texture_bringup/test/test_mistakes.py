@@ -79,7 +79,7 @@ def test_one_surface_is_not_enough_to_learn(data, capsys) -> None:
     assert 'at least two surfaces' in refused(['train', 'default', data / 'glass', '-o', data / 'x'], capsys)
 
 
-def test_unlabelled_slides_teach_nothing(data, capsys, tmp_path) -> None:
+def test_unlabelled_slides_train_nothing(data, capsys, tmp_path) -> None:
     def without_label(_topic, value):
         return replace(value, surface='') if isinstance(value, ExplorationState) else value
 

@@ -265,9 +265,9 @@ def model_in(folder: Path) -> object:
     return load_model(folder / 'model')
 
 
-MODEL, CARD, LESSON = 'model.skops', 'model.json', 'model.added/00001.json'
+MODEL, CARD, EXAMPLE = 'model.skops', 'model.json', 'model.added/00001.json'
 READERS = {
-    'model': Reader(make_model, model_in, (MODEL, CARD, LESSON)),
+    'model': Reader(make_model, model_in, (MODEL, CARD, EXAMPLE)),
     'model of support vectors': Reader(lambda folder: make_model(folder, 'ets-linear-svm'), model_in, (MODEL,)),
     'roughness model': Reader(
         make_roughness_model, lambda folder: load_roughness_model(folder / 'model'), (MODEL, CARD)
@@ -509,7 +509,7 @@ HARM: dict[str, tuple[str, str, str | Callable[[Path], bytes]]] = {
     'a deep card': ('model', CARD, '{"format": 1, "recipe": {"inputs": ' + '[' * 900 + ']' * 900 + '}}'),
     'a billion hidden units': ('model', CARD, changed_card(recipe=recipe(learner={'mlp': {'hidden': 10**9}}))),
     'a card that names a program': ('model', CARD, changed_card(recipe=recipe(learner='antigravity:fly'))),
-    'an added slide as deep as can be': ('model', LESSON, '{"values": ' + '[' * 100_000),
+    'an added slide as deep as can be': ('model', EXAMPLE, '{"values": ' + '[' * 100_000),
     'a recipe that multiplies': ('recipe', 'good.yaml', LAUGHS + 'inputs: *j'),
     'a scene that multiplies': ('scene', 'good.yaml', LAUGHS + 'surfaces: {x: *j}'),
     'a scene that runs a program': ('scene', 'good.yaml', '!!python/object/apply:os.mkdir [trapped]'),
@@ -759,7 +759,7 @@ BOMBS: dict[str, tuple[str, str, Callable[[Path], bytes]]] = {
     'a card of empty lists': ('model', CARD, lambda _: b'{"recipe": [' + b'[],' * (MB5 // 3) + b'[]]}'),
     'a card of small objects': ('model', CARD, lambda _: b'{"recipe": [' + b'{"":0},' * (MB5 // 7) + b'0]}'),
     'an added slide of short windows': (
-        'model', LESSON,
+        'model', EXAMPLE,
         lambda _: b'{"format":1,"feature_set":"abcd1234 signal=1000Hz*1","label":"x","exploration_id":"","values":['
         + b'[0,0,0,0,0,0],' * (MB5 // 14) + b'[0,0,0,0,0,0]]}',
     ),

@@ -27,7 +27,7 @@ pytestmark = pytest.mark.ros
 GRADE_NAMES = ('signal/signal_energy/f', 'signal/peak_to_median_power/f')
 GRADE_RECIPE = {'inputs': {'signal': {'features': ['signal_energy', 'peak_to_median_power']}}}
 NODES = {
-    'classifier': (Classifier, 'model', 'felt_slide'),
+    'classifier': (Classifier, 'model', 'cloth_slide'),
     'roughness_estimator': (RoughnessEstimator, 'roughness_model', 'grade_2'),
 }
 
@@ -82,7 +82,7 @@ def slide(rows, names, feature_set, identity='e1', **more):
 
 
 @pytest.fixture
-def felt_slide(examples):
+def cloth_slide(examples):
     return slide(examples.values[examples.groups == 'felt/0'], examples.names, examples.feature_set)
 
 
@@ -166,10 +166,10 @@ def test_a_wrong_model_at_the_start_is_an_error(graph, case, tmp_path):
         NodeUnderTest(graph, case[0], tmp_path / 'none.skops')
 
 
-def test_the_classifier_says_what_the_same_vectors_give_offline(graph, model, felt_slide, tmp_path):
-    received = NodeUnderTest(graph, Classifier, model.save(tmp_path / 'm')).ask(felt_slide)
+def test_the_classifier_says_what_the_same_vectors_give_offline(graph, model, cloth_slide, tmp_path):
+    received = NodeUnderTest(graph, Classifier, model.save(tmp_path / 'm')).ask(cloth_slide)
     evidence = EvidenceAccumulator(model)
-    for came, expected in zip(received, [evidence.update(vector) for vector in felt_slide], strict=True):
+    for came, expected in zip(received, [evidence.update(vector) for vector in cloth_slide], strict=True):
         assert (came.label, came.windows, came.final) == (expected.label, expected.windows, expected.final)
         np.testing.assert_allclose(came.probabilities, expected.probabilities)
     assert received[-1].label == 'felt'
@@ -197,18 +197,18 @@ def test_without_contact_there_is_no_grade_but_a_reason_and_it_is_counted(graph,
     assert node.ask(grade_2)[-1].valid
 
 
-def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, felt_slide, tmp_path):
+def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, cloth_slide, tmp_path):
     path = model.save(tmp_path / 'm')
     node = NodeUnderTest(graph, Classifier, path)
     moved = [
-        dataclasses.replace(v, values=v.values + (0.0 if v.last else 9.0), exploration_id='e7') for v in felt_slide
+        dataclasses.replace(v, values=v.values + (0.0 if v.last else 9.0), exploration_id='e7') for v in cloth_slide
     ]
     assert node.ask(moved)[-1].label != 'silk'
     answer = node.call(srv.AddTexture, 'add_texture', label='silk')
-    assert (answer.success, answer.examples) == (True, len(felt_slide) - 1)
+    assert (answer.success, answer.examples) == (True, len(cloth_slide) - 1)
     assert '5 textures, 1 slide added' in answer.message
     assert node.ask(moved)[-1].label == 'silk'
-    assert node.ask(felt_slide)[-1].label == 'felt'
+    assert node.ask(cloth_slide)[-1].label == 'felt'
     assert load_model(path).labels[-1] == 'silk'
     assert node.set_model(path).successful  # as after a restart
     assert node.ask(moved)[-1].label == 'silk'

@@ -63,7 +63,7 @@ def test_overlapping_windows_count_the_sliding_time_once(model, examples):
     assert apart[2].evidence_s == pytest.approx(1.5)
 
 
-def test_the_same_windows_further_apart_are_worth_more(model, make_examples):
+def test_the_same_windows_further_apart_weigh_more(model, make_examples):
     vague = make_examples(seed=8, spread=2.0)
     assert (
         predict(model, vectors(vague, hop_s=0.5))[-1].confidence

@@ -49,7 +49,7 @@ def test_more_examples_of_a_known_texture_add_no_label(model, examples):
     assert incremental_classifier.model.decide(moved) == ['wood'] * 8
 
 
-def test_what_was_taught_survives_a_restart_and_can_be_undone(model, examples, silk, tmp_path):
+def test_what_was_trained_survives_a_restart_and_can_be_undone(model, examples, silk, tmp_path):
     path = model.save(tmp_path / 'surfaces')
     incremental_classifier = IncrementalClassifier(load_model(path), path)
     measured(incremental_classifier, silk)
@@ -73,7 +73,7 @@ def test_what_was_taught_survives_a_restart_and_can_be_undone(model, examples, s
         later.remove_last()
 
 
-def test_a_trained_model_that_was_saved_again_keeps_its_lessons_but_other_features_do_not(model, silk, tmp_path):
+def test_a_trained_model_that_was_saved_again_keeps_its_examples_but_other_features_do_not(model, silk, tmp_path):
     path = model.save(tmp_path / 'm')
     incremental_classifier = IncrementalClassifier(load_model(path), path)
     measured(incremental_classifier, silk)
@@ -90,7 +90,7 @@ def test_a_trained_model_that_was_saved_again_keeps_its_lessons_but_other_featur
         load_model(path)
 
 
-def test_what_cannot_be_taught_is_refused_with_a_sentence(model, silk):
+def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk):
     incremental_classifier = IncrementalClassifier(model)
     with pytest.raises(InvalidData, match='explore first'):
         incremental_classifier.add('silk')
@@ -105,7 +105,7 @@ def test_what_cannot_be_taught_is_refused_with_a_sentence(model, silk):
         incremental_classifier.add('  ')
 
 
-def test_a_lesson_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path):
+def test_a_example_that_cannot_be_kept_is_not_learnt(model, silk, tmp_path):
     (tmp_path / 'm.added').write_text('in the way')
     incremental_classifier = IncrementalClassifier(model, tmp_path / 'm')
     measured(incremental_classifier, silk)
@@ -123,7 +123,7 @@ def test_only_the_latest_explorations_are_remembered(model, silk):
     assert incremental_classifier.add('silk', 'e3') == 2
 
 
-def test_a_model_without_examples_cannot_be_taught(model):
+def test_a_model_without_examples_cannot_be_trained(model):
     with pytest.raises(ModelMismatch, match='train it again'):
         IncrementalClassifier(dataclasses.replace(model, examples=None))
 

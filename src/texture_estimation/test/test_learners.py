@@ -75,7 +75,7 @@ def test_the_same_examples_make_the_same_model(training, name, examples):
     np.testing.assert_array_equal(again.predict_log_proba(examples.values), training.predict_log_proba(examples.values))
 
 
-def test_a_model_judges_the_same_after_it_was_saved(training, examples, tmp_path):
+def test_a_model_predicts_the_same_after_it_was_saved(training, examples, tmp_path):
     loaded = load_model(training.save(tmp_path / 'm'))
     np.testing.assert_array_equal(
         loaded.predict_log_proba(examples.values), training.predict_log_proba(examples.values)

@@ -20,7 +20,7 @@ def saved(model, tmp_path):
 
 
 @pytest.mark.parametrize('ending', ['', '.skops', '.json'])
-def test_a_model_judges_the_same_after_it_was_saved(saved, model, examples, ending):
+def test_a_model_predicts_the_same_after_it_was_saved(saved, model, examples, ending):
     loaded = load_model(saved.with_suffix(ending))
     np.testing.assert_array_equal(loaded.predict_log_proba(examples.values), model.predict_log_proba(examples.values))
     assert loaded.card == model.card

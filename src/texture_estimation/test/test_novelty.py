@@ -40,7 +40,7 @@ def test_surfaces_that_lie_elsewhere_are_unknown(training):
     assert not any(novelty_detector.is_known(mean, 3.5) for mean in slide_means(elsewhere, rng))
 
 
-def test_a_surface_that_was_taught_is_known(training):
+def test_a_surface_that_was_trained_is_known(training):
     novelty_detector, _, rng = training
     new = np.full((1, FEATURES), 15.0)
     trained = novelty_detector.with_slides(list(windows(new, rng, 3)[0].reshape(3, WINDOWS, FEATURES)), 0.5)

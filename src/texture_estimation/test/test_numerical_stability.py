@@ -93,7 +93,7 @@ def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, m
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')
 @pytest.mark.parametrize('change', DIFFICULT.values(), ids=DIFFICULT)
-def test_what_was_taught_live_is_judged_with_finite_log_probabilities(change, make_examples):
+def test_what_was_trained_live_is_evaluated_with_finite_log_probabilities(change, make_examples):
     examples = make_examples(slides=2, windows=4)
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
     regressor = RidgeClassifier(change(examples.values), codes, groups, trained=lambda rows: np.zeros((len(rows), 4)))

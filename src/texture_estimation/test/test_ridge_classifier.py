@@ -30,7 +30,7 @@ def test_a_new_texture_is_known_at_once_and_no_other_forgotten(ridge_classifier)
     assert right(ridge_classifier, [6, 0, 0, 0], 1) > 0.9
 
 
-def test_the_order_of_lessons_does_not_matter_and_undoing_leaves_no_trace(ridge_classifier):
+def test_the_order_of_examples_does_not_matter_and_undoing_leaves_no_trace(ridge_classifier):
     first, second = cloud([0, 6, 0, 0], 20, 3), cloud([0, 6, 1, 0], 20, 4)
     asked, before = cloud([3, 3, 0, 0]), ridge_classifier.predictor(cloud([3, 3, 0, 0]))
     ridge_classifier.set_examples(2, first)
@@ -58,7 +58,7 @@ def test_very_few_examples_are_learnt_from(count):
     assert right(ridge_classifier, [9, 0, 0, 0], 1) > 0.6
 
 
-def test_what_was_trained_has_half_the_say_among_its_labels_until_one_of_them_is_taught(ridge_classifier):
+def test_what_was_trained_has_half_the_say_among_its_labels_until_one_of_them_is_trained(ridge_classifier):
     asked = cloud([3, 0, 0, 0], 200, 8)
     values = np.concatenate([cloud([0, 0, 0, 0], seed=1), cloud([6, 0, 0, 0], seed=2)])
     labels, slides = np.repeat([0, 1], 60), np.repeat(np.arange(12), 10)

@@ -158,7 +158,7 @@ def test_the_kernel_is_the_one_of_scikit_learn() -> None:
 @pytest.mark.parametrize(
     ('learner', 'quick', 'least'), [(SvmPairs(), svm_pairs, 0.98), (AnnPairs(hidden=5), ann_pairs, 0.85)]
 )
-def test_a_quick_judge_decides_as_the_learner_does(learner, quick, least, labels) -> None:
+def test_a_quick_predictor_decides_as_the_learner_does(learner, quick, least, labels) -> None:
     values, codes, slides = points(labels=labels)
     training = random_halves(codes, slides, 1, np.random.default_rng(0))[0]
     decided = [decisions(surrogate(learner, values, codes, slides)(training)) for surrogate in (quick, exact)]
@@ -290,7 +290,9 @@ def test_scans_are_cut_into_parts_that_share_a_slide() -> None:
     ('recipe', 'search_space'),
     [('ets-linear-svm', 'ets-svm'), ('ets-linear-svm-vote', 'ets-svm'), ('ets-linear-ann', 'ets-ann')],
 )
-def test_what_is_found_is_judged_by_the_learner_itself_and_no_worse_than_where_it_began(recipe, search_space) -> None:
+def test_what_is_found_is_evaluated_by_the_learner_itself_and_no_worse_than_where_it_began(
+    recipe, search_space
+) -> None:
     space = RecipeSpace.load(search_space, load_recipe(recipe))
     search_slides = SearchSlides(tones(), SMALL.halves, SMALL.seed)
     found = optimise(space, search_slides, SMALL, ClassificationTask())
@@ -335,7 +337,7 @@ def test_cores_and_a_dask_cluster_find_what_one_core_finds(tmp_path) -> None:
 
 @pytest.mark.parametrize('name', ['ets-linear-svm', 'ets-linear-ann'])
 @pytest.mark.parametrize('quick', [True, False])
-def test_a_trial_travels_to_another_machine_and_judges_the_same_there(name, quick) -> None:
+def test_a_trial_travels_to_another_machine_and_predicts_the_same_there(name, quick) -> None:
     recipe = load_recipe(name)
     scans = tones(count=4)
     search_slides, task = SearchSlides(scans, 2), ClassificationTask()

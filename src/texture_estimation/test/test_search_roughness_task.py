@@ -40,7 +40,7 @@ def test_a_grade_off_costs_a_quarter_and_none_all() -> None:
 @pytest.mark.parametrize(
     ('regressor', 'quick', 'apart'), [(Ann1(hidden=5), ann1, 0.4), (Ann5(hidden=5), ann5, 0.4), (Svm5(), svm5, 0.03)]
 )
-def test_a_quick_judge_grades_as_the_head_does(regressor, quick, apart) -> None:
+def test_a_quick_predictor_grades_as_the_regressor_does(regressor, quick, apart) -> None:
     rng = np.random.default_rng(0)
     textures = np.repeat(np.arange(10), 30)
     grades = 1.0 + textures // 2
@@ -56,7 +56,7 @@ def test_a_quick_judge_grades_as_the_head_does(regressor, quick, apart) -> None:
 
 
 @pytest.mark.parametrize('regressor', ['ann1', 'ann5', 'svm5'])
-def test_the_recipes_of_the_roughness_paper_are_tuned_and_judged_by_their_heads(regressor) -> None:
+def test_the_recipes_of_the_roughness_paper_are_tuned_and_evaluated_by_their_heads(regressor) -> None:
     space = RecipeSpace.load(f'ets-roughness-{regressor}', load_roughness_recipe(f'ets-roughness-{regressor}'))
     params = SearchParams(population=5, generations=2, halves=3, finalists=1)
     found = optimise(space, SearchSlides(hisses(), params.halves), params, RoughnessTask(GRADES))

@@ -39,7 +39,7 @@ def test_confidence_is_not_far_from_how_often_it_is_right(make_examples):
     assert confidence == pytest.approx(accuracy(model, fresh), abs=0.08)
 
 
-def test_windows_of_a_slide_are_worth_less_than_independent_ones(make_examples):
+def test_windows_of_a_slide_weigh_less_than_independent_ones(make_examples):
     model = train(RECIPE, make_examples(spread=2.5, slides=8))
     assert 0.0 <= model.tempering_exponent < 1.0
 
@@ -99,7 +99,7 @@ def test_vectors_are_gathered_with_their_surfaces():
         LabelledFeatures.from_vectors(vectors, {})
 
 
-def test_the_start_of_a_slide_counts_as_often_as_asked_and_is_judged_once(examples):
+def test_the_start_of_a_slide_counts_as_often_as_asked_and_is_evaluated_once(examples):
     recipes = [
         dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, start_weight=weight))
         for weight in (1, 3)

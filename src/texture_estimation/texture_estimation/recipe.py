@@ -27,7 +27,7 @@ class TrainingParams:
 
     hop_s: float = param(
         0.25,
-        'Time between the starts of two training windows; a smaller one costs time and adds little.',
+        'Sets the time between the starts of two training windows; a smaller one costs time and adds little.',
         unit='s',
         low=0.001,
         high=60.0,
@@ -39,7 +39,11 @@ class DecisionParams(TrainingParams):
     """How the examples for training are cut, how they count, and how rarely decisions made with them may err."""
 
     start_weight: int = param(
-        1, 'Weight of the first windows of a slide in training, while friction and sensor settle.', low=1, high=100
+        1,
+        'Sets the weight of the first windows of a slide in training, while friction and sensor settle; a '
+        'larger one counts them more.',
+        low=1,
+        high=100,
     )
     max_error_rate: float = param(
         0.02, 'Largest fraction of wrong decisions when slides are stopped early.', low=0.0, high=1.0

@@ -45,7 +45,7 @@ def test_the_figures_are_written_as_json(model: TextureModel, simulated: Path, t
         report.write(tmp_path / 'nowhere' / 'report.json')
 
 
-def test_surfaces_that_were_not_taught_count_as_unknown_alone(simulated: Path) -> None:
+def test_surfaces_that_were_not_trained_count_as_unknown_alone(simulated: Path) -> None:
     model = train_from_bags('default', [simulated / 'glass', simulated / 'leather'], '1-4')
     report = evaluate(model, [simulated], '5-6')
     assert {result.surface for result in report.unknown} == {'ridge_2mm_deep'}

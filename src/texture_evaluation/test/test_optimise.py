@@ -33,7 +33,7 @@ def test_what_is_written_is_a_recipe_that_train_uses(simulated: Path, tmp_path: 
     assert model.labels == ('glass', 'leather', 'ridge_2mm_deep')
 
 
-def test_the_same_seed_writes_the_same_recipe_and_resuming_judges_nothing_again(
+def test_the_same_seed_writes_the_same_recipe_and_resuming_evaluates_nothing_again(
     simulated: Path, tmp_path: Path
 ) -> None:
     texts, halves = [], []

@@ -181,7 +181,7 @@ def test_states_of_a_recording_and_states_reported_live_agree():
     assert not rest  # all was told while the recording went on
 
 
-def test_live_states_come_soon_and_promise_only_what_was_measured():
+def test_live_states_come_soon_and_guarantee_only_what_was_measured():
     fast, slow = recording(((1.0, 3.0),), 4.0)
     signals = {'signal': batches(fast, RATE_HZ), 'signal_static': batches(slow, SLOW_HZ)}
     reported, _ = live(signals, SlideSegmenter(SegmentationParams()))

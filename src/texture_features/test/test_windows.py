@@ -79,7 +79,7 @@ def test_slide_states_too_far_apart_leave_a_hole():
     assert starts(run({'signal': stream(3.0)}, states)) == [0.0, 0.1, 1.3]
 
 
-def test_a_state_in_the_air_withdraws_the_promise_and_leaves_a_hole_up_to_the_next_state():
+def test_a_state_in_the_air_withdraws_the_guarantee_and_leaves_a_hole_up_to_the_next_state():
     sliding = [state(0.02 * number, steady_s=0.1, force_n=1.0) for number in range(60)]
     lost = [state(at, force_n=0.0) for at in (1.2, 1.22, 1.24)]
     states = [*sliding, *lost, state(1.26, steady_s=0.6, force_n=1.0), state(2.0, Phase.LIFT)]

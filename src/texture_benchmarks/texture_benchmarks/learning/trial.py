@@ -81,7 +81,7 @@ def run_incremental(
         for number in range(before + 1, stage + 1):
             for label in new:
                 rows = np.flatnonzero((numbers == number) & (examples.labels == label))
-                add_s.append(_teach(incremental_classifier, examples, rows))
+                add_s.append(_add_examples(incremental_classifier, examples, rows))
         retrained = train(recipe, _some(examples, training & (~is_new | (numbers <= stage))))
         for scores, model, which in (
             (incremental_run.incremental, incremental_classifier.model, test),
@@ -102,7 +102,9 @@ def _some(examples: LabelledFeatures, rows: Mask) -> LabelledFeatures:
     return replace(examples, values=examples.values[rows], labels=examples.labels[rows], groups=examples.groups[rows])
 
 
-def _teach(incremental_classifier: IncrementalClassifier, examples: LabelledFeatures, rows: NDArray[np.intp]) -> float:
+def _add_examples(
+    incremental_classifier: IncrementalClassifier, examples: LabelledFeatures, rows: NDArray[np.intp]
+) -> float:
     """Add one slide, and return the processor time that it took, s."""
     name = str(examples.groups[rows[0]])
     for place, row in enumerate(rows):

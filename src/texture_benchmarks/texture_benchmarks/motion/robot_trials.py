@@ -163,12 +163,12 @@ def _by_phase(fingers: list[FingerState], states: list[ExplorationState]) -> lis
     log = []
     for finger in fingers:
         newest = bisect_right(begins, finger.time_ns) - 1
-        if newest >= 0 and (states[newest].phase is not Phase.SLIDE or _promised(states[newest], finger.time_ns)):
+        if newest >= 0 and (states[newest].phase is not Phase.SLIDE or _guaranteed(states[newest], finger.time_ns)):
             log.append((states[newest].phase, _arm_state(finger)))
     return log
 
 
-def _promised(state: ExplorationState, time_ns: int) -> bool:
+def _guaranteed(state: ExplorationState, time_ns: int) -> bool:
     return time_ns <= state.stamp_ns + state.steady_s * 1e9
 
 

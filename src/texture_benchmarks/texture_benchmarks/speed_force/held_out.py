@@ -85,11 +85,11 @@ def run_chosen(
     inner_trials
         Trials of the same names that evaluate the candidates there, if something else is to be tested than at the end.
     """
-    judges = candidates if inner_trials is None else inner_trials
+    evaluations = candidates if inner_trials is None else inner_trials
     right, chosen = {}, {}
     for name, (train, test) in parts.items():
         inner = [part for values in conditions for part in one_out(values, train).values() if part[0].any()]
-        scores = {key: np.mean([trial(*part).mean() for part in inner]) for key, trial in judges.items()}
+        scores = {key: np.mean([trial(*part).mean() for part in inner]) for key, trial in evaluations.items()}
         best = max(scores, key=lambda key: scores[key])
         right[name], chosen[name] = candidates[best](train, test), best
     return HeldOutResult(right, chosen)

@@ -74,7 +74,11 @@ class MajorityVote:
     """
 
     share: float = param(
-        0.6, 'Fraction of the votes that a label needs; 0: the label with the most votes wins.', low=0.0, high=1.0
+        0.6,
+        'Sets the fraction of the votes that a label needs; a larger fraction leaves more slides undecided,'
+        ' 0 takes the label with the most votes.',
+        low=0.0,
+        high=1.0,
     )
     windows: int = param(5, 'Number of windows to which the fraction refers while there are fewer.', low=1)
 

@@ -33,9 +33,16 @@ class AnnPairs:
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C.
     """
 
-    hidden: int = param(10, 'Number of neurons in the hidden layer.', low=1, high=200)
-    iterations: int = param(30, 'Largest number of training iterations.', low=1, high=10_000)
-    seed: int = param(0, 'Seed of the initial weights.', low=0)
+    hidden: int = param(
+        10,
+        'Sets the number of neurons in the hidden layer; more neurons separate finer and cost computing time.',
+        low=1,
+        high=200,
+    )
+    iterations: int = param(
+        30, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
+    )
+    seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
     ties: str = param(
         'unclassified',
         "How ties are broken: 'unclassified' returns no label, 'nearest' the one with larger margins.",

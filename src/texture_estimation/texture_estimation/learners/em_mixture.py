@@ -27,19 +27,24 @@ class EmMixture:
     Source: Kaboli et al. 2015, section V.C.
     """
 
-    clusters_per_label: int = param(1, 'Number of clusters per label.', low=1, high=50)
+    clusters_per_label: int = param(
+        1, 'Sets the number of clusters per label; more clusters fit more diverse slides of one label.', low=1, high=50
+    )
     covariance: str = param(
         'full',
         "Covariance of a cluster: 'full', or 'diag' if features are taken as independent.",
         choices=('full', 'diag'),
     )
     regularisation: float = param(
-        1e-3, 'Variance added to the standardised features; prevents clusters from collapsing.', low=1e-9
+        1e-3,
+        'Sets the variance added to the standardised features, which keeps clusters from collapsing; a '
+        'larger one smooths more.',
+        low=1e-9,
     )
     starts: int = param(
         3, 'Number of random initialisations; the result with the highest likelihood is kept.', low=1, high=1000
     )
-    seed: int = param(0, 'Seed of the random initialisations.', low=0)
+    seed: int = param(0, 'Sets the seed of the random initialisations; equal seeds give equal models.', low=0)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""

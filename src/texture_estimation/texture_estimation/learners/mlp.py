@@ -35,14 +35,36 @@ class Mlp:
     Source: Adam of Kingma & Ba 2015 with a rate that falls like a cosine; one temperature (Guo et al. 2017).
     """
 
-    hidden: int = param(128, 'Number of units in the hidden layer.', low=1, high=4096)
-    noise: float = param(
-        0.3, 'Standard deviation of the noise added to the standardised features in training.', low=0.0, high=10.0
+    hidden: int = param(
+        128,
+        'Sets the number of units in the hidden layer; more units separate finer and cost computing time.',
+        low=1,
+        high=4096,
     )
-    decay: float = param(0.01, 'Weight decay, divided by the number of examples.', low=0.0, high=1e6)
-    epochs: int = param(60, 'Number of passes over the training examples.', low=1, high=100_000)
-    folds: int = param(5, 'Number of cross-validation folds for the calibration.', low=2, high=50)
-    seed: int = param(0, 'Seed of the initial weights, the order of the examples and the noise.', low=0)
+    noise: float = param(
+        0.3,
+        'Sets the standard deviation of the noise added to the standardised features in training; more '
+        'noise smooths more.',
+        low=0.0,
+        high=10.0,
+    )
+    decay: float = param(
+        0.01, 'Sets the weight decay, divided by the number of examples; a larger one smooths more.', low=0.0, high=1e6
+    )
+    epochs: int = param(
+        60, 'Sets the number of passes over the training examples; more take longer to train.', low=1, high=100_000
+    )
+    folds: int = param(
+        5,
+        'Sets the number of cross-validation folds for the calibration; more folds take longer to train.',
+        low=2,
+        high=50,
+    )
+    seed: int = param(
+        0,
+        'Sets the seed of the initial weights, the order of the examples and the noise; equal seeds give equal models.',
+        low=0,
+    )
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""

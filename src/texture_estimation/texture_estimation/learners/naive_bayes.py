@@ -26,11 +26,15 @@ class NaiveBayes:
     """
 
     smoothing: float = param(
-        1e-9, 'Variance added to each class, as a fraction of the variance over all classes.', low=1e-12, high=1.0
+        1e-9,
+        'Sets the variance added to each class, as a fraction of the variance over all classes; a larger '
+        'one smooths more.',
+        low=1e-12,
+        high=1.0,
     )
     bins: int = param(
         0,
-        'Number of equally filled histogram bins per feature; 0: normal distributions.',
+        'Sets the number of equally filled histogram bins per feature; 0 takes normal distributions.',
         low=0,
         high=1000,
     )

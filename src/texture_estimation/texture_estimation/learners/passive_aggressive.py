@@ -25,7 +25,7 @@ class PassiveAggressive:
     """
 
     c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
-    rounds: int = param(0, 'Number of examples of each label to train on; 0: all.', low=0)
+    rounds: int = param(0, 'Sets the number of examples of each label to train on; 0 takes all.', low=0)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,), in the order given."""

@@ -30,15 +30,20 @@ class SvmLinear:
     Source: Kaboli et al. 2015, section V.A: 5 folds, 10 repeats, 20 values.
     """
 
-    folds: int = param(5, 'Number of cross-validation folds.', low=2, high=50)
-    repeats: int = param(10, 'Number of repetitions of the cross-validation with other random folds.', low=1, high=1000)
+    folds: int = param(5, 'Sets the number of cross-validation folds; more folds take longer to train.', low=2, high=50)
+    repeats: int = param(
+        10,
+        'Sets the number of repetitions of the cross-validation with other random folds; more take longer to train.',
+        low=1,
+        high=1000,
+    )
     candidates: int = param(
         20, 'Number of values of C that are tried, evenly spaced on a logarithmic scale.', low=1, high=200
     )
     least_c: float = param(1e-3, 'Smallest value of C that is tried.', low=1e-9, high=1e9)
     most_c: float = param(1e3, 'Largest value of C that is tried.', low=1e-9, high=1e9)
     examples: int = param(200, 'Largest number of examples with which C is chosen; more are subsampled evenly.', low=10)
-    seed: int = param(0, 'Seed of the random folds.', low=0)
+    seed: int = param(0, 'Sets the seed of the random folds; equal seeds give equal models.', low=0)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""

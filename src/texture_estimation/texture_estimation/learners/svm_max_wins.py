@@ -31,12 +31,24 @@ class SvmMaxWins:
     """
 
     variance: float = param(
-        0.99, 'Fraction of the variance that the kept principal components explain.', low=0.01, high=1.0
+        0.99,
+        'Sets the fraction of the variance that the kept principal components explain; a larger one keeps '
+        'more of them.',
+        low=0.01,
+        high=1.0,
     )
     blocks: int = param(
-        1, 'Number of equal feature blocks with separate components, such as directions x and y.', low=1, high=64
+        1,
+        'Sets the number of equal feature blocks with separate components, such as the directions x and y.',
+        low=1,
+        high=64,
     )
-    c: float = param(10.0, 'Penalty of a training error (box constraint C).', low=1e-6, high=1e9)
+    c: float = param(
+        10.0,
+        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        low=1e-6,
+        high=1e9,
+    )
     gamma: float = param(
         1.0, 'Gamma of the kernel exp(-gamma d² / (n_components · variance)); larger is narrower.', low=1e-9, high=1e9
     )

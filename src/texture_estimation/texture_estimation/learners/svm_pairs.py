@@ -29,8 +29,18 @@ class SvmPairs:
     Source: Roberge et al., "Textures recognition through tactile exploration", sections III.C and IV.
     """
 
-    box_constraint: float = param(10.0, 'Penalty of a training error (box constraint C).', low=1e-6, high=1e9)
-    kernel_scale: float = param(3.0, "Width of the RBF kernel (MATLAB's KernelScale).", low=1e-9, high=1e9)
+    box_constraint: float = param(
+        10.0,
+        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        low=1e-6,
+        high=1e9,
+    )
+    kernel_scale: float = param(
+        3.0,
+        "Sets the width of the RBF kernel (MATLAB's KernelScale); a larger one smooths the decision more.",
+        low=1e-9,
+        high=1e9,
+    )
     standardise: bool = param(True, 'Whether the features are standardised to zero mean and unit variance first.')
     ties: str = param(
         'unclassified',

@@ -25,7 +25,12 @@ class SvmRbf:
     Not scikit-learn's SVC(probability=True): its inner cross-validation mixes the windows of one slide.
     """
 
-    c: float = param(10.0, 'Penalty of a training error (box constraint C).', low=1e-6, high=1e9)
+    c: float = param(
+        10.0,
+        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        low=1e-6,
+        high=1e9,
+    )
     gamma: float = param(
         0.0,
         'Gamma of the kernel exp(-gamma d²); 0: 1 / (n_features · variance). Larger is narrower.',
@@ -33,9 +38,14 @@ class SvmRbf:
         high=1e9,
     )
     common_scale: bool = param(
-        False, 'Whether all features share one scale, for features of one kind such as taxel means.'
+        False, 'Sets whether all features share one scale, for features of one kind such as taxel means.'
     )
-    folds: int = param(5, 'Number of cross-validation folds for the calibration.', low=2, high=50)
+    folds: int = param(
+        5,
+        'Sets the number of cross-validation folds for the calibration; more folds take longer to train.',
+        low=2,
+        high=50,
+    )
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
         """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""

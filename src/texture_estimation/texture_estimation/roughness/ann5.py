@@ -24,9 +24,17 @@ class Ann5:
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
 
-    hidden: int = param(10, 'Number of neurons in the hidden layer of each network.', low=1, high=200)
-    iterations: int = param(30, 'Largest number of training iterations.', low=1, high=10_000)
-    seed: int = param(0, 'Seed of the initial weights.', low=0)
+    hidden: int = param(
+        10,
+        'Sets the number of neurons in the hidden layer of each network; more neurons fit finer and cost '
+        'computing time.',
+        low=1,
+        high=200,
+    )
+    iterations: int = param(
+        30, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
+    )
+    seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
         """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,)."""

@@ -23,12 +23,15 @@ class CheckParams:
     min_force_n: float = param(0.05, 'Smallest force that counts as contact.', unit='N', low=0.0, high=100.0)
     stick_slip_margin: float = param(
         1.0,
-        f'Rise of `{STICK_SLIP}` over the strongest in the training, natural logarithm of power.',
+        f'Sets the rise of `{STICK_SLIP}` over the training set that counts as stick-slip, as ln of power.',
         low=0.0,
         high=100.0,
     )
     quiet_margin: float = param(
-        0.7, f'Fall of `{LEVEL}` below the weakest in the training, natural logarithm of power.', low=0.0, high=100.0
+        0.7,
+        f'Sets the fall of `{LEVEL}` below the training set that counts as too quiet, as ln of power.',
+        low=0.0,
+        high=100.0,
     )
 
 

@@ -23,9 +23,17 @@ class Svm5:
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
 
-    c: float = param(10.0, 'Penalty of a training error (box constraint C).', low=1e-6, high=1e9)
+    c: float = param(
+        10.0,
+        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        low=1e-6,
+        high=1e9,
+    )
     kernel_scale: float = param(
-        3.0, 'Width of the kernel exp(-(d / scale)²) over standardised features.', low=1e-9, high=1e9
+        3.0,
+        'Sets the width of the kernel exp(-(d / scale)²) over standardised features; a larger one smooths more.',
+        low=1e-9,
+        high=1e9,
     )
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:

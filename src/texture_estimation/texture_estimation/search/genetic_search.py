@@ -24,13 +24,19 @@ FIRST_LOOK = 4
 class SearchParams:
     """How long and for what is searched; the defaults are those of Roberge et al."""
 
-    population: int = param(20, 'Number of individuals in a generation.', low=4, high=1000)
-    generations: int = param(30, 'Number of generations, including the first one.', low=1, high=10_000)
+    population: int = param(
+        20, 'Sets the number of individuals in a generation; more search wider and take longer.', low=4, high=1000
+    )
+    generations: int = param(
+        30, 'Sets the number of generations, including the first one; more search longer.', low=1, high=10_000
+    )
     halves: int = param(20, 'Number of random half splits on which each individual is evaluated.', low=2, high=1000)
-    seed: int = param(0, 'Seed of the random half splits and of the search.', low=0)
+    seed: int = param(
+        0, 'Sets the seed of the random half splits and of the search; equal seeds give equal results.', low=0
+    )
     objective: str = param(
         'accuracy',
-        "Objective: 'accuracy', or the Pareto 'front' of accuracy and computing cost (NSGA-II).",
+        "Sets the objective: 'accuracy', or the Pareto 'front' of accuracy and computing cost (NSGA-II).",
         choices=OBJECTIVES,
     )
     finalists: int = param(

@@ -21,7 +21,7 @@ class Hjorth:
 
     per_channel: ClassVar[bool] = True
 
-    log_activity: bool = param(True, 'Return the logarithm of the activity instead of the activity itself.')
+    log_activity: bool = param(True, 'Returns the logarithm of the activity instead of the activity itself.')
     floor: float = param(
         1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
     )

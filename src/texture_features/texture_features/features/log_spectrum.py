@@ -25,7 +25,12 @@ class LogSpectrum:
 
     per_channel: ClassVar[bool] = True
 
-    points: int = param(12288, 'Number of frequency bins: k · rate / (2 · points), k from 1.', low=2, high=1 << 19)
+    points: int = param(
+        12288,
+        'Sets the number of frequency bins k · rate / (2 · points), k from 1; more bins resolve finer.',
+        low=2,
+        high=1 << 19,
+    )
     floor: float = param(
         1e-20,
         'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',

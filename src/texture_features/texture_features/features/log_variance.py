@@ -21,7 +21,7 @@ class LogVariance:
 
     floor: float = param(
         1e-20,
-        'Power added before the logarithm, unit²; use 1/12 for signals quantised to integers.',
+        'Sets the power added before the logarithm, in unit²; 1/12 is right for signals quantised to integers.',
         low=1e-300,
         high=1e300,
     )

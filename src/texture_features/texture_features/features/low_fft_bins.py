@@ -22,7 +22,12 @@ class LowFftBins:
 
     per_channel: ClassVar[bool] = True
 
-    bins: int = param(32, 'Number of FFT bins, from the first above 0 Hz.', low=1, high=512)
+    bins: int = param(
+        32,
+        'Sets the number of FFT bins, from the first above 0 Hz; more bins reach higher frequencies.',
+        low=1,
+        high=512,
+    )
     points: int = param(
         128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=4, high=16384
     )

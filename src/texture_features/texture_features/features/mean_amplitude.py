@@ -22,7 +22,7 @@ class MeanAmplitude:
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    logarithm: bool = param(False, 'Return the logarithm instead of the amplitude.')
+    logarithm: bool = param(False, 'Returns the logarithm instead of the amplitude itself.')
     floor: float = param(
         1e-10,
         'Amplitude added before the logarithm, so that silence gives a finite value, unit.',

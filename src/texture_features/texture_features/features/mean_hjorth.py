@@ -22,7 +22,7 @@ class MeanHjorth:
 
     per_channel: ClassVar[bool] = False
 
-    log_activity: bool = param(True, 'Average the logarithm of the activity instead of the activity itself.')
+    log_activity: bool = param(True, 'Averages the logarithm of the activity instead of the activity itself.')
     floor: float = param(
         1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
     )

@@ -23,7 +23,9 @@ class ChannelMeanStatistics:
     per_channel: ClassVar[bool] = False
     names: ClassVar[tuple[str, ...]] = ('mean', 'log_variance', 'rise', 'absolute_rise', 'share_above', 'skewness')
 
-    floor: float = param(1e-4, 'Power added to the variance before logarithm and split, unit².', low=1e-300, high=1e300)
+    floor: float = param(
+        1e-4, 'Sets the power added to the variance before logarithm and split, in unit².', low=1e-300, high=1e300
+    )
 
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the six means."""

@@ -30,7 +30,12 @@ class OrdinalPatterns:
     per_channel: ClassVar[bool] = True
 
     length: int = param(4, 'Number of samples in a pattern; there are factorial(length) patterns.', low=2, high=5)
-    delay: int = param(2, 'Distance between the samples of a pattern, in samples.', low=1, high=10_000)
+    delay: int = param(
+        2,
+        'Sets the distance between the samples of a pattern, in samples; a larger one describes lower frequencies.',
+        low=1,
+        high=10_000,
+    )
 
     @property
     def names(self) -> tuple[str, ...]:

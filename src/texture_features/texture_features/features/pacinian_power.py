@@ -36,10 +36,10 @@ class PacinianPower:
         250.0, 'Frequency at which the detection threshold is lowest.', unit='Hz', low=1.0, high=10_000.0
     )
     slope_below_db: float = param(
-        12.0, 'Slope of the threshold below that frequency, dB per octave.', low=0.0, high=100.0
+        12.0, 'Sets the slope of the threshold below that frequency, in dB per octave.', low=0.0, high=100.0
     )
     slope_above_db: float = param(
-        12.0, 'Slope of the threshold above that frequency, dB per octave.', low=0.0, high=100.0
+        12.0, 'Sets the slope of the threshold above that frequency, in dB per octave.', low=0.0, high=100.0
     )
     rate_of_change: bool = param(
         True, 'Whether the signal is the time derivative of the contact quantity; if so it is integrated.'

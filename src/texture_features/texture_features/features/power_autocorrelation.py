@@ -29,7 +29,9 @@ class PowerAutocorrelation:
 
     per_channel: ClassVar[bool] = True
 
-    lags: int = param(12, 'Number of lags, taken from 1, 2, 3, 4, 6, 8, 12, 16, 24, … samples.', low=1, high=24)
+    lags: int = param(
+        12, 'Sets the number of lags, taken from 1, 2, 3, 4, 6, 8, 12, 16, 24, … samples.', low=1, high=24
+    )
     floor: float = param(
         1e-3,
         'Ratio added before the logarithm, so that a lag without any power gives a finite value.',

@@ -33,7 +33,7 @@ class RegionPeaks:
         "How the peaks are ranked: 'intensity' as found, by their strongest region; by 'frequency', the lowest first.",
         choices=('intensity', 'frequency'),
     )
-    heights: bool = param(False, 'Return the amplitude of each peak in addition to its frequency.')
+    heights: bool = param(False, 'Returns the amplitude of each peak in addition to its frequency.')
     points: int = param(2048, 'FFT length in samples; a shorter window is zero-padded.', low=8, high=1 << 20)
 
     @property

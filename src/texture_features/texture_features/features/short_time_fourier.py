@@ -24,7 +24,9 @@ class ShortTimeFourier:
 
     per_channel: ClassVar[bool] = True
 
-    parts: int = param(4, 'Number of equal time segments of the window.', low=1, high=256)
+    parts: int = param(
+        4, 'Sets the number of equal time segments of the window; more segments resolve finer in time.', low=1, high=256
+    )
     bands: int = param(16, 'Number of frequency bands; a segment is twice as many samples long.', low=2, high=512)
     overlap: float = param(
         0.5,

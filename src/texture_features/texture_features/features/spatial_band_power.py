@@ -29,12 +29,12 @@ class SpatialBandPower:
 
     per_channel: ClassVar[bool] = True
 
-    bands: int = param(4, 'Number of spatial frequency bands.', low=1, high=128)
+    bands: int = param(4, 'Sets the number of spatial frequency bands; more bands resolve finer.', low=1, high=128)
     longest_m: float = param(
-        2e-3, 'Longest wavelength, the lower edge of the first band.', unit='m', low=1e-6, high=1.0
+        2e-3, 'Sets the longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1.0
     )
     shortest_m: float = param(
-        4.5e-4, 'Shortest wavelength, the upper edge of the last band.', unit='m', low=1e-6, high=1.0
+        4.5e-4, 'Sets the shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-6, high=1.0
     )
     points: int = param(
         128, 'Length of an FFT segment in samples; FFT bins are rate / points apart.', low=8, high=16384
@@ -48,7 +48,9 @@ class SpatialBandPower:
         low=0.0,
         high=4.0,
     )
-    floor: float = param(1e-20, 'Spatial power density added before the logarithm, unit² m.', low=1e-300, high=1e300)
+    floor: float = param(
+        1e-20, 'Sets the spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300
+    )
 
     def __post_init__(self) -> None:
         if not self.shortest_m < self.longest_m:

@@ -26,15 +26,17 @@ class SpatialBands:
 
     per_channel: ClassVar[bool] = True
 
-    bands: int = param(32, 'Number of spatial frequency bands.', low=2, high=512)
+    bands: int = param(32, 'Sets the number of spatial frequency bands; more bands resolve finer.', low=2, high=512)
     longest_m: float = param(
-        33e-3, 'Longest wavelength, the lower edge of the first band.', unit='m', low=1e-6, high=1e3
+        33e-3, 'Sets the longest wavelength, which is the lower edge of the first band.', unit='m', low=1e-6, high=1e3
     )
     shortest_m: float = param(
-        0.67e-3, 'Shortest wavelength, the upper edge of the last band.', unit='m', low=1e-7, high=1e3
+        0.67e-3, 'Sets the shortest wavelength, which is the upper edge of the last band.', unit='m', low=1e-7, high=1e3
     )
-    normalised: bool = param(True, 'Subtract the mean over the bands, which depends mainly on force and speed.')
-    floor: float = param(1e-7, 'Spatial power density added before the logarithm, unit² m.', low=1e-300, high=1e300)
+    normalised: bool = param(True, 'Subtracts the mean over the bands, which depends mainly on force and speed.')
+    floor: float = param(
+        1e-7, 'Sets the spatial power density added before the logarithm, in unit² m.', low=1e-300, high=1e300
+    )
 
     def __post_init__(self) -> None:
         if not self.shortest_m < self.longest_m:

@@ -29,7 +29,7 @@ class SpatialVariation:
 
     lag_m: float = param(
         5e-4,
-        'Distance on the surface between the two compared points; longer lags compare coarser texture.',
+        'Sets the distance on the surface between the two compared points; longer lags compare coarser texture.',
         unit='m',
         low=1e-6,
         high=1.0,

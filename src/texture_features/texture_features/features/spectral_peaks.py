@@ -29,7 +29,11 @@ class SpectralPeaks:
         5, 'Number of peaks; those that the spectrum lacks have frequency and amplitude 0.', low=1, high=64
     )
     gap_hz: float = param(
-        10.0, 'Smallest distance between two peaks; a larger one suppresses side peaks.', unit='Hz', low=0.0, high=1e6
+        10.0,
+        'Sets the smallest distance between two peaks; a larger one suppresses side peaks.',
+        unit='Hz',
+        low=0.0,
+        high=1e6,
     )
     order: str = param('intensity', 'Order in which the peaks are returned.', choices=('intensity', 'frequency'))
     points: int = param(2048, 'FFT length in samples; a shorter window is zero-padded.', low=8, high=1 << 20)

@@ -26,7 +26,11 @@ class TemporalVariation:
     names: ClassVar[tuple[str, ...]] = ('',)
 
     lag_s: float = param(
-        0.002, 'Time lag between the compared samples; at least one sample.', unit='s', low=0.0, high=10.0
+        0.002,
+        'Sets the time lag between the compared samples, at least one sample; a longer one compares lower frequencies.',
+        unit='s',
+        low=0.0,
+        high=10.0,
     )
     floor: float = param(
         1e-20,

@@ -30,7 +30,9 @@ class WaveletEnergy:
 
     per_channel: ClassVar[bool] = True
 
-    octaves: int = param(6, 'Number of octaves of the wavelet transform.', low=1, high=20)
+    octaves: int = param(
+        6, 'Sets the number of octaves of the wavelet transform; more reach lower frequencies.', low=1, high=20
+    )
     floor: float = param(
         1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
     )

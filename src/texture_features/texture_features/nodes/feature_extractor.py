@@ -28,7 +28,10 @@ TIMEOUT_PERIOD_S = 0.1
 class ExtractorParams:
     """Parameters of the feature extractor."""
 
-    recipe: str = param('default', "Name of a shipped recipe, or path of a recipe (YAML) or of a model's card (JSON).")
+    recipe: str = param(
+        'default',
+        "Sets the recipe: the name of a shipped one, or the path of a recipe (YAML) or of a model's card (JSON).",
+    )
 
 
 class FeatureExtractor(Node):

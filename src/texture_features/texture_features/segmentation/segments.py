@@ -55,25 +55,31 @@ class SegmentationParams:
         0.15, 'Shortest slide that is reported; shorter ones are discarded.', unit='s', low=0.0, high=60.0
     )
     ramp_s: float = param(
-        0.2, 'Acceleration and deceleration time of the robot, from its motion plan.', unit='s', low=0.0, high=10.0
+        0.2,
+        'Sets the acceleration and deceleration time of the robot, from its motion plan.',
+        unit='s',
+        low=0.0,
+        high=10.0,
     )
     press_s: float = param(
         0.1, 'Time the robot takes to press and to release, from its motion plan.', unit='s', low=0.0, high=10.0
     )
     quantity: str = param(
         'either',
-        "Quantity that the vibration channels measure: 'force', its 'change', or 'either' if unknown.",
+        "Sets the quantity that the vibration channels measure: 'force', its 'change', or 'either' if unknown.",
         choices=tuple(MEASURED_QUANTITIES),
     )
     smooth_s: float = param(
         SMOOTH_S,
-        'Time constant of the high-pass filter that removes the load; longer for slow slides.',
+        'Sets the time constant of the high-pass filter that removes the load; slow slides need a longer one.',
         unit='s',
         low=0.01,
         high=1.0,
     )
     noise_rms: float = param(
-        0.0, 'Baseline noise of the sensor, rms; 0: estimated from the quietest tenth of the recording.', low=0.0
+        0.0,
+        'Sets the baseline noise of the sensor, rms; 0 estimates it from the quietest tenth of the recording.',
+        low=0.0,
     )
 
 

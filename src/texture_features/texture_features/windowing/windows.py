@@ -29,9 +29,19 @@ class WindowParams:
     """How the sliding part of a signal is cut."""
 
     length_s: float = param(
-        0.5, 'Length of a window; longer ones give more certain decisions, later.', unit='s', low=0.005, high=60.0
+        0.5,
+        'Sets the length of a window; longer ones give more certain decisions, later.',
+        unit='s',
+        low=0.005,
+        high=60.0,
     )
-    hop_s: float = param(0.1, 'Time between the starts of two windows.', unit='s', low=0.001, high=60.0)
+    hop_s: float = param(
+        0.1,
+        'Sets the time between the starts of two windows; a smaller one gives more estimates and costs computing time.',
+        unit='s',
+        low=0.001,
+        high=60.0,
+    )
     skip_s: float = param(
         0.0, 'Time at the start of a slide that is excluded from windows.', unit='s', low=0.0, high=60.0
     )

@@ -102,8 +102,8 @@ def _write_phase(
     progress = part.start / len(slide.samples)
     # A state before the first batch it covers, and after the last batch of the phase before.
     log_ns = begin_ns + (DELAY_NS if part.start else 0)
-    promise_s = (end_ns - begin_ns) / NANOSECONDS
-    bag.write('exploration', replace(state, stamp_ns=begin_ns, steady_s=promise_s, progress=progress), log_ns)
+    guaranteed_s = (end_ns - begin_ns) / NANOSECONDS
+    bag.write('exploration', replace(state, stamp_ns=begin_ns, steady_s=guaranteed_s, progress=progress), log_ns)
     step = max(1, round(BATCH_S * stream.rate_hz))
     for index in range(part.start, part.stop, step):
         samples = slide.samples[index : min(index + step, part.stop)].astype('float32')
