@@ -3,6 +3,7 @@
 import os
 import re
 import signal
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 from xml.etree import ElementTree
@@ -119,6 +120,26 @@ def test_a_model_of_simulated_slides_recognises_the_surface_of_the_emulator(oper
     explored = operator.explore(SLIDE)
     assert (explored.texture.label, explored.texture.final) == ('ridge_2mm_deep', True)
     assert explored.texture.confidence > 0.9
+    assert explored.texture.known
+    assert 'outside' not in explored.texture.message
+
+
+@pytest.mark.parametrize(
+    ('asked', 'deviation'),
+    [
+        (ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=1.0, distance_m=0.02), 'speed 0.02 m/s, trained'),
+        (ExplorationRequest('circular', speed_m_s=0.05, force_n=1.0, turns=0.5), "motion 'circular', trained 'linear"),
+        (ExplorationRequest('in_hand_sliding', force_n=1.0, duration_s=1.5), "motion 'in_hand_sliding', trained"),
+    ],
+    ids=['another_speed', 'circular', 'in_hand_sliding'],
+)
+def test_outside_what_was_trained_the_estimate_says_so_and_decides_nothing(operator, models, asked, deviation) -> None:
+    operator.set_parameters('classifier', {'model': str(models['vibration'])})
+    explored = operator.explore(replace(asked, early_stopping=True))
+    assert explored.texture.windows, explored.message
+    assert (explored.texture.known, explored.texture.decided) == (False, False)
+    assert explored.texture.message.startswith('outside what was trained: ')
+    assert deviation in explored.texture.message
 
 
 def test_the_sample_can_be_swapped_and_an_unknown_one_gets_the_nearest(operator) -> None:

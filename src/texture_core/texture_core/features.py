@@ -18,6 +18,7 @@ class FeatureVector:
     `feature_set` is the fingerprint of the windows, inputs and features that made the values: a model refuses
     vectors of another fingerprint. `skipped` counts the windows left out so far for lost or non-finite samples.
     `sequence` counts the vectors that its sender has sent before: a jump is what was lost on the way.
+    `motion`, `direction_rad` and `sensor` say how the window was measured, as `speed_m_s` and `force_n` do.
     """
 
     start_ns: int
@@ -33,6 +34,9 @@ class FeatureVector:
     skipped: int = 0
     sequence: int = 0
     frame_id: str = ''
+    motion: str = ''
+    direction_rad: float = math.nan
+    sensor: str = ''
 
     def __post_init__(self) -> None:
         if self.values.shape != (len(self.names),):

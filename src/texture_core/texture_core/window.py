@@ -24,6 +24,8 @@ class Window:
         Time of the first sample.
     speed_m_s, force_n
         Mean speed and normal force in the window; NaN if unknown.
+    sensor
+        Name of the sensor part that measured; '' if unknown.
     """
 
     samples: Samples
@@ -32,6 +34,7 @@ class Window:
     start_ns: int = 0
     speed_m_s: float = math.nan
     force_n: float = math.nan
+    sensor: str = ''
 
     def __post_init__(self) -> None:
         if self.samples.ndim != 2 or 0 in self.samples.shape:

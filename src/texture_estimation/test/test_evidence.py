@@ -5,8 +5,11 @@ import pytest
 
 from texture_core.features import FeatureVector
 from texture_estimation.classification.evidence_rules import MajorityVote
+from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.fingerprint import fingerprint_difference
+from texture_estimation.open_set.domain import Domain
+from texture_estimation.recipe import load_recipe
 
 
 def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):
@@ -48,7 +51,9 @@ def test_an_estimate_carries_the_frame_of_its_vectors(model, examples):
     assert {estimate.frame_id for estimate in predict(model, stream)} == {'tip'}
 
 
-def test_the_final_estimate_says_how_many_windows_are_missing_from_it(model, examples):
+def test_the_final_estimate_says_how_many_windows_are_missing_from_it(make_examples):
+    examples = make_examples(slides=5)  # enough for prediction sets, whose absence is another message
+    model = train(load_recipe('default'), examples)
     *windows, last = vectors(examples)
     final = predict(model, [*windows, dataclasses.replace(last, skipped=6)])[-1]
     assert final.message == '6 of 14 windows were left out, as samples were lost or not finite'
@@ -69,6 +74,51 @@ def test_the_same_windows_further_apart_weigh_more(model, make_examples):
         predict(model, vectors(vague, hop_s=0.5))[-1].confidence
         > predict(model, vectors(vague, hop_s=0.02))[-1].confidence
     )
+
+
+def under(stream, **conditions):
+    """Return vectors made under other conditions."""
+    return [vector if vector.last else dataclasses.replace(vector, **conditions) for vector in stream]
+
+
+def trained_at(model, speed_m_s):
+    domain = Domain(motions=('linear_slide',), speed_m_s=(speed_m_s, speed_m_s))
+    return dataclasses.replace(model, domain=domain)
+
+
+def test_outside_what_was_trained_nothing_is_known_or_decided_and_every_estimate_says_why(model, examples):
+    slow = under(vectors(examples), speed_m_s=0.02, motion='linear_slide')
+    sentence = 'outside what was trained: speed 0.02 m/s, trained 0.05 m/s'
+    assert any(estimate.decided for estimate in predict(model, slow))
+    for estimate in predict(trained_at(model, 0.05), slow):
+        assert (estimate.known, estimate.decided, estimate.prediction_set) == (False, False, ())
+        assert (estimate.label, estimate.message) == ('felt', sentence)
+
+
+def test_within_what_was_trained_the_estimates_are_those_without_a_domain(model, examples):
+    stream = under(vectors(examples), speed_m_s=0.05, motion='linear_slide')
+    assert predict(trained_at(model, 0.05), stream) == predict(model, stream)
+
+
+def test_the_mean_speed_of_the_exploration_counts_not_that_of_one_window(model, examples):
+    first, *rest = under(vectors(examples), speed_m_s=0.05)
+    estimates = predict(trained_at(model, 0.05), [dataclasses.replace(first, speed_m_s=0.035), *rest])
+    assert [bool(estimate.message) for estimate in estimates[:3]] == [True, True, False]
+    assert estimates[-1].known
+
+
+def test_the_next_exploration_is_compared_anew(model, examples):
+    slow = under(vectors(examples), speed_m_s=0.02)
+    usual = under(vectors(examples, name='e2'), speed_m_s=0.05)
+    assert predict(trained_at(model, 0.05), slow + usual)[-1].known
+
+
+def test_a_model_of_too_few_slides_names_no_candidates_and_says_why(make_examples):
+    few = make_examples(labels=('cork', 'felt'))
+    *growing, final = predict(train(load_recipe('default'), few), vectors(few))
+    assert final.prediction_set == ()
+    assert 'needs 19 slides or more' in final.message
+    assert {estimate.message for estimate in growing} == {''}
 
 
 def test_a_new_exploration_begins_again_even_without_an_end(model, examples):

@@ -26,9 +26,18 @@ def test_the_true_texture_is_in_the_set_as_often_as_asked(coverage):
     assert np.mean(found) == pytest.approx(coverage, abs=0.02)
 
 
-def test_with_too_few_slides_for_the_coverage_all_textures_are_in_the_set():
-    prediction_sets = fit_prediction_sets(*slides(np.random.default_rng(0), 9), 0.95)
-    assert prediction_sets.members(np.array([0.7, 0.0, 0.3]), 1.0) == [0, 2, 1]
+@pytest.mark.parametrize(('count', 'coverage', 'needed'), [(9, 0.95, 19), (18, 0.95, 19), (3, 0.8, 4)])
+def test_with_too_few_slides_for_the_coverage_there_is_no_set_but_a_reason(count, coverage, needed):
+    prediction_sets = fit_prediction_sets(*slides(np.random.default_rng(0), count), coverage)
+    assert prediction_sets.members(np.array([0.7, 0.0, 0.3]), 1.0) == []
+    assert f'a coverage of {100 * coverage:g} % needs {needed} slides' in prediction_sets.reason
+
+
+@pytest.mark.parametrize(('count', 'coverage'), [(19, 0.95), (4, 0.8), (9, 0.9)])
+def test_with_just_enough_slides_there_are_sets(count, coverage):
+    prediction_sets = fit_prediction_sets(*slides(np.random.default_rng(0), count), coverage)
+    assert prediction_sets.reason == ''
+    assert prediction_sets.members(np.array([0.7, 0.0, 0.3]), 1.0)[0] == 0
 
 
 def test_the_most_probable_texture_is_always_in_the_set():

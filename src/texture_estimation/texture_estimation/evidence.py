@@ -13,6 +13,7 @@ from texture_core.signal import NANOSECONDS
 from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.model import TextureModel
 from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS
+from texture_features.slide_conditions import RunningConditions
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
 NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
@@ -22,7 +23,9 @@ class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
     A new exploration id, or a vector after the `last` one, starts a new slide. Novelty detection runs once the label is
-    certain, and at the end; until then a label counts as known. Equally probable labels give no label: unclassified.
+    certain, and at the end; until then a label counts as known. An exploration under conditions that were not trained
+    is neither known nor decided, and the message says which condition it is. Equally probable labels give no label:
+    unclassified.
 
     Parameters
     ----------
@@ -62,6 +65,8 @@ class EvidenceAccumulator:
         self._values = self._zeros.copy()
         self._novelty_windows = 0
         self._known: bool | None = None  # not looked at yet
+        self._conditions = RunningConditions()
+        self._deviation = ''  # of these conditions from those of the training
 
     def _note_skipped(self, skipped: int) -> None:
         """Say in the final estimate how much of the slide is missing from it."""
@@ -82,6 +87,8 @@ class EvidenceAccumulator:
             bad = vector.names[int((~np.isfinite(vector.values)).argmax())]
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
+        self._conditions.update(vector)
+        self._deviation = model.domain.deviation(self._conditions.get())
         self._sum += model.recipe.evidence.window_evidence(model.predictor(vector.values))
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
@@ -110,7 +117,8 @@ class EvidenceAccumulator:
         listed = probabilities.tolist()
         confidence = max(listed)
         best, decided = listed.index(confidence), listed.count(confidence) == 1
-        certain = decided and model.stopping_rule.certain(confidence, effective_windows)
+        within = not self._deviation
+        certain = decided and within and model.stopping_rule.certain(confidence, effective_windows)
         if (certain and not self._known) or final:
             self._known = model.active_novelty_detector is None or model.active_novelty_detector.is_known(
                 self._values / self._novelty_windows, effective_windows
@@ -120,18 +128,23 @@ class EvidenceAccumulator:
             exploration_id=vector.exploration_id,
             frame_id=vector.frame_id,
             label=model.labels[best] if decided else '',
-            known=decided and self._known is not False,
+            known=decided and within and self._known is not False,
             confidence=confidence,
             labels=model.labels,
             probabilities=tuple(listed),
             decided=certain,
-            prediction_set=self._candidates(model, probabilities, effective_windows) if final else (),
+            prediction_set=self._candidates(model, probabilities, effective_windows) if final and within else (),
             windows=self._windows,
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
             model=model.name,
-            message=self._message,
+            message=self._explanation(model, final),
         )
+
+    def _explanation(self, model: TextureModel, final: bool) -> str:
+        """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
+        no_set = model.prediction_sets.reason if final and not self._deviation else ''
+        return '; '.join(filter(None, (self._deviation, self._message, no_set)))
 
     @staticmethod
     def _candidates(model: TextureModel, probabilities: Array, effective_windows: float) -> tuple[str, ...]:

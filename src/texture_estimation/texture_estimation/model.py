@@ -22,6 +22,7 @@ from texture_estimation.incremental.training_examples import TrainingExamples
 from texture_estimation.learners.learner import Predictor
 from texture_estimation.log_probabilities import is_tied, log_softmax
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
+from texture_estimation.open_set.domain import Domain
 from texture_estimation.open_set.novelty import NoveltyDetector
 from texture_estimation.open_set.prediction_sets import PredictionSets
 from texture_estimation.open_set.stopping_rule import StoppingRule
@@ -67,6 +68,8 @@ class TextureModel:
         Slides added after the training.
     incremental_predictor
         Predictor since slides were added; None if none were.
+    domain
+        Conditions under which the model was trained; outside them it decides nothing.
     """
 
     name: str
@@ -84,6 +87,7 @@ class TextureModel:
     examples: TrainingExamples | None = None
     added_slides: tuple[AddedSlide, ...] = ()
     incremental_predictor: Predictor | None = None
+    domain: Domain = field(default_factory=Domain)
 
     @cached_property
     def predictor(self) -> Predictor:
@@ -181,6 +185,7 @@ class TextureModel:
             'tempering_exponent': self.tempering_exponent,
             'stopping_rule': asdict(self.stopping_rule),
             'prediction_sets': asdict(self.prediction_sets),
+            'domain': self.domain.as_card(),
             'motions': [asdict(motion) for motion in self.next_touch_model.gaussians] if self.next_touch_model else [],
             'training': dict(self.training),
             'recipe': self.recipe.as_mapping(),
@@ -238,6 +243,7 @@ def load_model(path: str | Path) -> TextureModel:
             novelty_detector=NoveltyDetector.from_arrays(novelty_detector) if novelty_detector else None,
             next_touch_model=NextTouchModel.from_arrays(gaussians) if gaussians else None,
             examples=TrainingExamples.from_arrays(examples) if examples else None,
+            domain=Domain.from_card(card.get('domain', {})),
         )
         model.validate()
     except model_files.BROKEN as error:

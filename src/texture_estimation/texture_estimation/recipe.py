@@ -13,6 +13,7 @@ from texture_core.parameters import from_mapping, param
 from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
+from texture_estimation.open_set.domain import DomainMargins
 from texture_features.feature_set import FeatureSet
 from texture_features.recipe_entry import choose, entry_of
 from texture_features.recipe_file import read_recipe
@@ -57,6 +58,33 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=0.5,
     )
+    speed_margin: float = param(
+        0.15,
+        'Sets how far the speed of an exploration may lie outside the speeds of the training, relative to them; '
+        'beyond, the estimate says that it is outside what was trained.',
+        low=0.0,
+        high=100.0,
+    )
+    force_margin: float = param(
+        0.3,
+        'Sets how far the force of an exploration may lie outside the forces of the training, relative to them; '
+        'beyond, the estimate says that it is outside what was trained.',
+        low=0.0,
+        high=100.0,
+    )
+    direction_margin_rad: float = param(
+        0.35,
+        'Sets the largest angle between the direction of an exploration and a direction of the training; '
+        'beyond, the estimate says that it is outside what was trained.',
+        unit='rad',
+        low=0.0,
+        high=3.2,
+    )
+
+    @property
+    def domain_margins(self) -> DomainMargins:
+        """How far an exploration may lie outside the conditions of the training."""
+        return DomainMargins(self.speed_margin, self.force_margin, self.direction_margin_rad)
 
 
 @dataclass(frozen=True)

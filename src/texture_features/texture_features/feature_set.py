@@ -199,6 +199,9 @@ class FeatureSet:
             force_n=event.force_n,
             feature_set=fingerprint,
             skipped=event.skipped,
+            motion=event.motion,
+            direction_rad=event.direction_rad,
+            sensor=event.windows[self.topics[0]].sensor,
         )
 
     def _names_and_fingerprint(self, layout: InputLayout) -> tuple[tuple[str, ...], str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -13,6 +14,7 @@ from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
 from texture_core.slide_motion import SlideMotion
+from texture_features.slide_conditions import RunningConditions, SlideConditions
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +36,8 @@ class LabelledFeatures:
         How slides were made, as far as it is known.
     start_ns : (n,) int64 or None
         Start of each window, ns; without it, the windows of a slide are taken to lie `hop_s` apart.
+    conditions
+        Motion, sensor, speed, force and directions of each slide, as far as its windows tell them.
 
     Raises
     ------
@@ -50,6 +54,7 @@ class LabelledFeatures:
     hop_s: float
     motions: Mapping[str, SlideMotion] = field(default_factory=dict)
     start_ns: NDArray[np.int64] | None = None
+    conditions: Mapping[str, SlideConditions] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         shape = (len(self.labels), len(self.names))
@@ -84,13 +89,24 @@ class LabelledFeatures:
         return self.take(np.isin(self.groups, list(slides)))
 
     def vectors(self, slide: str) -> list[FeatureVector]:
-        """Return the windows of one slide, (n_windows,), and its end, as the feature extractor publishes them."""
+        """Return the windows of one slide, (n_windows,), and its end, each with the mean speed and force of the slide."""
         rows = np.flatnonzero(self.groups == slide)
+        made = self.conditions.get(slide, SlideConditions())
         hop_ns = self.hop_s * NANOSECONDS
         starts = (np.arange(len(rows)) * hop_ns).round() if self.start_ns is None else self.start_ns[rows]
         vectors = [
             FeatureVector(
-                int(start), slide, self.window_s, self.hop_s, self.names, values, feature_set=self.feature_set
+                int(start),
+                slide,
+                self.window_s,
+                self.hop_s,
+                self.names,
+                values,
+                made.speed_m_s,
+                made.force_n,
+                self.feature_set,
+                motion=made.motion,
+                sensor=made.sensor,
             )
             for start, values in zip(starts.tolist(), self.values[rows], strict=True)
         ]
@@ -125,4 +141,12 @@ class LabelledFeatures:
             window_s=used[0].window_s,
             hop_s=used[0].hop_s,
             start_ns=np.array([vector.start_ns for vector in used], dtype=np.int64),
+            conditions=_conditions(used),
         )
+
+
+def _conditions(vectors: Iterable[FeatureVector]) -> Mapping[str, SlideConditions]:
+    running: defaultdict[str, RunningConditions] = defaultdict(RunningConditions)
+    for vector in vectors:
+        running[vector.exploration_id].update(vector)
+    return {exploration_id: conditions.get() for exploration_id, conditions in running.items()}

@@ -18,9 +18,11 @@ from texture_estimation.log_probabilities import is_tied, log_loss
 from texture_estimation.model import TextureModel
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
 from texture_estimation.open_set import prediction_sets, stopping_rule
+from texture_estimation.open_set.domain import Domain
 from texture_estimation.open_set.novelty import NoveltyDetector
-from texture_estimation.recipe import Recipe
+from texture_estimation.recipe import DecisionParams, Recipe
 from texture_features.labelled_features import LabelledFeatures
+from texture_features.slide_conditions import SlideConditions
 
 # Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
 DEFAULT_TEMPERING_EXPONENT = 0.5
@@ -80,6 +82,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
             'held_out_window_accuracy': _held_out_accuracy(fitted, codes),
         },
         examples=TrainingExamples.of(examples.values, codes, groups),
+        domain=_domain(examples, recipe.training),
     )
 
 
@@ -198,6 +201,13 @@ def _fit_next_touch_model(examples: LabelledFeatures) -> NextTouchModel | None:
     means /= np.bincount(groups)[:, None]
     made = [examples.motions.get(slide) for slide in slides.tolist()]
     return NextTouchModel.of_slides(means, examples.labels[first].tolist(), made)
+
+
+def _domain(examples: LabelledFeatures, params: DecisionParams) -> Domain:
+    """Return the conditions under which the slides were made."""
+    slides, first = np.unique(examples.groups, return_index=True)
+    conditions = [examples.conditions.get(slide, SlideConditions()) for slide in slides.tolist()]
+    return Domain.of_slides(conditions, examples.labels[first].tolist(), params.domain_margins)
 
 
 def _held_out_accuracy(fitted: Fitted, codes: Codes) -> float | None:

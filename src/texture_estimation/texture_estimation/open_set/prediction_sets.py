@@ -10,6 +10,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 
+ROUNDING = 1e-9
 EFFECTIVE_WINDOWS = (1.0, 2.0, 4.0, 8.0)  # lengths of evidence at which it is learnt, in windows that do not overlap
 
 
@@ -26,15 +27,28 @@ class PredictionSets:
     coverage
         Share of slides whose texture is to be in the set.
     effective_window_counts, thresholds
-        Effective window count, and the smallest probability of a texture in the set.
+        Effective window count, and the smallest probability of a texture in the set; empty if the held-out slides were
+        too few for the coverage.
     """
 
     coverage: float = 0.95
-    effective_window_counts: tuple[float, ...] = (1.0,)
-    thresholds: tuple[float, ...] = (0.0,)
+    effective_window_counts: tuple[float, ...] = ()
+    thresholds: tuple[float, ...] = ()
+
+    @property
+    def reason(self) -> str:
+        """Why there are no sets, in one sentence; '' if there are."""
+        if self.thresholds:
+            return ''
+        return (
+            f'no prediction set: a coverage of {100 * self.coverage:g} % needs {slides_needed(self.coverage)} slides '
+            'or more to be held out of the training'
+        )
 
     def members(self, probabilities: Array, effective_windows: float) -> list[int]:
-        """Return the numbers of the textures in the set, the most probable first; never empty."""
+        """Return the numbers of the textures in the set, the most probable first; none only for a `reason`."""
+        if not self.thresholds:
+            return []
         thresholds = min(
             float(np.interp(effective_windows, self.effective_window_counts, self.thresholds)),
             float(probabilities.max()),
@@ -48,6 +62,8 @@ def fit_prediction_sets(
 ) -> PredictionSets:
     """Return the sets for a coverage from slides held out of the training.
 
+    With too few slides for the coverage every texture would be in each set: there are none then.
+
     Parameters
     ----------
     posteriors : of each slide (n_windows, n_labels)
@@ -60,9 +76,22 @@ def fit_prediction_sets(
         Share of slides whose texture is to be in the set.
     """
     thresholds = []
-    rank = math.floor((len(truths) + 1) * (1.0 - coverage))  # so many slides may lie below: with this rank it is exact
+    rank = _rank(len(truths), coverage)
+    if not rank:
+        return PredictionSets(coverage)
     for effective_windows in EFFECTIVE_WINDOWS:
         places = [int(np.abs(own - effective_windows).argmin()) for own in effective_window_counts]
         true = np.sort([np.exp(p[place, truth]) for p, place, truth in zip(posteriors, places, truths, strict=True)])
-        thresholds.append(float(true[rank - 1]) if rank else 0.0)
+        thresholds.append(float(true[rank - 1]))
     return PredictionSets(coverage, EFFECTIVE_WINDOWS, tuple(thresholds))
+
+
+def slides_needed(coverage: float) -> int:
+    """Return the smallest number of held-out slides from which sets of this coverage can be learnt."""
+    number = max(1, round(1.0 / (1.0 - coverage)) - 1)
+    return number if _rank(number, coverage) else number + 1
+
+
+def _rank(slides: int, coverage: float) -> int:
+    """Return how many of the slides held out may lie below the threshold for the coverage to be exact."""
+    return math.floor((slides + 1) * (1.0 - coverage) + ROUNDING)

@@ -30,6 +30,7 @@ class SampleBuffer:
     def __init__(self, signal: TactileSignal, keep_s: float) -> None:
         self.rate_hz = signal.sampling_rate_hz
         self.channels = signal.channels
+        self.sensor = signal.sensor
         self.first_sample = signal.first_sample
         self.next_sample = signal.first_sample
         self._keep = math.ceil(keep_s * self.rate_hz)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections import deque
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ class CoveredSpan:
     end_ns: int
     speed_m_s: float
     force_n: float
+    direction_rad: float
 
 
 class SlideCoverage:
@@ -48,6 +50,7 @@ class SlideCoverage:
     def __init__(self, state: ExplorationState, length_ns: int, hop_ns: int, skip_ns: int) -> None:
         self.exploration_id = state.exploration_id
         self.surface = state.surface
+        self.motion = state.motion
         self.start_ns = state.stamp_ns
         self.ended = False
         self.skipped = 0
@@ -55,8 +58,8 @@ class SlideCoverage:
         self._hop_ns = hop_ns
         self._next_ns = state.stamp_ns + skip_ns
         self._intervals: deque[list[int]] = deque()
-        # stamp, end of the covered time known with this state, speed, force
-        self._states: deque[tuple[int, int, float, float]] = deque(maxlen=MAX_STATES)
+        # stamp, end of the covered time known with this state, speed, force, direction
+        self._states: deque[tuple[int, int, float, float, float]] = deque(maxlen=MAX_STATES)
         self._promising = False
         self._withdrawn = False
         self._force = _Mean()
@@ -77,7 +80,7 @@ class SlideCoverage:
         if self._withdrawn and state.force_n < LOST_SHARE * self._force.value:
             self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
         self._force.add(state.force_n, float(state.steady_s > 0))
-        self._states.append((stamp, self._intervals[-1][1], state.speed_m_s, state.force_n))
+        self._states.append((stamp, self._intervals[-1][1], state.speed_m_s, state.force_n, state.direction_rad))
         return True
 
     @property
@@ -113,15 +116,17 @@ class SlideCoverage:
             states.popleft()
         speeds = _Mean()
         forces = _Mean()
-        for number, (stamp, covered, speed, force) in enumerate(states):
+        directions = _MeanDirection()
+        for number, (stamp, covered, speed, force, direction) in enumerate(states):
             enough = covered >= end
             until = end if enough else min(states[number + 1][0], end)
             weight = until - max(stamp, start)
             speeds.add(speed, weight)
             forces.add(force, weight)
+            directions.add(direction, weight)
             if enough or until >= end:
                 break
-        return CoveredSpan(start, end, speeds.value, forces.value)
+        return CoveredSpan(start, end, speeds.value, forces.value, directions.value)
 
 
 class _Mean:
@@ -139,6 +144,21 @@ class _Mean:
     @property
     def value(self) -> float:
         return self._sum / self._weight if self._weight else math.nan
+
+
+class _MeanDirection:
+    """Weighted mean of the directions that are known, as that of their unit vectors."""
+
+    def __init__(self) -> None:
+        self._sum = 0j
+
+    def add(self, direction_rad: float, weight: float) -> None:
+        if weight > 0 and math.isfinite(direction_rad):
+            self._sum += cmath.rect(weight, direction_rad)
+
+    @property
+    def value(self) -> float:
+        return cmath.phase(self._sum) if self._sum else math.nan
 
 
 def _steady_ns(steady_s: float) -> int:

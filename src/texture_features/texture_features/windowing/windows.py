@@ -63,6 +63,8 @@ class CutWindow:
     force_n: float = math.nan
     surface: str = ''
     skipped: int = 0
+    motion: str = ''
+    direction_rad: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -248,6 +250,8 @@ class WindowCutter:
             force_n=span.force_n,
             surface=slide.surface,
             skipped=slide.skipped,
+            motion=slide.motion,
+            direction_rad=span.direction_rad,
         )
 
     def _skip(self, slide: SlideCoverage) -> None:
@@ -298,7 +302,7 @@ def _finite_window(buffer: SampleBuffer, first: int, count: int, span: CoveredSp
     samples = buffer.take(first, count)
     if not np.isfinite(samples).all():
         return _Missing.LOST
-    return Window(samples, buffer.rate_hz, buffer.channels, span.start_ns, span.speed_m_s, span.force_n)
+    return Window(samples, buffer.rate_hz, buffer.channels, span.start_ns, span.speed_m_s, span.force_n, buffer.sensor)
 
 
 def _calls(add: Callable[[Any], None], items: Iterable[Any]) -> Iterator[tuple[int, Callable[[Any], None], Any]]:

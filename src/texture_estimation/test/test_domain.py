@@ -1,0 +1,115 @@
+import json
+import math
+
+import pytest
+
+from texture_core.errors import InvalidData
+from texture_estimation.open_set.domain import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
+from texture_features.slide_conditions import SlideConditions
+
+
+def conditions(speed_m_s=0.05, force_n=1.0, motion='linear_slide', sensor='tsf85', directions_rad=(0.0,)):
+    return SlideConditions(motion, sensor, speed_m_s, force_n, directions_rad)
+
+
+def trained_on(*slides, **margins):
+    return Domain.of_slides(slides, ['cork'] * len(slides), DomainMargins(**margins))
+
+
+TRAINED = trained_on(conditions(0.045, 0.9), conditions(0.055, 1.1))
+
+
+def test_slides_like_those_of_the_training_are_within_the_domain():
+    assert TRAINED.deviation(conditions()) == ''
+
+
+@pytest.mark.parametrize(
+    ('came', 'sentence'),
+    [
+        (conditions(speed_m_s=0.02), 'speed 0.02 m/s, trained 0.045 to 0.055 m/s'),
+        (conditions(speed_m_s=0.1), 'speed 0.1 m/s, trained 0.045 to 0.055 m/s'),
+        (conditions(force_n=3.0), 'force 3 N, trained 0.9 to 1.1 N'),
+        (conditions(motion='circular'), "motion 'circular', trained 'linear_slide'"),
+        (conditions(sensor='biotac'), "sensor 'biotac', trained 'tsf85'"),
+        (conditions(directions_rad=(1.57,)), 'direction 1.57 rad, trained 0 rad'),
+    ],
+)
+def test_each_condition_that_was_not_trained_is_named_with_what_was(came, sentence):
+    assert TRAINED.deviation(came) == f'outside what was trained: {sentence}'
+
+
+def test_several_deviations_stand_in_one_sentence():
+    assert TRAINED.deviation(conditions(0.02, 3.0)).count('trained 0.') == 2
+
+
+@pytest.mark.parametrize(
+    ('speed', 'within'), [(0.05 / 1.14, True), (0.05 / 1.16, False), (0.057, True), (0.058, False)]
+)
+def test_a_range_is_wider_than_its_slides_by_the_margin(speed, within):
+    assert (trained_on(conditions(0.05), speed=0.15).deviation(conditions(speed)) == '') is within
+
+
+def test_between_two_trained_speeds_a_model_is_within_its_domain():
+    assert trained_on(conditions(0.02), conditions(0.1)).deviation(conditions(0.05)) == ''
+
+
+def test_a_slide_widens_the_range_by_how_its_mean_settles_and_one_odd_slide_of_many_does_not():
+    settling = SlideConditions(speed_m_s=0.05, speed_range_m_s=(0.02, 0.06))
+    odd = SlideConditions(speed_m_s=0.05, speed_range_m_s=(0.001, 0.5))
+    assert Domain.of_slides([settling, conditions()], ['cork'] * 2).speed_m_s == (0.02, 0.06)
+    assert Domain.of_slides([odd] + [settling] * 200, ['cork'] * 201).speed_m_s == (0.02, 0.06)
+
+
+def test_what_is_unknown_in_the_slide_or_in_the_training_is_not_compared():
+    nothing = SlideConditions()
+    assert TRAINED.deviation(nothing) == ''
+    assert trained_on(nothing).deviation(conditions()) == ''
+    assert Domain().deviation(conditions()) == ''
+
+
+def test_a_model_trained_on_circles_covers_all_directions():
+    circles = trained_on(conditions(motion='circular', directions_rad=(0.3,)), conditions())
+    assert circles.directions_rad == (FULL_CIRCLE,)
+    assert circles.deviation(conditions(directions_rad=(-2.0,))) == ''
+
+
+@pytest.mark.parametrize(
+    ('directions', 'arcs'),
+    [
+        ((), ()),
+        ((0.5,), ((0.5, 0.5),)),
+        ((0.0, 0.2, 2.0), ((0.0, 0.2), (2.0, 2.0))),
+        ((3.1, -3.1), ((3.1, math.tau - 3.1),)),
+        (tuple(0.5 * k for k in range(13)), (FULL_CIRCLE,)),
+    ],
+)
+def test_arcs_bridge_small_gaps_also_across_the_back(directions, arcs):
+    assert sorted(covered_arcs(directions, 0.6)) == [pytest.approx(arc) for arc in arcs]
+
+
+@pytest.mark.parametrize(('direction', 'within'), [(math.pi, True), (-3.0, True), (2.6, False), (-2.6, False)])
+def test_an_arc_across_the_back_has_two_ends(direction, within):
+    domain = trained_on(conditions(directions_rad=(3.1, -3.1)), direction_rad=0.35)
+    assert (domain.deviation(conditions(directions_rad=(direction,))) == '') is within
+
+
+def test_to_and_fro_is_trained_if_both_directions_are():
+    both = conditions(directions_rad=(0.0, 3.14))
+    assert trained_on(conditions(), conditions(directions_rad=(math.pi,))).deviation(both) == ''
+    assert TRAINED.deviation(both) == 'outside what was trained: direction 3.14 rad, trained 0 rad'
+
+
+def test_a_domain_survives_the_card_and_a_card_without_one_compares_nothing():
+    assert Domain.from_card(json.loads(json.dumps(TRAINED.as_card()))) == TRAINED
+    assert Domain.from_card({}).deviation(conditions(9.0)) == ''
+
+
+@pytest.mark.parametrize('card', [{'speed_m_s': [0.2, 0.1]}, {'force_n': [0.0, math.inf]}, {'margins': {'speed': -1}},
+                                  {'directions_rad': [[0.0, 9.0]]}])  # fmt: skip
+def test_a_card_with_an_impossible_range_is_refused(card):
+    with pytest.raises(InvalidData):
+        Domain.from_card(card)
+
+
+def test_slides_are_counted_by_label():
+    assert Domain.of_slides([conditions()] * 3, ['cork', 'felt', 'cork']).slides == {'cork': 2, 'felt': 1}

@@ -1,0 +1,240 @@
+"""The domain of a model: under which conditions it was trained, and whether an exploration lies within them."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from texture_core.errors import InvalidData
+from texture_features.slide_conditions import Interval, SlideConditions
+
+# Of the slides, at either end of a range: with a hundred slides or more, one odd slide does not widen it.
+ODD_SHARE = 0.01
+FULL_CIRCLE: Interval = (-math.pi, math.pi)
+# Motions whose direction turns within a window: they cover all directions, and theirs is not compared.
+TURNING_MOTIONS = ('circular',)
+REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
+OUTSIDE = 'outside what was trained'
+
+
+@dataclass(frozen=True)
+class DomainMargins:
+    """How far an exploration may lie outside the conditions of the training.
+
+    Parameters
+    ----------
+    speed, force
+        Relative margins: from low / (1 + margin) to high · (1 + margin) is within.
+    direction_rad
+        Largest angle to a direction of the training.
+    """
+
+    speed: float = 0.15
+    force: float = 0.3
+    direction_rad: float = 0.35
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not 0.0 <= value < math.inf:
+                raise InvalidData(f'the margin {name} of a domain is {value}; 0 or a positive number is needed')
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The conditions under which a model was trained; what was unknown in the training is not compared.
+
+    A range goes from the lowest to the highest mean over the first windows of the slides, however many: speed and force
+    settle at the start of a slide, and an exploration is compared by the mean over its windows so far. Between two
+    trained speeds or forces a model is within its domain.
+
+    Parameters
+    ----------
+    motions, sensors
+        Names of the exploratory motions and of the sensors; empty if unknown.
+    speed_m_s, force_n
+        Lowest and highest mean; None if unknown.
+    directions_rad
+        Arcs (from, to) that the directions of travel cover, from +x towards +y; `to` may exceed π. Empty if unknown.
+    slides
+        Number of slides of each label.
+    margins
+        How far an exploration may lie outside.
+
+    Examples
+    --------
+    >>> domain = Domain(motions=('linear_slide',), speed_m_s=(0.045, 0.055))
+    >>> domain.deviation(SlideConditions('linear_slide', speed_m_s=0.02))
+    'outside what was trained: speed 0.02 m/s, trained 0.045 to 0.055 m/s'
+    >>> domain.deviation(SlideConditions('linear_slide', speed_m_s=0.05))
+    ''
+    """
+
+    motions: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
+    speed_m_s: Interval | None = None
+    force_n: Interval | None = None
+    directions_rad: tuple[Interval, ...] = ()
+    slides: Mapping[str, int] = field(default_factory=dict)
+    margins: DomainMargins = field(default_factory=DomainMargins)
+
+    def __post_init__(self) -> None:
+        for name in ('speed_m_s', 'force_n'):
+            interval = getattr(self, name)
+            if interval is not None and not 0.0 <= interval[0] <= interval[1] < math.inf:
+                raise InvalidData(f'{name} of a domain is {interval}; two numbers from 0 on in rising order are needed')
+        for start, end in self.directions_rad:
+            if not (math.isfinite(start) and 0.0 <= end - start <= math.tau):
+                raise InvalidData(f'an arc of a domain goes from {start} to {end} rad; at most one turn is needed')
+
+    @classmethod
+    def of_slides(
+        cls, conditions: Iterable[SlideConditions], labels: Iterable[str], margins: DomainMargins | None = None
+    ) -> Domain:
+        """Return the domain of a model that is trained on slides.
+
+        Parameters
+        ----------
+        conditions
+            Of each slide, as far as they are known.
+        labels
+            Of each slide.
+        margins
+            How far an exploration may lie outside; the defaults if None.
+        """
+        slides = tuple(conditions)
+        margins = margins or DomainMargins()
+        return cls(
+            motions=_names(slide.motion for slide in slides),
+            sensors=_names(slide.sensor for slide in slides if not slide.sensor.startswith(REPLAYS)),
+            speed_m_s=_interval((slide.speed_m_s, *slide.speed_range_m_s) for slide in slides),
+            force_n=_interval((slide.force_n, *slide.force_range_n) for slide in slides),
+            directions_rad=_directions(slides, margins.direction_rad),
+            slides=dict(Counter(labels)),
+            margins=margins,
+        )
+
+    def deviation(self, conditions: SlideConditions) -> str:
+        """Return how an exploration lies outside this domain, in one sentence; '' if it lies within."""
+        found = '; '.join(self._deviations(conditions))
+        return f'{OUTSIDE}: {found}' if found else ''
+
+    def as_card(self) -> dict[str, Any]:
+        """Return what a model's card holds, in the form of JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_card(cls, card: Mapping[str, Any]) -> Domain:
+        """Return what `as_card` gave; of a card without a domain, one to which nothing is compared.
+
+        Raises
+        ------
+        InvalidData
+            If a range is none.
+        """
+        intervals = {name: _pair(card[name]) for name in ('speed_m_s', 'force_n') if card.get(name) is not None}
+        return cls(
+            motions=tuple(map(str, card.get('motions', ()))),
+            sensors=tuple(map(str, card.get('sensors', ()))),
+            directions_rad=tuple(_pair(arc) for arc in card.get('directions_rad', ())),
+            slides={str(label): int(count) for label, count in card.get('slides', {}).items()},
+            margins=DomainMargins(**{name: float(value) for name, value in card.get('margins', {}).items()}),
+            **intervals,
+        )
+
+    def _deviations(self, conditions: SlideConditions) -> Iterator[str]:
+        speed, force = conditions.speed_m_s, conditions.force_n
+        if _beyond(speed, self.speed_m_s, self.margins.speed):
+            yield f'speed {speed:.3g} m/s, trained {_range(self.speed_m_s)} m/s'
+        if _beyond(force, self.force_n, self.margins.force):
+            yield f'force {force:.3g} N, trained {_range(self.force_n)} N'
+        if self.motions and conditions.motion and conditions.motion not in self.motions:
+            yield f"motion '{conditions.motion}', trained {_listed(self.motions)}"
+        sensor = '' if conditions.sensor.startswith(REPLAYS) else conditions.sensor
+        if self.sensors and sensor and sensor not in self.sensors:
+            yield f"sensor '{sensor}', trained {_listed(self.sensors)}"
+        for direction in self._untrained_directions(conditions)[:1]:
+            yield f'direction {direction:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
+
+    def _untrained_directions(self, conditions: SlideConditions) -> list[float]:
+        """Return the directions of a slide outside the arcs; none where directions are not compared."""
+        if not self.directions_rad or conditions.motion in TURNING_MOTIONS:
+            return []
+        return [direction for direction in conditions.directions_rad if not self._covers(direction)]
+
+    def _covers(self, direction_rad: float) -> bool:
+        margin = self.margins.direction_rad
+        return any(
+            (direction_rad - start + margin) % math.tau <= end - start + 2.0 * margin
+            for start, end in self.directions_rad
+        )
+
+
+def covered_arcs(directions_rad: Iterable[float], gap_rad: float) -> tuple[Interval, ...]:
+    """Return the arcs that directions cover when gaps of at most `gap_rad` between neighbours count as covered.
+
+    Parameters
+    ----------
+    directions_rad
+        Any angles.
+    gap_rad
+        Largest gap that is bridged.
+    """
+    ordered = sorted({math.remainder(direction, math.tau) for direction in directions_rad})
+    if not ordered:
+        return ()
+    turned = [*ordered[1:], ordered[0] + math.tau]
+    ends = [place for place, (one, other) in enumerate(zip(ordered, turned, strict=True)) if other - one > gap_rad]
+    if not ends:
+        return (FULL_CIRCLE,)
+    starts = [ordered[(end + 1) % len(ordered)] for end in (ends[-1], *ends[:-1])]
+    return tuple(
+        (start, ordered[end] if ordered[end] >= start else ordered[end] + math.tau)
+        for start, end in zip(starts, ends, strict=True)
+    )
+
+
+def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[Interval, ...]:
+    if any(slide.motion in TURNING_MOTIONS for slide in slides):
+        return (FULL_CIRCLE,)
+    return covered_arcs((angle for slide in slides for angle in slide.directions_rad), 2.0 * margin_rad)
+
+
+def _names(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(sorted({name for name in names if name}))
+
+
+def _interval(means: Iterable[Iterable[float]]) -> Interval | None:
+    """Return the range of the means of slides without the odd slides; None if no slide has a known one."""
+    known = [own for slide in means for own in [[mean for mean in slide if math.isfinite(mean)]] if own]
+    if not known:
+        return None
+    low = np.quantile([min(own) for own in known], ODD_SHARE, method='lower')
+    high = np.quantile([max(own) for own in known], 1.0 - ODD_SHARE, method='higher')
+    return float(low), float(high)
+
+
+def _beyond(value: float, interval: Interval | None, margin: float) -> bool:
+    """Return whether a value lies outside an interval widened by a relative margin; False for an unknown one."""
+    if interval is None or math.isnan(value):
+        return False
+    low, high = interval
+    return not low / (1.0 + margin) <= value <= high * (1.0 + margin)
+
+
+def _pair(values: Sequence[Any]) -> Interval:
+    low, high = values
+    return float(low), float(high)
+
+
+def _range(interval: Interval | None) -> str:
+    low, high = (f'{value:.3g}' for value in interval or ())
+    return low if low == high else f'{low} to {high}'
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ', '.join(f"'{name}'" for name in names)
