@@ -26,6 +26,7 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     assert list(figures) == [
         'window_accuracy', 'accuracy_at_s', 'early', 'calibration_error', 'candidates', 'falsely_rejected',
         'unknown_accepted', 'labels', 'confusion', 'latency_us', 'unclassified',
+        'wrong_known', 'unknown',
     ]  # fmt: skip
     table = np.array(figures['confusion'])
     assert figures['window_accuracy'] == pytest.approx(np.trace(table) / table.sum())
@@ -34,6 +35,8 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
     assert figures['early']['accuracy'] == 1.0
     assert 0.5 <= figures['early']['mean_s'] <= 1.2
     assert figures['unknown_accepted'] is None
+    assert figures['wrong_known'] == {'early': 0.0, 'final': 0.0}
+    assert figures['unknown'] == {'early': 0.0, 'final': 0.0}
     assert 0 < figures['latency_us']['median'] <= figures['latency_us']['p99']
 
 

@@ -93,3 +93,25 @@ def test_candidates_are_counted_at_the_end_where_there_are_any() -> None:
     ends = [TextureEstimate(0, 'e', 'a', prediction_set=names) for names in (('a',), ('b', 'a'), ('b',), ())]
     results = [SlideResult('a', [], [end]) for end in ends]
     assert metrics.candidates(results) == {'coverage': pytest.approx(2 / 3), 'mean_size': pytest.approx(4 / 3)}
+
+
+def test_wrong_and_known_is_counted_once_decided_and_at_the_end() -> None:
+    right = slide('a', 'aaaa', certain_from=1)
+    soon_wrong = slide('a', 'bbaa', certain_from=1)  # decided for b, and right at its end
+    late_wrong = slide('a', 'aaab', certain_from=0)  # decided for a, and wrong at its end
+    never_decided = slide('a', 'aabb')  # known and wrong at its end, but never decided
+    strange = slide('a', 'bbbb', certain_from=0, known=False)
+    results = [right, soon_wrong, late_wrong, never_decided, strange]
+    assert metrics.wrong_known(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(2 / 5)}
+    assert metrics.unknown(results) == {'early': pytest.approx(1 / 5), 'final': pytest.approx(1 / 5)}
+
+
+def test_the_final_estimate_counts_where_it_is_rejected_after_a_decision() -> None:
+    decided = slide('a', 'bbbb', certain_from=1)
+    rejected = SlideResult('a', decided.window_labels, decided.estimates, TextureEstimate(0, 'e', 'b', known=False))
+    assert metrics.wrong_known([rejected]) == {'early': 1.0, 'final': 0.0}
+    assert metrics.unknown([rejected]) == {'early': 0.0, 'final': 1.0}
+
+
+def test_without_slides_nothing_is_wrong_or_unknown() -> None:
+    assert metrics.wrong_known([]) == metrics.unknown([]) == {'early': None, 'final': None}

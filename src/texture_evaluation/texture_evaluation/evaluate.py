@@ -71,6 +71,8 @@ class EvaluationReport:
                 'windows': metrics.unclassified_windows(self.known) if self.known else None,
                 'at_s': metrics.unclassified_at_times(self.known),
             },
+            'wrong_known': metrics.wrong_known([*self.known, *self.unknown]),
+            'unknown': metrics.unknown([*self.known, *self.unknown]),
         }
 
     def write(self, path: str | Path) -> None:

@@ -147,6 +147,41 @@ def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
     return float(np.mean([result.end.known for result in results])) if results else None
 
 
+def wrong_known(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
+    """Return the share of slides that ended as known with the wrong label, over any surfaces; None without slides.
+
+    Returns
+    -------
+    mapping
+        'early' counts the slides that ended at the first estimate that is decided and known, 'final' all at their end.
+    """
+    early = [e.known and e.decided and e.label != surface for surface, e in _early_ends(results)]
+    final = [result.end.known and result.end.label != result.surface for result in results]
+    return {'early': _share(early), 'final': _share(final)}
+
+
+def unknown(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
+    """Return the share of slides that ended as unknown, early ('early') or at their end ('final'); None without slides.
+
+    A slide that is never decided goes on to its end: there its last estimate counts as early, too.
+    """
+    early = [not estimate.known for _, estimate in _early_ends(results)]
+    return {'early': _share(early), 'final': _share([not result.end.known for result in results])}
+
+
+def _early_ends(results: Sequence[SlideResult]) -> list[tuple[str, TextureEstimate]]:
+    """Return surface and estimate at the end of each slide that ends as soon as it is decided and known."""
+    return [
+        (result.surface, early if early.known and early.decided else result.end)
+        for result in results
+        for early in [result.early()]
+    ]
+
+
+def _share(which: Sequence[bool]) -> float | None:
+    return float(np.mean(which)) if which else None
+
+
 def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray:
     """Return how many windows of each surface (row) were taken for each label (column), (n_labels, n_labels).
 

@@ -113,6 +113,11 @@ def summary(report: EvaluationReport) -> list[str]:
         + (f', after {early["mean_s"]:.2f} s on average' if early['mean_s'] is not None else ''),
         f'computing time of a window: {latency["median"]:.0f} µs median, {latency["p99"]:.0f} µs 99th percentile',
     ]
+    wrong, unknown = figures['wrong_known'], figures['unknown']
+    lines.append(
+        f'wrong but taken for known: {percent(wrong["early"])} once decided, {percent(wrong["final"])} at the end; '
+        f'taken for unknown: {percent(unknown["early"])}, {percent(unknown["final"])}'
+    )
     if figures['unknown_accepted'] is not None:
         lines.append(f'unknown surfaces taken for known ones: {percent(figures["unknown_accepted"])}')
     if report.unusable:
