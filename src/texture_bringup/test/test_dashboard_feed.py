@@ -142,6 +142,18 @@ def test_a_failing_node_and_a_silent_one_are_red() -> None:
     assert len(node_statuses.shown(2.0)) == MAX_LIGHTS
 
 
+def test_a_node_that_ended_well_is_grey_until_it_is_started_again() -> None:
+    lights = NodeStatuses()
+    lights.update('record', 'OK', '12 messages recorded, nothing lost', 0.0, ended=True)
+    ended = {'name': 'record', 'colour': 'grey', 'message': 'ended: 12 messages recorded, nothing lost'}
+    assert lights.shown(1.0) == lights.shown(SILENT_S + 100.0) == [ended]
+    lights.update('record', 'WARN', '3 lost samples', 200.0, ended=True)
+    assert lights.shown(300.0)[0]['colour'] == 'yellow'
+    lights.update('record', 'OK', 'recording', 301.0)
+    assert lights.shown(302.0)[0]['colour'] == 'green'
+    assert lights.shown(302.0 + SILENT_S)[0]['colour'] == 'red'
+
+
 @pytest.mark.parametrize('motion', MOTIONS)
 @pytest.mark.parametrize('number', RANGES)
 def test_the_page_offers_each_motion_the_numbers_it_knows_with_its_defaults(motion, number) -> None:

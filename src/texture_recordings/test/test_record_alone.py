@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
+from texture_core.ros.diagnostics import has_ended
 from texture_core.ros.local_graph import LocalGraph
 from texture_recordings.bags import read_bag
 
@@ -61,6 +62,11 @@ def recorded(reports: list[DiagnosticArray]) -> int:
     return max((int(value.value) for value in values if value.key == 'samples /signal'), default=0)
 
 
+def ended(reports: list[DiagnosticArray]) -> list[str]:
+    """Return the nodes that said that they ended."""
+    return [status.name for report in reports for status in report.status if has_ended(status)]
+
+
 def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_of_the_suite(tmp_path: Path) -> None:
     np.savez(tmp_path / 'slide.npz', samples=np.arange(500.0)[:, None], rate_hz=1000.0, channels=['film'])
     bag, logs = tmp_path / 'bag', (tmp_path / 'record.log', tmp_path / 'sensor.log')
@@ -72,6 +78,8 @@ def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_o
             alone('texture_drivers.nodes.sensor', logs[1], **source) as sensor,
         ):
             graph.until(lambda: recorded(reports) > 300 or record.poll() is not None or sensor.poll() is not None)
+            assert not ended(reports)
+        graph.until(lambda: ended(reports) == ['/record'])
         said = '\n'.join(log.read_text() for log in logs)
     assert (record.returncode, sensor.returncode) == (0, 0), said
     batches = [batch for _, _, batch in read_bag(bag, ('signal',))]

@@ -1,4 +1,4 @@
-"""One light a node: green, yellow or red; a node that has fallen silent is red."""
+"""One light per node: green, yellow or red; a node that has fallen silent is red, one that has ended is grey."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from dataclasses import dataclass
 SILENT_S = 5.0  # nodes report once a second
 MAX_LIGHTS = 64
 MAX_CHARACTERS = 300
+ENDED_COLOURS = {'OK': 'grey', 'WARN': 'yellow', 'ERROR': 'red'}
 COLOURS = {'OK': 'green', 'WARN': 'yellow', 'ERROR': 'red'}
 
 
 @dataclass(frozen=True)
 class NodeStatus:
-    """What a node said last, and when (monotonic clock, s)."""
+    """What a node said last, when (monotonic clock, s), and whether it ended with that."""
 
     level: str
     message: str
     time_s: float
+    ended: bool = False
 
 
 class NodeStatuses:
@@ -25,10 +27,10 @@ class NodeStatuses:
     def __init__(self) -> None:
         self._lights: dict[str, NodeStatus] = {}
 
-    def update(self, name: str, level: str, message: str, time_s: float) -> None:
+    def update(self, name: str, level: str, message: str, time_s: float, ended: bool = False) -> None:
         """Take note of a report; when there are too many names, the one silent for longest is forgotten."""
         self._lights.pop(name, None)
-        self._lights[name[:MAX_CHARACTERS]] = NodeStatus(level, message[:MAX_CHARACTERS], time_s)
+        self._lights[name[:MAX_CHARACTERS]] = NodeStatus(level, message[:MAX_CHARACTERS], time_s, ended)
         if len(self._lights) > MAX_LIGHTS:
             del self._lights[next(iter(self._lights))]
 
@@ -38,6 +40,8 @@ class NodeStatuses:
 
 
 def _look(light: NodeStatus, age_s: float) -> dict[str, str]:
+    if light.ended:
+        return {'colour': ENDED_COLOURS.get(light.level, 'red'), 'message': f'ended: {light.message}'}
     if age_s > SILENT_S:
         return {'colour': 'red', 'message': f'silent for {age_s:.0f} s; it said last: {light.message}'}
     return {'colour': COLOURS.get(light.level, 'red'), 'message': light.message}

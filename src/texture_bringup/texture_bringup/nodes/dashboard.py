@@ -30,7 +30,7 @@ from texture_core.exploration import ExplorationRequest
 from texture_core.parameters import from_mapping, param
 from texture_core.resources import folder
 from texture_core.ros.conversions import from_msg, request_to_msg
-from texture_core.ros.diagnostics import LEVELS, DiagnosticReport, Diagnostics
+from texture_core.ros.diagnostics import LEVELS, DiagnosticReport, Diagnostics, has_ended
 from texture_core.ros.parameters import declare
 from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
@@ -167,7 +167,8 @@ class DashboardNode(Node):
         for status in message.status:
             if status.name.startswith(ours):
                 level = LEVEL_NAMES.get(status.level, 'ERROR')
-                self._feed.node_statuses.update(status.name.removeprefix(ours), level, status.message, time.monotonic())
+                name = status.name.removeprefix(ours)
+                self._feed.node_statuses.update(name, level, status.message, time.monotonic(), has_ended(status))
 
     def _show(self) -> None:
         self._recorder.watch()

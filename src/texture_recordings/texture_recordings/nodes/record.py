@@ -66,6 +66,7 @@ class RecordNode(Node):
             self.get_logger().error(f"'{self._path}' cannot be completed: {error}; free some space and record anew")
         else:
             self.get_logger().info(f"'{self._path}' is complete: {self._report()[1]}")
+            self._diagnostics.end()
 
     def _subscribe(self, topic: Topic) -> None:
         name = self.resolve_topic_name(topic.name)
