@@ -89,7 +89,7 @@ class LabelledFeatures:
         return self.take(np.isin(self.groups, list(slides)))
 
     def vectors(self, slide: str) -> list[FeatureVector]:
-        """Return the windows of one slide, (n_windows,), and its end, each with the mean speed and force of the slide."""
+        """Return the windows of one slide, (n_windows,), with its mean speed and force, and its end."""
         rows = np.flatnonzero(self.groups == slide)
         made = self.conditions.get(slide, SlideConditions())
         hop_ns = self.hop_s * NANOSECONDS
