@@ -87,15 +87,15 @@ def difficulty(chosen: dict[str, Any]) -> str:
 
 
 def grades(root: Path) -> str:
-    """Return the mean error of roughness grades of the paper's heads and ours, on textures learnt and never felt."""
+    """Return the mean error of roughness grades, paper and ours, on trained and unseen textures."""
     content = json.loads((root / CHARTS / 'roughness.json').read_text(encoding='utf-8'))
     numbers = content['numbers']
-    rows = ['| head | paper: learnt | paper: unseen | here: learnt | here: unseen |', '|---|---|---|---|---|']
-    for head, figures in numbers['heads'].items():
-        told = numbers['paper'].get(head, {})
-        paper = [f'{told[kind]:.2f}' if told else '–' for kind in ('seen', 'unseen')]
+    rows = ['| regressor | paper: trained | paper: unseen | here: trained | here: unseen |', '|---|---|---|---|---|']
+    for regressor, figures in numbers['regressors'].items():
+        published = numbers['paper'].get(regressor, {})
+        paper = [f'{published[kind]:.2f}' if published else '–' for kind in ('seen', 'unseen')]
         here = [f'{figures[kind]["error"]:.2f}' for kind in ('seen', 'unseen')]
-        rows.append(f'| {" | ".join([head, *paper, *here])} |')
+        rows.append(f'| {" | ".join([regressor, *paper, *here])} |')
     about = f'Mean absolute error in grades from 1 to 5. Data: {content["data"]}. Split: {content["split"]}.'
     person = f'One person differs from the mean of the others by {numbers["one_person"]:.2f} (another study).'
     return f'{about} {person}\n\n' + '\n'.join(rows) + '\n'

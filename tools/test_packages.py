@@ -42,7 +42,7 @@ OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_
 OPTIONAL = {
     'texture_recordings': {
         'python3-scipy': {'importers.ntp21'},
-        'texture_features': {'commands.segment', 'dataset', 'segment', 'whole_slides'},
+        'texture_features': {'commands.segment', 'segment', 'slide_dataset', 'slide_samples'},
     }
 }
 # What launch files need, which no module imports.

@@ -92,8 +92,8 @@ def test_figures_of_the_papers_are_those_of_the_charts(site: Path) -> None:
         figures = json.loads((DOCS / 'charts' / f'{name}.json').read_text())['numbers']['tasks'][task][recipe]
         assert f'{100 * figures["paper"]["test"]:.1f} %' in page
         assert f'{100 * figures["test"][0]:.1f} %' in page
-    heads = json.loads((DOCS / 'charts' / 'roughness.json').read_text())['numbers']['heads']
-    assert all(f'{head["unseen"]["error"]:.2f}' in page for head in heads.values())
+    regressors = json.loads((DOCS / 'charts' / 'roughness.json').read_text())['numbers']['regressors']
+    assert all(f'{regressor["unseen"]["error"]:.2f}' in page for regressor in regressors.values())
     assert '<!--' not in re.search(r'<article.*</article>', page, re.DOTALL).group()
 
 

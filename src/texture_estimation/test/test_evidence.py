@@ -107,7 +107,7 @@ def test_the_mean_speed_of_the_exploration_counts_not_that_of_one_window(model, 
     assert estimates[-1].known
 
 
-def test_the_next_exploration_is_compared_anew(model, examples):
+def test_the_next_exploration_is_compared_again(model, examples):
     slow = under(vectors(examples), speed_m_s=0.02)
     usual = under(vectors(examples, name='e2'), speed_m_s=0.05)
     assert predict(trained_at(model, 0.05), slow + usual)[-1].known
