@@ -20,7 +20,7 @@ from texture_benchmarks.recipes.trial import (
     try_recipe,
 )
 from texture_benchmarks.result import BenchmarkOptions
-from texture_core.errors import InvalidData
+from texture_core.errors import ModelMismatch
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
@@ -85,7 +85,7 @@ def test_recipes_are_compared_on_windows_of_one_length_without_what_the_session_
 
 
 def test_a_missing_input_is_named() -> None:
-    with pytest.raises(InvalidData, match="no 'signal_static', which recipe 'kaboli-svm' needs"):
+    with pytest.raises(ModelMismatch, match="no 'signal_static', only signal; the windows need signal, signal_static"):
         cut_slide(slide_signals(), load_recipe('kaboli-svm').feature_set)
 
 

@@ -13,10 +13,12 @@ from texture_core.features import FeatureVector
 from texture_core.ros.conversions import from_msg, to_msg
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
+from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import load_model
 from texture_estimation.nodes.classifier import Classifier
 from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
+from texture_estimation.recipe import Recipe
 from texture_estimation.roughness.evidence import RoughnessAccumulator
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.recipe import RoughnessRecipe
@@ -28,6 +30,7 @@ GRADE_NAMES = ('signal/signal_energy/f', 'signal/peak_to_median_power/f')
 GRADE_RECIPE = {'inputs': {'signal': {'features': ['signal_energy', 'peak_to_median_power']}}}
 NODES = {
     'classifier': (Classifier, 'model', 'cloth_slide'),
+    'classifier with trees': (Classifier, 'trees_model', 'cloth_slide'),
     'roughness_estimator': (RoughnessEstimator, 'roughness_model', 'grade_2'),
 }
 
@@ -79,6 +82,14 @@ def slide(rows, names, feature_set, identity='e1', **more):
         for number, row in enumerate(rows)
     ]
     return [*windows, FeatureVector(10**9, identity, 0.0, 0.1, last=True)]
+
+
+@pytest.fixture(scope='module')
+def trees_model(examples):
+    """Return a model whose learner is a forest of scikit-learn."""
+    learner = {'sklearn': {'estimator': 'sklearn.ensemble:ExtraTreesClassifier', 'n_estimators': 20}}
+    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': learner}
+    return train(Recipe.from_mapping(recipe, 'trees'), examples)
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ In = TypeVar('In')
 Out = TypeVar('Out')
 # For a scheduler to answer, and for its workers to come.
 ANSWER_S, WORKERS_S = 20, 30
+LOCAL, MAX_LOCAL_WORKERS = 'local:', 64
 
 
 class ParallelMap(Protocol):
@@ -54,14 +55,28 @@ def dask_backend(address: str) -> Iterator[None]:
     Parameters
     ----------
     address
-        Address of its scheduler, such as 'tcp://192.168.1.5:8786'.
+        Address of its scheduler, such as 'tcp://192.168.1.5:8786', or 'local:2' to start a cluster of two workers on
+        this machine.
 
     Raises
     ------
     InvalidParameter
         If no scheduler answers there.
     """
-    from distributed import Client  # noqa: PLC0415  # takes a second
+    from distributed import Client, LocalCluster  # noqa: PLC0415  # takes a second
+
+    if address.startswith(LOCAL):
+        workers = address.removeprefix(LOCAL)
+        if not workers.isdecimal() or not 1 <= int(workers) <= MAX_LOCAL_WORKERS:
+            raise InvalidParameter(
+                f"the local cluster has '{workers}' workers; 1 to {MAX_LOCAL_WORKERS} are allowed, such as '{LOCAL}2'"
+            )
+        cluster: Any = LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=int(workers), threads_per_worker=1, dashboard_address=None
+        )
+        with cluster, dask_backend(cluster.scheduler_address):
+            yield
+        return
 
     try:
         client: Any = Client(  # type: ignore[no-untyped-call]

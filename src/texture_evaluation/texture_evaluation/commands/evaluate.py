@@ -29,7 +29,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         'or random:20',
     )
     parser.add_argument('--jobs', type=int, default=1, metavar='N', help='folds computed at once; -1: one per core')
-    parser.add_argument('--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead')
+    parser.add_argument(
+        '--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead, or local:WORKERS'
+    )
     add_slides(parser)
     add_channels(parser)
     add_seed(parser)

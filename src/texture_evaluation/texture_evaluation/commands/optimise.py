@@ -32,7 +32,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--halves', type=int, default=usual.halves, metavar='N', help='random splits evaluated on')
     parser.add_argument('--all-halves', action='store_true', help='evaluate each individual on all, however bad it is')
     parser.add_argument('--jobs', type=int, default=-1, metavar='N', help='cores to use; -1: all')
-    parser.add_argument('--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead')
+    parser.add_argument(
+        '--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead, or local:WORKERS'
+    )
     parser.add_argument('--resume', action='store_true', help='go on from the checkpoint beside FILE')
     add_slides(parser)
     add_channels(parser)
