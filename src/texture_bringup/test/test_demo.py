@@ -16,7 +16,7 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo.plan import DemoPlan
 from texture_bringup.demo.progress_log import ProgressLog
-from texture_bringup.demo.results import Row, table
+from texture_bringup.demo.results import Row, is_refused, table
 from texture_bringup.demo.run import demonstrate
 from texture_core.estimates import TextureEstimate
 
@@ -43,6 +43,18 @@ def test_the_table_shows_a_mistake() -> None:
     assert '✗' in third
 
 
+@pytest.mark.parametrize(
+    ('estimate', 'refused'),
+    [
+        (TextureEstimate(0, 'a', 'glass', message='outside what was trained: speed 0.02 m/s, trained 0.05 m/s'), True),
+        (TextureEstimate(0, 'a', 'glass', True, message='outside what was trained: speed 0.02 m/s'), False),
+        (TextureEstimate(0, 'a', 'glass'), False),
+    ],
+)
+def test_a_refusal_names_the_condition_and_claims_nothing(estimate: TextureEstimate, refused: bool) -> None:
+    assert is_refused(estimate) is refused
+
+
 def test_each_chapter_of_the_story_begins_with_the_time() -> None:
     times = iter([100.0, 107.4])
     out = io.StringIO()
@@ -66,7 +78,12 @@ def test_it_learns_recognises_and_leaves_recordings_model_figures_and_picture(tm
     out = io.StringIO()
     assert demonstrate(tmp_path / 'demo', 'default', 0, SHORT, ProgressLog(out=out)), out.getvalue()
     assert '2 of 2 slides over simulated surfaces recognised' in out.getvalue()
-    assert json.loads((tmp_path / 'demo/evaluation.json').read_text())['labels'] == ['glass', 'ridge_2mm_deep']
+    figures = json.loads((tmp_path / 'demo/evaluation.json').read_text())
+    assert figures['labels'] == ['glass', 'ridge_2mm_deep']
+    assert (figures['untrained_speed']['known'], figures['untrained_speed']['decided']) == (False, False)
+    sentence = 'outside what was trained: speed 0.02 m/s, trained 0.05'
+    assert figures['untrained_speed']['message'].startswith(sentence)
+    assert sentence in out.getvalue()
     assert (tmp_path / 'demo/demo.png').stat().st_size > 10_000
 
 

@@ -38,6 +38,8 @@ class SlideOverview:
         Confusion of test windows, as `metrics.confusion` counts it.
     others
         Slides over other surfaces, (n_samples,) each, whose spectra are drawn beside for comparison.
+    note
+        One sentence below the panels; '' for none.
     """
 
     source: str
@@ -49,6 +51,7 @@ class SlideOverview:
     labels: Sequence[str]
     table: AnyArray
     others: Mapping[str, Array] = field(default_factory=dict)
+    note: str = ''
 
 
 def picture(overview: SlideOverview, path: str | Path) -> Path:
@@ -60,6 +63,8 @@ def picture(overview: SlideOverview, path: str | Path) -> Path:
         _evidence(evidence, overview)
         draw_confusion(table, overview.labels, overview.table)
         table.set_title('4. All test slides: what each single window was taken for')
+        if overview.note:
+            figure.supxlabel(overview.note, fontsize='medium')
     return Path(path)
 
 

@@ -17,7 +17,7 @@ from texture_evaluation.slide_overview_chart import SlideOverview, picture
 from texture_recordings.bags import read_bag
 
 
-def draw(bag: Path, surface: str, report: EvaluationReport, source: str, path: Path) -> Path:
+def draw(bag: Path, surface: str, report: EvaluationReport, source: str, path: Path, *, note: str = '') -> Path:
     """Draw an exploration of a surface, and the confusion of all explorations in the bag.
 
     Parameters
@@ -30,6 +30,8 @@ def draw(bag: Path, surface: str, report: EvaluationReport, source: str, path: P
         Of the model on this bag.
     source
         Where the signal comes from, in words.
+    note
+        One sentence below the panels.
     """
     states, estimates, batches = _gather(bag)
     candidates = [name for name in estimates if states[name][0].surface == surface]
@@ -38,7 +40,7 @@ def draw(bag: Path, surface: str, report: EvaluationReport, source: str, path: P
     others = {states[each][0].surface: _sliding_part(states[each], batches)[0] for each in estimates}
     del others[surface]
     overview = SlideOverview(
-        source, surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion, others
+        source, surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion, others, note
     )
     return picture(overview, path)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from texture_core.exploration import ExplorationRequest
 
@@ -13,7 +13,8 @@ from texture_core.exploration import ExplorationRequest
 class DemoPlan:
     """Surfaces of the scene `twelve_textures`, slides over each, and the slide itself.
 
-    The finger touches each time at another place; every second slide goes the other way.
+    The finger touches each time at another place; every second slide goes the other way. A last slide at
+    `untrained_speed_m_s` shows what is said outside the conditions of the training.
     """
 
     surfaces: tuple[str, ...] = ('glass', 'leather', 'woven_cloth', 'ridge_2mm_deep')
@@ -23,6 +24,7 @@ class DemoPlan:
     speed_m_s: float = 0.05
     force_n: float = 1.0
     distance_m: float = 0.06
+    untrained_speed_m_s: float = 0.02
 
     def requests(self, surface: str, slides: int, early_stopping: bool = False) -> Iterator[ExplorationRequest]:
         """Yield the explorations of one surface."""
@@ -36,3 +38,9 @@ class DemoPlan:
                 surface=surface,
                 early_stopping=early_stopping,
             )
+
+    def untrained_request(self) -> ExplorationRequest:
+        """Return a slide over the shown surface, as in the training but for its speed, and as long in time."""
+        [usual] = self.requests(self.shown, 1, early_stopping=True)
+        share = self.untrained_speed_m_s / self.speed_m_s
+        return replace(usual, speed_m_s=self.untrained_speed_m_s, distance_m=share * self.distance_m)

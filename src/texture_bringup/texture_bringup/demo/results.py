@@ -7,9 +7,11 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from texture_core.estimates import TextureEstimate
 from texture_core.signal import NANOSECONDS
+from texture_estimation.open_set.domain import OUTSIDE
 from texture_recordings.bags import read_bag
 
 
@@ -24,6 +26,22 @@ class Row:
     def right(self) -> bool:
         """Whether the surface was recognised."""
         return self.estimate.known and self.estimate.label == self.surface
+
+
+def is_refused(estimate: TextureEstimate) -> bool:
+    """Return whether an estimate says that its exploration is outside what was trained, and claims nothing."""
+    return estimate.message.startswith(OUTSIDE) and not estimate.known and not estimate.decided
+
+
+def untrained_figures(estimate: TextureEstimate, speed_m_s: float) -> dict[str, Any]:
+    """Return what is written of the slide at a speed that was not trained."""
+    return {
+        'speed_m_s': speed_m_s,
+        'label': estimate.label,
+        'known': estimate.known,
+        'decided': estimate.decided,
+        'message': estimate.message,
+    }
 
 
 def latencies_s(bag: Path) -> Mapping[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -11,9 +12,10 @@ from pathlib import Path
 from texture_bringup.demo.picture import draw
 from texture_bringup.demo.plan import DemoPlan
 from texture_bringup.demo.progress_log import ProgressLog
-from texture_bringup.demo.results import Row, latencies_s, table
+from texture_bringup.demo.results import Row, is_refused, latencies_s, table, untrained_figures
 from texture_bringup.demo.rig import DemoRig
 from texture_core.errors import InvalidData
+from texture_core.estimates import TextureEstimate
 from texture_evaluation.commands import train as training
 from texture_evaluation.commands.evaluate import percent
 from texture_evaluation.evaluate import EvaluationReport, evaluate_bags
@@ -79,7 +81,7 @@ class Places:
 
 
 def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> bool:
-    """Explore, learn, recognise and report on the emulator; return whether every slide was recognised."""
+    """Explore, learn, recognise and report on the emulator; return whether all was recognised that was trained."""
     places = Places(out)
     places.clear()
     progress.section('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')
@@ -93,8 +95,9 @@ def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: Pro
         rig.use_model(places.model.resolve())
         progress.line('the running classifier has taken the model over')
         rows = _recognise(rig, places, plan, progress)
-    report = _report(rows, places, plan, progress)
-    return all(row.right for row in rows) and len(report.known) == len(rows)
+        untrained = _explore_untrained(rig, plan, progress)
+    report = _report(rows, untrained, places, plan, progress)
+    return all(row.right for row in rows) and len(report.known) == len(rows) and is_refused(untrained)
 
 
 def _learn(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> None:
@@ -128,7 +131,19 @@ def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressL
     return rows
 
 
-def _report(rows: list[Row], places: Places, plan: DemoPlan, progress: ProgressLog) -> EvaluationReport:
+def _explore_untrained(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> TextureEstimate:
+    speed, usual = plan.untrained_speed_m_s, plan.speed_m_s
+    progress.section(f'Outside the training: {plan.shown} again, at {speed:g} m/s instead of {usual:g} m/s')
+    [explored] = rig.explore(plan.shown, iter([plan.untrained_request()]))
+    estimate: TextureEstimate = explored.texture
+    progress.line(f'the estimate says: {estimate.message or "nothing"}')
+    progress.line('the surface counts as unknown, and the slide is not ended early')
+    return estimate
+
+
+def _report(
+    rows: list[Row], untrained: TextureEstimate, places: Places, plan: DemoPlan, progress: ProgressLog
+) -> EvaluationReport:
     progress.section('Result')
     latencies: Mapping[str, float] = latencies_s(places.recognition_bag)
     for line in table(rows, latencies):
@@ -137,10 +152,12 @@ def _report(rows: list[Row], places: Places, plan: DemoPlan, progress: ProgressL
     progress.line(f'{right} of {len(rows)} slides over simulated surfaces recognised')
     progress.line('latency: from the last sample of a window to its estimate at another process')
     report = evaluate_bags(places.model, [places.recognition_bag])
-    report.write(places.figures)
+    figures = {**report.as_json(), 'untrained_speed': untrained_figures(untrained, plan.untrained_speed_m_s)}
+    places.figures.write_text(json.dumps(figures, indent=1) + '\n', encoding='utf-8')
     windows = percent(report.as_json()['window_accuracy'])
     progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
-    draw(places.recognition_bag, plan.shown, report, SOURCE, places.picture)
+    note = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
+    draw(places.recognition_bag, plan.shown, report, SOURCE, places.picture, note=note)
     progress.section(f'Done. Look at {places.picture}')
     progress.line(f'recordings, model, figures and the log of the nodes are in {places.folder}/')
     return report
