@@ -18,9 +18,9 @@ def test_every_search_ends_with_a_recipe_evaluated_by_its_learner_and_the_charts
     for figures in result.numbers['searches'].values():
         assert figures['evaluations'] == 10
         assert 0.0 < figures['fitness_exact'] <= 1.0
-        assert figures['halves_judged'] <= figures['halves_of_all']
+        assert figures['halves_evaluated'] <= figures['halves_of_all']
     whole = result.numbers['searches']['linear, SVM, no individual given up']
-    assert whole['halves_judged'] == whole['halves_of_all']
+    assert whole['halves_evaluated'] == whole['halves_of_all']
     assert all(chart.is_file() for chart in result.charts)
 
 

@@ -89,7 +89,7 @@ def test_a_missing_input_is_named() -> None:
         cut_slide(slide_signals(), load_recipe('kaboli-svm').feature_set)
 
 
-def test_a_recipe_is_tested_on_slides_it_has_not_learnt(simulated: Path) -> None:
+def test_a_recipe_is_tested_on_slides_outside_its_training(simulated: Path) -> None:
     slides = SlideDataset.from_bags([simulated]).slides
     recipe = comparable(load_recipe('default'), 1000.0, of_motion=False)
     outcome = try_recipe(recipe, slides, chronological_split(slides, 4))
@@ -100,7 +100,7 @@ def test_a_recipe_is_tested_on_slides_it_has_not_learnt(simulated: Path) -> None
     assert len(find_slides([simulated])) == len(slides)
 
 
-def test_windows_learnt_from_may_overlap_where_those_tested_do_not(simulated: Path) -> None:
+def test_training_windows_may_overlap_where_test_windows_do_not(simulated: Path) -> None:
     slides = SlideDataset.from_bags([simulated]).slides
     recipe = comparable(load_recipe('jamali-naive-bayes-5'), 1000.0, of_motion=False)
     splits = chronological_split(slides, 4)

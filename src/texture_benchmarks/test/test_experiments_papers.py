@@ -56,7 +56,7 @@ def test_an_experiment_whose_paper_searches_for_nothing_refuses_to_tune(name: st
     assert not list(tmp_path.iterdir())
 
 
-def test_a_search_sees_what_is_learnt_from_alone_and_its_recipe_is_tried_on_the_rest(tmp_path, monkeypatch) -> None:
+def test_a_search_sees_the_training_slides_alone_and_its_recipe_is_tried_on_the_rest(tmp_path, monkeypatch) -> None:
     seen: dict = {}
     monkeypatch.setattr(report, 'outcomes', lambda *args, **kwargs: seen.update(outcomes(*args, **kwargs)) or seen)
     result, path = run_experiment('ets-fine', Experiment(tmp_path, seed=1, quick=True, tune=True))
@@ -152,7 +152,7 @@ def test_intervals_are_those_of_the_textbook() -> None:
     assert apart(values, values).value == 0
 
 
-def test_a_method_that_cannot_fail_recognises_all_it_learnt() -> None:
+def test_a_method_that_cannot_fail_recognises_all_its_training_set() -> None:
     protocol = next(protocol for protocol in PROTOCOLS if protocol.name == 'jamali')
     task = reduced(protocol.tasks[0], 6)
     slides = gather(load_scene(protocol.scene), task, 0, slow=False)

@@ -168,7 +168,7 @@ def test_the_page_shows_what_the_bench_measured(kind: str) -> None:
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
-def test_noise_breaks_what_was_learnt_without_it(tmp_path: Path) -> None:
+def test_noise_breaks_what_was_trained_without_it(tmp_path: Path) -> None:
     result = BENCHMARKS['robustness'](BenchmarkOptions(tmp_path, DATA, quick=True))
     assert len(result.charts) == len(result.numbers)
     assert all(chart.is_file() for chart in result.charts)

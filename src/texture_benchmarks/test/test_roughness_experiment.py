@@ -44,7 +44,7 @@ def test_the_table_names_every_texture_and_the_charts_are_drawn(outcome) -> None
     assert all(matplotlib.image.imread(chart).std() > 0 for chart in result.charts)
 
 
-def test_the_search_writes_recipes_that_can_be_learnt_by(outcome) -> None:
+def test_the_search_writes_recipes_that_can_be_trained(outcome) -> None:
     result, out = outcome
     assert set(result.numbers['tuning']) == {'ANN1', 'ANN5', 'SVM5'}
     recipe = load_roughness_recipe(str(out / 'ets-roughness-svm5.yaml'))

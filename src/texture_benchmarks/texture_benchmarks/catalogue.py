@@ -41,7 +41,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
     'optimise': optimise.run,  # genetic searches of the papers' size, linear experiment: time, convergence
     'optimise_large': optimise.run_large,  # all of them, and the fronts of accuracy and computing; not in `all`
-    'learning': learning.run,  # trained slide by slide against trained anew on the same slides
+    'learning': learning.run,  # trained slide by slide against trained again on the same slides
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
     'load': load.run,  # what sensor nodes cost and lose, alone, together and at high rates

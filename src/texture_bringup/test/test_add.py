@@ -86,6 +86,6 @@ def test_a_texture_is_trained_and_forgotten_from_the_command_line(classifier, ca
 
 
 @pytest.mark.parametrize('arguments', [['add'], ['add', 'silk', '--undo']])
-def test_what_to_learn_must_be_said(arguments, capsys):
+def test_what_to_add_must_be_given(arguments, capsys):
     assert main(arguments) == 2
-    assert 'name of the texture' in capsys.readouterr().err
+    assert 'label of the texture' in capsys.readouterr().err

@@ -228,7 +228,7 @@ def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, 
     assert not node.call(Trigger, 'remove_last_added').success
 
 
-def test_what_cannot_be_learnt_is_answered_with_a_sentence(graph, model, tmp_path):
+def test_what_cannot_be_added_is_answered_with_a_sentence(graph, model, tmp_path):
     node = NodeUnderTest(graph, Classifier)
     assert 'no model is loaded' in node.call(srv.AddTexture, 'add_texture', label='silk').message
     node.set_model(model.save(tmp_path / 'm'))

@@ -27,7 +27,7 @@ def silk():
     return 4.0 + rng.normal(size=(12, 6))
 
 
-def test_one_slide_teaches_a_texture_and_the_others_stay_known(model, examples, silk):
+def test_one_slide_adds_a_texture_and_the_others_stay_known(model, examples, silk):
     incremental_classifier = IncrementalClassifier(model)
     measured(incremental_classifier, silk)
     assert incremental_classifier.add('silk') == 12
@@ -129,7 +129,7 @@ def test_a_model_without_examples_cannot_be_trained(model):
 
 
 @pytest.mark.parametrize('label', ['../../etc/x', 'x' * 10_000, 'two\nlines'])
-def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_learnt(model, silk, tmp_path, label):
+def test_a_label_that_cannot_be_meant_is_refused_and_nothing_is_added(model, silk, tmp_path, label):
     path = model.save(tmp_path / 'surfaces')
     incremental_classifier = IncrementalClassifier(load_model(path), path)
     measured(incremental_classifier, silk)

@@ -123,7 +123,7 @@ def test_few_labels_are_reported_apart_in_the_right_direction(name, make_example
     assert accuracy(learn(name, make_examples(labels=labels)), make_examples(seed=1, labels=labels)) > 0.85
 
 
-def test_labels_of_unequal_numbers_are_all_learnt(name, make_examples):
+def test_labels_of_unequal_numbers_are_all_trained_on(name, make_examples):
     many, few = make_examples(), make_examples(seed=4, slides=1, windows=3)
     rows = np.concatenate(
         [np.flatnonzero(many.labels != 'felt'), len(many.labels) + np.flatnonzero(few.labels == 'felt')]

@@ -64,7 +64,7 @@ def test_one_texture_is_known_before_the_first_slide() -> None:
     assert training.update(training.uniform_log_prior, ACROSS, np.array([5.0, 5.0])) == pytest.approx([0.0])
 
 
-def test_probabilities_add_up_to_one_after_any_slide_however_strange() -> None:
+def test_probabilities_add_up_to_one_after_any_slide_however_improbable() -> None:
     training = slides({ACROSS: UNLIKE})
     for value in (0.0, 2.0, -1e6, 1e6):
         after = training.update(training.uniform_log_prior, ACROSS, np.array([value, 0.0]))
@@ -119,7 +119,7 @@ def test_scaled_doubled_and_constant_features_change_nothing_that_matters() -> N
         (np.eye(4), ['a', 'b'] * 2, [ACROSS] * 2 + [ALONG] * 2, 'how much slides differ'),
     ],
 )
-def test_slides_that_cannot_be_learnt_from_are_refused(
+def test_slides_unfit_for_training_are_refused(
     values: np.ndarray, textures: list[str], motions: list[SlideMotion], said: str
 ) -> None:
     with pytest.raises(InvalidData, match=said):
@@ -178,9 +178,9 @@ def test_a_slide_is_the_mean_of_its_usable_windows() -> None:
         slide_values(windows, 'signal=2200Hz*1')
 
 
-def test_motions_and_values_that_were_not_learnt_are_refused() -> None:
+def test_motions_and_values_outside_the_training_are_refused() -> None:
     training = slides({ACROSS: UNLIKE})
-    with pytest.raises(InvalidParameter, match='was not learnt'):
+    with pytest.raises(InvalidParameter, match='is not in the training set'):
         training.best_motion(training.uniform_log_prior, [ALONG])
     with pytest.raises(InvalidParameter, match='no motion to choose from'):
         training.best_motion(training.uniform_log_prior, [])

@@ -154,13 +154,13 @@ def test_in_other_units_a_recipe_learns_to_report_as_much(recipe, training, fact
 
 
 @pytest.mark.parametrize('changed', [{'factor': 1e6}, {'factor': 1e-6}, {'constant': True}], ids=str)
-def test_a_signal_as_none_that_was_learnt_gets_an_answer_in_finite_numbers(recipe, training, changed):
+def test_a_signal_unlike_the_training_gets_an_answer_in_finite_numbers(recipe, training, changed):
     values = windows_of(recipe, seed=1, **changed).values
     assert np.isfinite(values).all()
     assert np.isfinite(training.predict_log_proba(values)).all()
 
 
-def test_from_signals_that_stand_still_nothing_is_learnt(recipe):
+def test_from_signals_that_stand_still_nothing_is_trained(recipe):
     still = windows_of(recipe, constant=True)
     answers = np.exp(train(recipe, still).predict_log_proba(still.values))
     np.testing.assert_allclose(answers.sum(axis=1), 1.0)

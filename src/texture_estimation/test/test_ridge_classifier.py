@@ -50,7 +50,7 @@ def test_probabilities_are_neither_sure_of_everything_nor_of_nothing(ridge_class
 
 
 @pytest.mark.parametrize('count', [1, 2])
-def test_very_few_examples_are_learnt_from(count):
+def test_very_few_examples_suffice_for_training(count):
     values = np.concatenate([cloud([0, 0, 0, 0], count), cloud([9, 0, 0, 0], count)])
     ridge_classifier = RidgeClassifier(values, np.repeat([0, 1], count), np.repeat([0, 1], count), trained=is_tied)
     ridge_classifier.set_examples(2, cloud([0, 9, 0, 0], 1))

@@ -95,7 +95,7 @@ def test_a_grade_is_final_once_more_sliding_gains_little_and_nothing_follows(mod
     ('window', 'sentence'),
     [
         (vector(force_n=0.01), 'no contact: the force is 0.01 N'),
-        (vector((3.0, 0.0, 0.5, 2.0)), 'weaker than on the smoothest surface'),
+        (vector((3.0, 0.0, 0.5, 2.0)), 'weaker than on the smoothest training surface'),
         (vector((3.0, 0.0, 4.0, 8.0)), 'skids'),
         (vector((np.nan, 0.0, 0.5, 8.0)), "'signal/signal_energy/f' is not finite"),
         (vector((3.0, 0.0, 0.5, np.inf)), "'signal/log_variance/f' is not finite"),
@@ -146,7 +146,7 @@ def test_intervals_hold_as_often_as_they_claim_on_textures_never_measured() -> N
     assert 0.85 <= np.mean(inside) <= 0.97
 
 
-def test_held_out_textures_are_not_learnt_from() -> None:
+def test_held_out_textures_are_not_trained_on() -> None:
     class Spy:
         def __init__(self):
             self.training_sets = []
@@ -188,7 +188,7 @@ def test_models_of_the_other_kind_are_reported_apart(model, examples, tmp_path) 
         load_roughness_model(tmp_path / 'names')
 
 
-def test_examples_that_cannot_be_learnt_from_get_a_sentence() -> None:
+def test_examples_unfit_for_training_get_a_sentence() -> None:
     examples, grades = graded()
     with pytest.raises(UnknownName, match="grade for the texture 't3'"):
         train_grades(recipe(), examples, Grades({k: v for k, v in grades.grades.items() if k != 't3'}))

@@ -103,7 +103,7 @@ def test_more_windows_of_the_same_textures_make_the_process_no_surer() -> None:
     assert stds[1] > 0.5
 
 
-def test_a_single_texture_cannot_be_learnt_from() -> None:
+def test_a_single_texture_cannot_be_trained_on() -> None:
     with pytest.raises(InvalidData, match='one texture'):
         GaussianProcess().fit(*graded_windows(n_textures=1))
 

@@ -124,7 +124,7 @@ def test_a_search_space_that_is_wrong_is_refused_with_one_sentence(text, sentenc
 # -- how it is evaluated
 
 
-def test_half_of_the_slides_of_each_surface_are_learnt_and_no_slide_is_on_both_sides() -> None:
+def test_half_of_the_slides_of_each_surface_are_for_training_and_no_slide_is_on_both_sides() -> None:
     codes = np.repeat([0, 0, 0, 0, 1, 1, 1], 3)
     slides = np.repeat(np.arange(7), 3)
     halves = random_halves(codes, slides, 50, np.random.default_rng(0))

@@ -74,7 +74,7 @@ def pick(examples, rows):
     )
 
 
-def test_examples_that_cannot_be_learnt_from_get_a_sentence(examples):
+def test_examples_unfit_for_training_get_a_sentence(examples):
     with pytest.raises(InvalidData, match='no windows for training'):
         train(RECIPE, pick(examples, slice(0, 0)))
     with pytest.raises(InvalidData, match="all windows are of 'cork'"):

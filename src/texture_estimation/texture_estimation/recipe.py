@@ -89,7 +89,7 @@ class DecisionParams(TrainingParams):
 
 @dataclass(frozen=True)
 class Recipe:
-    """What turns a signal into a decision, before anything is learnt."""
+    """What turns a signal into a decision, before any training."""
 
     name: str
     feature_set: FeatureSet

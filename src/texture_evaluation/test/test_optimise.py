@@ -27,7 +27,7 @@ def test_what_is_written_is_a_recipe_that_train_uses(simulated: Path, tmp_path: 
     assert all(path.is_file() for path in written.files)
     first, second, *_ = out.read_text().splitlines()
     assert 'texture optimise ets-linear-svm' in first
-    assert re.fullmatch(r'# fitness \d+\.\d %: learnt .* over 3 halves\.', second)
+    assert re.fullmatch(r'# fitness \d+\.\d %: training .* over 3 halves\.', second)
     assert load_recipe(str(out)).learner_name == 'svm_pairs'
     model = train_from_bags(str(out), [simulated])
     assert model.labels == ('glass', 'leather', 'ridge_2mm_deep')
@@ -62,7 +62,7 @@ def test_each_pair_of_surfaces_gets_a_recipe(simulated: Path, tmp_path: Path) ->
     written = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
     assert (tmp_path / 'best-glass-vs-leather.yaml').is_file()
     assert len(written.files) == 4
-    assert written.lines[-1].startswith('all pairs together, most pairs won: learnt ')
+    assert written.lines[-1].startswith('all pairs together, most pairs won: training ')
 
 
 def test_grades_are_tuned_by_a_roughness_recipe(simulated: Path, tmp_path: Path) -> None:

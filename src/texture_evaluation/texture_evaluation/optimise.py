@@ -236,7 +236,7 @@ def _write_pairs(pairs: PairSearchResult, wanted: Wanted, params: SearchParams, 
     histories = {' – '.join(pair): found.found.history for pair, found in pairs.by_pair.items()}
     convergence_chart(histories, f'{wanted.recipe}: a search for each pair', chart)
     together = (
-        f'all pairs together, most pairs won: learnt {100 * pairs.record.learning.mean():.1f} %, '
+        f'all pairs together, most pairs won: training {100 * pairs.record.learning.mean():.1f} %, '
         f'tested {100 * pairs.record.test.mean():.1f} %'
     )
     lines = [f'{path}: {_scores(finalist)}' for path, finalist in recipes.items()]
@@ -262,6 +262,6 @@ def _origin(wanted: Wanted, params: SearchParams) -> str:
 def _scores(finalist: Finalist[Any]) -> str:
     record = finalist.record
     return (
-        f'fitness {100 * finalist.fitness:.1f} %: learnt {100 * record.learning.mean():.1f} %, '
+        f'fitness {100 * finalist.fitness:.1f} %: training {100 * record.learning.mean():.1f} %, '
         f'tested {100 * record.test.mean():.1f} % over {record.halves} halves'
     )

@@ -121,7 +121,7 @@ def test_the_array_reports_its_own_speed_on_a_surface_it_never_met(speed):
         assert found == pytest.approx(speed, rel=0.05)
 
 
-def test_places_of_taxels_are_learnt_to_a_tenth_of_a_millimetre():
+def test_positions_of_taxels_are_estimated_to_a_tenth_of_a_millimetre():
     training = ArraySpeedEstimator.fit([(slide(0.04, surface=rough(seed)), RATE_HZ, 0.04) for seed in range(4)])
     np.testing.assert_allclose(training.offsets_m, ArraySpeedEstimator.from_positions(PLACES_M).offsets_m, atol=2e-4)
     with pytest.raises(InvalidData, match='no slides'):

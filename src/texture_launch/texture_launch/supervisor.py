@@ -34,7 +34,7 @@ class Job:
 
     @property
     def environment(self) -> Mapping[str, str]:
-        """The environment of its process; in the place of a dead one, Fast DDS has settings to be heard soon."""
+        """The environment of its process; in the place of a dead one, Fast DDS has settings to be discovered soon."""
         given = self.node.environment
         if not self.again or any(given.get(name) for name in PROFILES):
             return given

@@ -147,7 +147,7 @@ def _charts(trials: dict[str, _Trial], out: Path) -> tuple[Path, ...]:
         ),
         line_chart(
             {name: tuple(100.0 * trial.draws.mean(axis=0).T) for name, trial in trials.items()},
-            f'{UNKNOWN} of 20 materials never learnt, after 2.5 s. {where}',
+            f'{UNKNOWN} of 20 materials not in the training set, after 2.5 s. {where}',
             ('known ones taken for unknown (%)', 'unknown ones taken for known (%)'),
             out / 'decisions_unknown.png',
         ),

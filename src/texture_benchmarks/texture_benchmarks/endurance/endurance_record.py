@@ -72,7 +72,7 @@ class FaultEvent:
     begin_s, end_s
         While it was in force (monotonic clock).
     back_s
-        When all nodes were heard again and samples flowed; NaN if they were not in time, inf if the run ended before.
+        When all nodes reported again and samples arrived; NaN if they did not in time, inf if the run ended before.
     detail
         Its strength or whom it was injected.
     """

@@ -25,7 +25,7 @@ def early_chart(
     lines
         Mean seconds and shares at rising confidences, by name.
     rule
-        Mean seconds and share of the rule that a model learnt itself.
+        Mean seconds and share of the stopping rule fitted with the model.
     """
     with chart(path, (7.0, 4.6)) as figure:
         axes = figure.subplots()

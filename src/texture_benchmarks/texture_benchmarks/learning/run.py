@@ -1,4 +1,4 @@
-"""A model trained more textures slide by slide against one trained anew on the same slides, on recorded slides."""
+"""A model trained more textures slide by slide against one trained again on the same slides, on recorded slides."""
 
 from __future__ import annotations
 
@@ -85,8 +85,12 @@ def _numbers(
             str(stage): {
                 'incremental': _mean([incremental_run.incremental[stage] for incremental_run in incremental_runs]),
                 'retrained': _mean([incremental_run.retrained[stage] for incremental_run in incremental_runs]),
-                'trained, new textures': _mean([incremental_run.new[stage] for incremental_run in incremental_runs]),
-                'trained, old textures': _mean([incremental_run.old[stage] for incremental_run in incremental_runs]),
+                'incremental, new textures': _mean(
+                    [incremental_run.new[stage] for incremental_run in incremental_runs]
+                ),
+                'incremental, old textures': _mean(
+                    [incremental_run.old[stage] for incremental_run in incremental_runs]
+                ),
             }
             for stage in stages
         },
@@ -134,12 +138,12 @@ def _chart(incremental_runs: Sequence[IncrementalRun], stages: Sequence[int], ne
         for what in ('slides', 'windows')
         for how, field in (
             ('trained one slide at a time', 'incremental'),
-            ('trained anew on the same slides', 'retrained'),
+            ('trained again on the same slides', 'retrained'),
         )
     }
     return line_chart(
         lines,
-        f'{new} new materials learnt beside the others (BioTac, later slides of all)',
+        f'{new} new materials added to the others (BioTac, later slides of all)',
         ('slides of each new material', 'right (%)'),
         path,
         logarithmic=True,

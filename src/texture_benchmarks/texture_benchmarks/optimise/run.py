@@ -145,7 +145,7 @@ def run_case(
         'load_before': round(load, 1),
         'evaluations': params.population * params.generations,
         'different_individuals': last.evaluated,
-        'halves_judged': last.halves,
+        'halves_evaluated': last.halves,
         'halves_of_all': last.evaluated * params.halves,
         'fitness_searched': round(best.searched.fitness, 4),
         'fitness_exact': round(best.fitness, 4),

@@ -1,4 +1,4 @@
-"""Twenty objects in a hand, learnt with two fingers and recognised with two others (Kaboli et al. 2015)."""
+"""Twenty objects in a hand, trained with two fingers and recognised with two others (Kaboli et al. 2015)."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ PROTOCOL = Protocol(
         for name, svm, em, table, surfaces in zip(TASKS, PAPER_SVM, PAPER_EM, TABLES, SURFACES, strict=True)
     ),
     divide=training_in(TRAINED),
-    split='learnt: 10 slides with index and middle finger; tested: 20 with thumb and index finger',
+    split='training: 10 slides with index and middle finger; test: 20 with thumb and index finger',
     anchor=Anchor(
         ALL,
         SVM,

@@ -85,7 +85,7 @@ class Method:
         Which views of a slide it is given; () for all.
     singly
         Whether the windows are assigned for training one by one, half of them, instead of slide by slide: all slides
-        are then tested though parts of each are learnt. A fault on trial, to see what it would give.
+        are then tested though parts of each are in the training set: data leakage on purpose, to measure its effect.
     splits
         It is tried on so many of the splits; 0 for all.
     confusion : (n_surfaces, n_surfaces) or (n_surfaces, n_surfaces + 1)

@@ -61,7 +61,7 @@ def _difficulty(protocol: Protocol, found: MethodResults) -> dict[str, Any]:
         'set_by': f'{anchor.experiment or protocol.name}: {anchor.method}, {anchor.task}: {anchor.source}',
         'paper': anchor.test,
         'here': outcome and outcome.test.as_json(),
-        'knob': anchor.setting,
+        'setting': anchor.setting,
         'shortfall': anchor.shortfall,
     }
 
@@ -147,7 +147,7 @@ def _tuning_lines(tuned: TunedRecipes, out: Path) -> Iterator[str]:
         path = one.write(out / f'{recipe}{TUNED}-{task.replace(" ", "-")}.yaml')
         facts = one.figures()
         yield (
-            f'searched: {path}: learnt {100 * facts["learning"]:.1f} %, tested {100 * facts["test"]:.1f} % within the '
+            f'searched: {path}: training {100 * facts["learning"]:.1f} %, test {100 * facts["test"]:.1f} % within the '
             f'search; {facts["individuals_tried"]} individuals on {facts["scans"]} slides in {facts["seconds"]:.0f} s'
         )
 

@@ -31,7 +31,7 @@ SPLITS, QUICK_SPLITS = 20, 2
 QUICK_STEP = 8  # between the textures that the paper's regressors have left out
 OURS = 'roughness'
 RECIPES = {'ANN1': 'ets-roughness-ann1', 'ANN5': 'ets-roughness-ann5', 'SVM5': 'ets-roughness-svm5', 'ours': OURS}
-# The paper's Table II: mean absolute error of textures learnt and not learnt, and standard deviation within a texture.
+# The paper's Table II: mean absolute error of training and test textures, and standard deviation within a texture.
 PAPER = {'ANN1': (0.65, 1.13, 0.59, 0.59), 'ANN5': (0.24, 1.02, 0.60, 0.55), 'SVM5': (0.25, 1.30, 0.64, 0.77)}
 COLUMNS = ('seen', 'unseen', 'std_seen', 'std_unseen')
 ONE_PERSON = 0.82  # grades from the mean of the others: 81 materials, 11 people, another study (ViPer)
@@ -92,7 +92,7 @@ def run(experiment: Experiment) -> ExperimentResult:
             f'simulated: {len(setup.textures)} surfaces whose shape is guessed from the descriptions in the paper, '
             f"{setup.scans} scans each; grades: the paper's Table I, by people on the real textures"
         ),
-        split=f"by texture, the paper's: {len(train)} learnt, {len(test)} never touched",
+        split=f"by texture, the paper's: {len(train)} for training, {len(test)} for test",
         numbers=numbers,
         charts=_charts(setup, answers, numbers['ours_other_splits'], experiment),
         lines=tuple(lines(numbers, setup.grades)),
@@ -176,7 +176,7 @@ def _skids(setup: Setup, model: RoughnessModel, textures: Sequence[str]) -> dict
 
 
 def _other_splits(setup: Setup, recipe: RoughnessRecipe) -> dict[str, Any]:
-    """Return errors, and how often intervals hold, on unseen textures, over random choices of those that are learnt.
+    """Return errors, and how often intervals hold, on unseen textures, over random choices of the training textures.
 
     With ten textures a share of 90 % rests on one of them; many choices say whether the intervals are honest.
     """
@@ -222,8 +222,8 @@ def _charts(
     setup: Setup, answers: Mapping[str, Mapping[str, Answers]], splits: Mapping[str, Any], experiment: Experiment
 ) -> tuple[Any, ...]:
     panels = {
-        f'{name}: learnt and unseen textures': {
-            'learnt': Series.of(answers[name]['seen'].by_texture()),
+        f'{name}: training and unseen textures': {
+            'training': Series.of(answers[name]['seen'].by_texture()),
             'unseen': Series.of(answers[name]['unseen'].by_texture()),
         }
         for name in ('ANN5', 'ours')

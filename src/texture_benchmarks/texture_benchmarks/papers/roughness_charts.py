@@ -12,7 +12,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 
-SHADES = {'learnt': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper
+SHADES = {'training': COLOURS[2], 'unseen': COLOURS[0]}  # green and blue as in the paper
 NORMAL_90 = 1.6449
 
 

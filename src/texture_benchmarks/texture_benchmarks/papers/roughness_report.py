@@ -8,7 +8,7 @@ from typing import Any
 
 from texture_estimation.roughness.grades import TEST, Grades
 
-PARTS = (('seen', 'learnt'), ('unseen', 'unseen'))
+PARTS = (('seen', 'training'), ('unseen', 'unseen'))
 
 
 def lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
@@ -20,7 +20,7 @@ def lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
         yield f'  unseen textures at {condition}: {", ".join(row)}'
     splits = numbers['ours_other_splits']
     yield (
-        f'  ours over {splits["splits"]} random choices of the learnt textures: error {splits["error"]:.2f}, '
+        f'  ours over {splits["splits"]} random choices of the training textures: error {splits["error"]:.2f}, '
         f'90 % intervals hold in {100 * splits["coverage_90"]:.0f} %'
     )
     skids = numbers['skids']
@@ -42,7 +42,8 @@ def lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
 def _errors(numbers: Mapping[str, Any]) -> Iterator[str]:
     yield 'mean absolute error (standard deviation within a texture), in grades:'
     yield (
-        f'  {"":8}{"paper: learnt":>14}{"unseen":>14}{"here: learnt":>16}{"unseen":>14}{"no grade":>10}{"left out":>10}'
+        f'  {"":8}{"paper: training":>16}{"unseen":>14}'
+        f'{"here: training":>18}{"unseen":>14}{"no grade":>10}{"left out":>10}'
         '   90 % intervals hold: unseen, left out'
     )
     for name, parts in numbers['regressors'].items():
@@ -51,12 +52,12 @@ def _errors(numbers: Mapping[str, Any]) -> Iterator[str]:
         said = [pair(paper.get(part), paper.get(f'std_{part}')) for part, _ in PARTS]
         found = [pair(parts[part]['error'], parts[part]['std']) for part, _ in PARTS]
         yield (
-            f'  {name:8}{said[0]:>14}{said[1]:>14}{found[0]:>16}{found[1]:>14}'
+            f'  {name:8}{said[0]:>16}{said[1]:>14}{found[0]:>18}{found[1]:>14}'
             f'{100 * unseen["without_grade"]:8.0f} %{number(left["error"]):>10}'
             f'   {number(unseen["coverage_90"])}, {number(left["coverage_90"])}'
         )
     middle = numbers['always_the_middle']
-    yield f'  always 3{"":28}{middle["seen"]:9.2f}{middle["unseen"]:14.2f}{"":17}{middle["left_out"]:10.2f}'
+    yield f'  always 3{"":30}{middle["seen"]:11.2f}{middle["unseen"]:14.2f}{"":17}{middle["left_out"]:10.2f}'
     yield f'  one person against the others, in another study: {numbers["one_person"]}'
     errors = {name: parts['unseen']['error_of_the_mean'] for name, parts in numbers['regressors'].items()}
     reported = ', '.join(f'{name} {number(error)}' for name, error in errors.items())

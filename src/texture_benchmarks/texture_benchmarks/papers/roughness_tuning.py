@@ -1,4 +1,4 @@
-"""The paper's search for the parameters of its regressors, on the textures that are learnt."""
+"""The paper's search for the parameters of its regressors, on the training textures."""
 
 from __future__ import annotations
 

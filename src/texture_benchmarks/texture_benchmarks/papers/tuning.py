@@ -45,7 +45,7 @@ class TunedRecipe(Generic[R]):
             'scans': self.scans,
             'generations': len(history),
             'individuals_tried': history[-1].evaluated,
-            'halves_judged': history[-1].halves,
+            'halves_evaluated': history[-1].halves,
             'learning': float(record.learning.mean()),
             'test': float(record.test.mean()),
         }

@@ -1,4 +1,4 @@
-"""Recipes side by side on the same recorded slides: cut, described, learnt and evaluated by the code of the robot."""
+"""Recipes compared on the same recorded slides, with the code that runs on the robot."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def random_splits(slides: Sequence[LabelledSlide], count: int, rng: np.random.Ge
 
 
 def chronological_split(slides: Sequence[LabelledSlide], last_training: int) -> list[Split]:
-    """Return the one split in which the first slides of each surface are learnt and the later ones tested."""
+    """Return the one split with the first slides of each surface for training and the later ones for test."""
     return [_split({slide.name: int(slide.number > last_training) for slide in slides}, 1)]
 
 

@@ -160,14 +160,14 @@ def _degraded(
 
 
 def _later(recipes: Sequence[Recipe], slide_signals: Sequence[LabelledSlide], size: _Size) -> Panel:
-    """Return how recipes that learnt at the beginning of the session do further and further on."""
+    """Return the accuracy of recipes trained at the beginning of the session on later and later slides."""
     trained_models = TrainedModels.trained(recipes, [item for item in slide_signals if item.number in size.early])
     groups = {max(0.0, float(np.mean(group)) - max(size.early)): group for group in size.later}
 
     def score(since: float) -> Mapping[str, Count]:
         return trained_models.counts([item for item in slide_signals if item.number in groups[since]])
 
-    return _panel('slides since the last one learnt', tuple(groups), score, 'recorded')
+    return _panel('slides since the last training slide', tuple(groups), score, 'recorded')
 
 
 def _simulated(recipes: Sequence[Recipe], size: _Size, seed: int) -> dict[str, Panel]:
@@ -221,7 +221,8 @@ def _result(options: BenchmarkOptions, panels: Mapping[str, Panel], tested: int,
         split=(
             f'recorded: trained on slides 1-{LAST_TRAINED} of each material, tested on {tested} of the later ones; '
             f'{LATER}: trained on slides {_listed(size.early)}, tested on {"; ".join(map(_listed, size.later))}. '
-            f'Simulated: {size.simulated[0]} slides of {SLIDE_S} s a surface learnt, {size.simulated[1]} others tested'
+            f'Simulated: {size.simulated[0]} slides of {SLIDE_S} s a surface for training, {size.simulated[1]} '
+            'others for test'
         ),
         numbers={effect: _numbers(panel) for effect, panel in panels.items()},
         charts=tuple(

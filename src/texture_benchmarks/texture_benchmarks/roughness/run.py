@@ -47,7 +47,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'one by one, in one process'
         ),
         data='simulated TSF-85, scene roughness',
-        split="by texture, the paper's: 15 learnt, windows of the 10 others timed",
+        split="by texture, the paper's: 15 for training, windows of the 10 others timed",
         numbers={
             'target_us': TARGET_US,
             **{name: {'median_us': median, 'p99_us': p99} for name, (median, p99) in percentiles.items()},

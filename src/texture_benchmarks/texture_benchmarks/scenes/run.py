@@ -105,8 +105,9 @@ def _report(
         'logarithm of 24 bands of the spectrum of each channel, with and without each term; the effects that no scene '
         f"names are put into '{HOST}' one at a time, as strong as the catalogue has them",
         data='simulated scenes; slides of 2 and 3 s are cut to 1 s; terms that left a scene are put back for it',
-        split=f'{size.slides} slides learnt (jamali a third, sticky a fifth), others tested, {size.repeats} times '
-        f"anew; the papers' methods on {size.paper_repeats} sets of slides as many as in the paper; "
+        split=f'{size.slides} slides for training (jamali a third, sticky a fifth), others for test, '
+        f"{size.repeats} repetitions; the papers' methods on "
+        f'{size.paper_repeats} sets of slides as many as in the paper; '
         f'intervals of {CONFIDENCE:.0%}',
         numbers={
             'target_ms': {'without stick-slip': TARGET_MS[False], 'with': TARGET_MS[True]},
@@ -140,7 +141,7 @@ def _ablation(name: str, size: SceneBenchmarkSize, seed: int) -> Ablation:
 
 
 def _added(size: SceneBenchmarkSize, seed: int) -> list[Ablation]:
-    """Return the worth of each effect that no scene names, in a scene that has no other of them."""
+    """Return the influence of each effect that no scene names, in a scene that has no other of them."""
     return [_weighed(scene, size, seed, (name,)) for name, scene in with_one_more(load_scene(HOST)).items()]
 
 
@@ -172,7 +173,7 @@ def _terms(ablation: Ablation) -> dict[str, Any]:
     term_effects = {
         term_effect.term: {
             'accuracy_without': _numbers(term_effect.easier),
-            'accuracy_learnt_without': _numbers(term_effect.unprepared),
+            'accuracy_trained_without': _numbers(term_effect.unprepared),
             'decisions_changed': _numbers(term_effect.changed),
             **({'paper_without': _numbers(term_effect.paper)} if term_effect.paper else {}),
             'cost_us': round(term_effect.cost_us, 1),

@@ -52,8 +52,8 @@ def added_table(added: Sequence[Ablation]) -> str:
     regressors = (
         'effect',
         'costs (µs a slide)',
-        'change if met and learnt (points)',
-        'further change if not learnt (points)',
+        'change if in test and training (points)',
+        'further change if not in training (points)',
     )
     return _table((*regressors, 'verdict'), rows)
 

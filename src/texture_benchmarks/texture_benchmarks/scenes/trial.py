@@ -32,7 +32,7 @@ BANDS = 24  # of the spectrum, each of equal width on a logarithmic scale
 LOWEST_HZ = 5.0
 MIN_POWER = 1e-12
 CONFIDENCE = 0.95
-MIN_CHANGE = 0.01  # of the accuracy, or of the decisions: what is less is not worth a term
+MIN_CHANGE = 0.01  # of the accuracy, or of the decisions: an effect with less change needs no term
 PATCH = 'patch filter'
 FRICTION = 'friction'
 
@@ -151,9 +151,9 @@ class TermEffect:
     easier
         Accuracy without the term, in learning and in the test, less that with it.
     unprepared
-        Accuracy on slides with the term of what learnt without it, less that of what learnt with it.
+        Accuracy on slides with the term of a model trained without it, less that of one trained with it.
     changed
-        Share of the test slides decided otherwise by what learnt without it, less that by what learnt with it from
+        Share of the test slides decided otherwise by a model trained without it, less that by one trained with it from
         other slides.
     paper
         Accuracy of the paper's method without the term, in learning and in the test, less that with it, if known.
@@ -179,7 +179,7 @@ class TermEffect:
 
 @dataclass(frozen=True, eq=False)
 class Ablation:
-    """A scene and the worth of each of its terms.
+    """A scene and the influence of each of its terms.
 
     Parameters
     ----------

@@ -191,7 +191,7 @@ class Ntp21:
         return extracted([MeanSpatialBands()], [slide.windows(speed_m_s=float(speed)) for slide, speed in pairs])
 
     def _array(self, train: Mask) -> ArraySpeedEstimator:
-        """Return the array, the places of its taxels learnt in training."""
+        """Return the array with the positions of its taxels estimated in training."""
         slides = [slide for slide, use in zip(self.conditions.slides, train, strict=True) if use]
         return ArraySpeedEstimator.fit([(slide.samples, slide.rate_hz, slide.speed_m_s) for slide in slides])
 

@@ -126,7 +126,7 @@ def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressL
             measured = rig.explore(surface, plan.requests(surface, plan.recognition_slides, early_stopping=True))
             for number, explored in enumerate(measured):
                 rows.append(Row(surface, explored.texture))
-                progress.part(f'{", " if number else "felt as "}{explored.texture.label or "nothing"}')
+                progress.part(f'{", " if number else "recognised as "}{explored.texture.label or "nothing"}')
             progress.part('', last=True)
     return rows
 

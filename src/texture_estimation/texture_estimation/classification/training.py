@@ -122,7 +122,7 @@ def _fit(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
 
 @dataclass(frozen=True, eq=False)
 class _HeldOut:
-    """One slide as a learner that has not seen it classifies it: mean voice and worth after each window."""
+    """A held-out slide: mean log-evidence and effective window count after each window."""
 
     truth: int
     means: Array

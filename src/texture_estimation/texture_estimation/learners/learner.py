@@ -23,7 +23,7 @@ class Predictor(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """What a learner has learnt.
+    """Fitted parameters of a learner.
 
     Parameters
     ----------

@@ -253,7 +253,7 @@ class NextTouchModel:
     def _gaussian(self, motion: SlideMotion) -> ClassConditionalGaussian:
         if motion not in self.gaussians:
             known = '; '.join(str(other) for other in self.gaussians)
-            raise InvalidParameter(f'{motion} was not learnt; choose one of: {known}')
+            raise InvalidParameter(f'{motion} is not in the training set; choose one of: {known}')
         return self.gaussians[motion]
 
     def _checked(self, log_prior: Array) -> Array:

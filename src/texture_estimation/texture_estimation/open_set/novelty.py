@@ -21,7 +21,7 @@ FLOOR = 0.18  # of the mean variance within surfaces, added to each
 SMALLEST = 1e-9  # variance within surfaces, in that of all: slides that are the same to the last bit
 FOLDS = 5
 MIN_SLIDES = 3  # of a surface: with one held out, two tell how much slides differ
-# Lengths of evidence at which the limit is learnt, in windows that do not overlap. The start of a slide is like no
+# Lengths of evidence at which the threshold is fitted, in windows that do not overlap. The start of a slide is like no
 # other part, so slides are compared by the same stretch: by all that was measured, up to the last of these.
 EFFECTIVE_WINDOWS = (1.0, 1.5, 2.0, 3.0, 5.0)
 

@@ -21,7 +21,7 @@ class StoppingRule:
     """Truncated sequential test: stop at a confidence threshold, or after a number of effective windows.
 
     Source: Wald 1945 for a decision at a threshold of the evidence; the end after some time, as with one window in a
-    hundred that would go on for ever, is learnt with the threshold.
+    hundred that would go on for ever, is fitted with the threshold.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ class Checks:
             bad = vector.names[int(finite.argmin())]
             return f"its feature '{bad}' is not finite; is the speed known?"
         if LEVEL in self.limits and float(vector.values[self._columns[LEVEL]].max()) < self.limits[LEVEL]:
-            return 'no contact: the signal is weaker than on the smoothest surface learnt'
+            return 'no contact: the signal is weaker than on the smoothest training surface'
         if (
             STICK_SLIP in self.limits
             and float(vector.values[self._columns[STICK_SLIP]].max()) > self.limits[STICK_SLIP]

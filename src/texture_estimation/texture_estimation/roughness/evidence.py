@@ -13,7 +13,7 @@ from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estimator to the path of a trained one"
 NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
-SILENT = 'no grade: the surface resembles none of those learnt'
+SILENT = 'no grade: the surface resembles no training surface'
 # The scatter of the windows of a texture, known from the training, counts as so many windows.
 PRIOR_WINDOWS = 4.0
 

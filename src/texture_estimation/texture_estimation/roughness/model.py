@@ -62,13 +62,13 @@ class RoughnessModel:
     recipe
         By which it was made.
     parameters
-        What the regressor has learnt: plain arrays.
+        Fitted parameters of the regressor: plain arrays.
     calibration
         Of the standard deviation.
     limits
         Of the checks.
     grades
-        Of the textures learnt.
+        Of the training textures.
     training
         Facts about the training, for the card.
     """

@@ -49,7 +49,7 @@ class CalibrationParams(TrainingParams):
 
 @dataclass(frozen=True)
 class RoughnessRecipe:
-    """What turns a signal into a grade, before anything is learnt."""
+    """What turns a signal into a grade, before any training."""
 
     name: str
     feature_set: FeatureSet

@@ -14,5 +14,5 @@ the grades come.
 ...     found = optimise(space, Division(scans), SearchParams(), Grading(read_grades('ets_roughness')), spread=spread)
 >>> found.best.recipe, found.best.fitness  # a RoughnessRecipe, evaluated by its own head on every half
 
-A learner or head without a quick surrogate in `judges/catalogue.py` is evaluated by itself.
+A learner or regressor without a quick surrogate in `surrogates/catalogue.py` is evaluated by itself.
 """

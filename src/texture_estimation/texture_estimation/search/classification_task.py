@@ -40,7 +40,7 @@ class ClassificationTask:
         )
 
     def cost(self, recipe: Recipe, n_samples: int, n_values: int, examples: LabelledWindows) -> float:
-        """Return about how many operations a window costs, half the examples being learnt."""
+        """Return about how many operations a window costs, with half the examples for training."""
         features = [feature for item in recipe.feature_set.inputs for _, feature in item.features]
         return operations(
             features,

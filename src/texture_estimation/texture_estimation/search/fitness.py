@@ -32,7 +32,7 @@ def decisions(scores: Array) -> Codes:
 
 
 def shares_right(decided: Codes, codes: Codes, training: Mask) -> tuple[float, float]:
-    """Return the shares of right decisions among the learnt and among the other examples; undecided is not right."""
+    """Return the shares of right decisions among the training and among the other examples; undecided is not right."""
     right = decided == codes
     return float(right[training].mean()), float(right[~training].mean())
 

@@ -44,7 +44,7 @@ class RoughnessFitness:
     halves: Mask
 
     def start(self) -> HalfScorer:
-        """Return what gives the scores of learnt and other windows of a half."""
+        """Return what gives the scores of training and other windows of a half."""
         graded = self.surrogate(self.regressor, self.values, self.grades, self.textures)
 
         def half(number: int) -> tuple[float, float]:

@@ -59,7 +59,7 @@ class RoughnessTask:
         )
 
     def cost(self, recipe: RoughnessRecipe, n_samples: int, n_values: int, examples: LabelledWindows) -> float:
-        """Return about how many operations a window costs, half the examples being learnt."""
+        """Return about how many operations a window costs, with half the examples for training."""
         features = [feature for item in self.feature_set_of(recipe).inputs for _, feature in item.features]
         return operations(
             features,

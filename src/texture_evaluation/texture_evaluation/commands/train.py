@@ -52,7 +52,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
     )
     kinds = len(model.next_touch_model.gaussians) if model.next_touch_model else 0
     return [
-        f"recipe '{model.recipe.name}' learnt {len(model.labels)} surfaces: {', '.join(model.labels)}",
+        f"recipe '{model.recipe.name}' trained on {len(model.labels)} surfaces: {', '.join(model.labels)}",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
         f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it',
@@ -60,12 +60,12 @@ def summary(model: TextureModel, out: Path) -> list[str]:
 
 
 def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
-    """Return what a roughness model learnt and how it did on textures held out, in lines."""
+    """Return the training set and the held-out errors of a roughness model, in lines."""
     training = model.training
     error = training.get('held_out_error')
     held_out = 'nothing could be held out' if error is None else f'{error:.2f} grades off on textures held out in turn'
     return [
-        f"recipe '{model.recipe.name}' learnt the grades of {training['textures']} textures",
+        f"recipe '{model.recipe.name}' trained on the grades of {training['textures']} textures",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it',
     ]

@@ -25,7 +25,7 @@ class SlideSegmenter:
     """Turn signal batches into exploration states: `slide` while the finger slides, `lift` when it has ended.
 
     A state is told once what it covers is beyond doubt: a ramp and a bridge (0.4 s by default) after it was measured.
-    The sensor's noise is learnt at rest, so let the finger rest at first, or give `noise_rms`.
+    The sensor's noise is estimated at rest, so let the finger rest at first, or give `noise_rms`.
 
     Parameters
     ----------

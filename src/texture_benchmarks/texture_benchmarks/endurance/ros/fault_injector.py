@@ -33,7 +33,7 @@ class FaultInjector:
     processes
         The nodes; the same.
     watcher
-        Tells when a node is heard again.
+        Returns when a node has reported again.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class FaultInjector:
         return pids[planned_fault.fault.node]
 
     def _back(self, since_s: float) -> float:
-        """Return when all nodes are heard again and samples flow: NaN if not in time, inf if the run ends before."""
+        """Return when all nodes report again and samples arrive: NaN if not in time, inf if the run ends before."""
         awaited = (*NODES, 'signal')
         while time.monotonic() < since_s + BACK_DEADLINE_S:
             if self._stop.is_set():

@@ -40,7 +40,7 @@ class Watcher:
     said
         Warnings and errors of the nodes, with how often; numbers in them are left out.
     received_s
-        When a node was heard last on /diagnostics, and the stream 'signal' (monotonic clock).
+        When a node reported last on /diagnostics, and the stream 'signal' (monotonic clock).
     """
 
     def __init__(self, domain_id: int) -> None:

@@ -114,7 +114,7 @@ class SurrogateNetworks:
 
 
 def sample_rows(codes: Codes, training: Mask, most: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Return the rows of `most` learnt examples of each label, of the rarest one all, (n_labels, count)."""
+    """Return the rows of `most` training examples of each label, of the rarest one all, (n_labels, count)."""
     members = [np.flatnonzero(training & (codes == label)) for label in np.unique(codes)]
     count = min(most, *map(len, members))
     return np.array([rng.choice(of_label, count, replace=False) for of_label in members])
