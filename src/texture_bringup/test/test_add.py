@@ -74,10 +74,10 @@ def classify_slide(node, exploration_id):
     return estimates[-1].label
 
 
-def test_a_texture_is_trained_and_forgotten_from_the_command_line(classifier, capsys):
+def test_a_texture_is_added_and_removed_from_the_command_line(classifier, capsys):
     assert classify_slide(classifier, 'slide-1') in ('cork', 'felt', '')
     assert main(['add', 'silk']) == 0
-    assert "learnt 'silk' from 'slide-1'; 3 textures known" in capsys.readouterr().out
+    assert "added 'silk' from 'slide-1'; 3 textures, 1 slide added" in capsys.readouterr().out
     assert classify_slide(classifier, 'slide-2') == 'silk'
     assert main(['add', 'silk', 'slide-9']) == 2
     assert 'Can be added: slide-1, slide-2' in capsys.readouterr().err

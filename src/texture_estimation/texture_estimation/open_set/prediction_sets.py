@@ -11,7 +11,7 @@ import numpy as np
 from texture_core.arrays import Array
 
 ROUNDING = 1e-9
-EFFECTIVE_WINDOWS = (1.0, 2.0, 4.0, 8.0)  # lengths of evidence at which it is learnt, in windows that do not overlap
+EFFECTIVE_WINDOWS = (1.0, 2.0, 4.0, 8.0)  # lengths of evidence at which it is fitted, in windows that do not overlap
 
 
 @dataclass(frozen=True)
