@@ -25,7 +25,9 @@ def needs(module):
 def run(rig, start_fault, trials, tmp_path, exit_by='SIGINT'):
     session = Session(rig, start_fault, trials, exit_by)
     log = tmp_path / 'explorers.log'
-    record = endure_robots(RobotPlan(DEADLINE_S), log, lambda _: None, [session])
+    kept = []
+    record = endure_robots(RobotPlan(DEADLINE_S), log, lambda _: None, [session], kept.append)
+    assert [len(item.explorations) for item in kept] == [len(record.explorations)]
     told = log.read_text() + '\n'.join(item.message for item in record.explorations)
     assert [item.asked for item in check_robots(record) if not item.holds] == [], told
     return record

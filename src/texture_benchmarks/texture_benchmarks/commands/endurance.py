@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from texture_benchmarks.endurance.report import write
 from texture_benchmarks.endurance.requirements import RequirementResult, check_requirements
-from texture_benchmarks.endurance.robot_report import write_robots
+from texture_benchmarks.endurance.robot_report import write_figures, write_robots
 from texture_benchmarks.endurance.robot_requirements import check_robots
 from texture_benchmarks.endurance.robot_run import RobotPlan, endure_robots
 from texture_benchmarks.endurance.run import EndurancePlan, endure
@@ -56,7 +57,8 @@ def _run_sensor(options: argparse.Namespace, shared: bool) -> Sequence[Requireme
 
 def _run_robots(options: argparse.Namespace, shared: bool) -> Sequence[RequirementResult]:
     plan = RobotPlan(options.duration * (ROBOT_SHARE if shared else 1.0), options.seed)
-    record = endure_robots(plan, options.out / 'explorers.log', _say)
+    keep = partial(write_figures, out=options.out)
+    record = endure_robots(plan, options.out / 'explorers.log', _say, keep=keep)
     return _report(check_robots(record), write_robots(record, options.out))
 
 

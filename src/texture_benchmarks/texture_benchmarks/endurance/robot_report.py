@@ -35,9 +35,14 @@ def write_robots(record: RobotRecord, out: Path) -> list[Path]:
     """Write endurance-robots.md, .json and .png into a folder; return them."""
     page = out / 'endurance-robots.md'
     page.write_text('\n'.join(as_page(record)) + '\n', encoding='utf-8')
+    return [page, write_figures(record, out), draw_robots(record, out / 'endurance-robots.png')]
+
+
+def write_figures(record: RobotRecord, out: Path) -> Path:
+    """Write endurance-robots.json into a folder; return it."""
     figures = out / 'endurance-robots.json'
     figures.write_text(json.dumps(as_json(record), indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
-    return [page, figures, draw_robots(record, out / 'endurance-robots.png')]
+    return figures
 
 
 def as_json(record: RobotRecord) -> dict[str, Any]:

@@ -219,7 +219,13 @@ class RobotPlan:
     seed: int = 0
 
 
-def endure_robots(plan: RobotPlan, log: Path, say: Callable[[str], None], given: Iterable[Session] = ()) -> RobotRecord:
+def endure_robots(
+    plan: RobotPlan,
+    log: Path,
+    say: Callable[[str], None],
+    given: Iterable[Session] = (),
+    keep: Callable[[RobotRecord], object] = lambda _record: None,
+) -> RobotRecord:
     """Let faults strike the emulated robots for a while; return what happened.
 
     Parameters
@@ -232,6 +238,8 @@ def endure_robots(plan: RobotPlan, log: Path, say: Callable[[str], None], given:
         Is told after each session how it went.
     given
         These sessions instead of random ones; the run ends with them.
+    keep
+        Is given what happened so far after each session, so that nothing is lost with this process.
     """
     begin_s = time.monotonic()
     explorations: list[RobotExploration] = []
@@ -239,25 +247,28 @@ def endure_robots(plan: RobotPlan, log: Path, say: Callable[[str], None], given:
     load: list[float] = []
     parameters: dict[str, dict[str, object]] = {}
     ended_early_by = ''
-    number = 0
+
+    def record(ended_by: str) -> RobotRecord:
+        return RobotRecord(
+            begin_s, time.monotonic(), plan.seed, len(exits), explorations, exits, parameters, load, ended_by
+        )
+
     with tempfile.TemporaryDirectory(prefix='endurance_robots_') as folder, log.open('w', encoding='utf-8') as told:
         domain_id = isolate(Path(folder)).domain_id
         try:
             for session in given or sessions(plan.seed):
                 if time.monotonic() > begin_s + plan.duration_s:
                     break
-                number += 1
                 explorer_exit = _run_session(session, domain_id, told.write, explorations, parameters)
                 exits.append(explorer_exit)
                 load.append(os.getloadavg()[0])
+                keep(record('it has not ended yet'))
                 say(_progress(session, explorations, begin_s + plan.duration_s))
         except KeyboardInterrupt:
             ended_early_by = f'it was interrupted {begin_s + plan.duration_s - time.monotonic():.0f} s before its end'
         except TextureError as error:
             ended_early_by = str(error)
-    return RobotRecord(
-        begin_s, time.monotonic(), plan.seed, number, explorations, exits, parameters, load, ended_early_by
-    )
+    return record(ended_early_by)
 
 
 def _run_session(
