@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from scipy.signal import resample_poly
+from sklearn.model_selection import LeaveOneGroupOut
 
 from texture_core.errors import InvalidData
 from texture_core.features import FeatureVector
@@ -192,8 +193,9 @@ def chronological_split(slides: Sequence[LabelledSlide], last_training: int) -> 
 
 def splits_by(values: Mapping[str, float]) -> list[Split]:
     """Return one split for each value that slides have, by name: those that have it are tested."""
-    order = sorted(set(values.values()))
-    return [_split({name: order.index(value) for name, value in values.items()}, held) for held in range(len(order))]
+    names, groups = np.array(list(values)), list(values.values())
+    parts = LeaveOneGroupOut().split(names, groups=groups)
+    return [(frozenset(names[train].tolist()), frozenset(names[test].tolist())) for train, test in parts]
 
 
 def _split(part: Mapping[str, int], held: int) -> Split:
