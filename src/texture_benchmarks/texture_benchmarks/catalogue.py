@@ -26,6 +26,7 @@ from texture_benchmarks.segmentation import run as segmentation
 from texture_benchmarks.sensors import run as sensors
 from texture_benchmarks.speed_force import run as speed_force
 from texture_benchmarks.stick_slip import run as stick_slip
+from texture_benchmarks.trust import run as trust
 from texture_core.catalogue import find
 
 BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
@@ -36,6 +37,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
     'ablation': ablation.run,  # which features, numbers, units and channels contribute their time, recorded
     'decisions': decisions.run,  # early decisions, calibration, candidates and unknown surfaces, recorded
+    'trust': trust.run,  # slides wrong and known under disturbances, early and at the end
     'speed_force': speed_force.run,  # speeds, forces and directions that were not in the training set, recorded
     'roughness': roughness.run,  # from window to grade
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow

@@ -12,7 +12,8 @@ from texture_estimation.classification.training import train
 from texture_estimation.incremental.ridge_classifier import RidgeClassifier
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.log_probabilities import log_softmax
-from texture_estimation.open_set.novelty import NoveltyDetector
+from texture_estimation.open_set.class_distance import ClassDistance
+from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, FEATURES, NoveltyDetector
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.catalogue import REGRESSORS
 from texture_estimation.roughness.regressor import ROUGH, SMOOTH
@@ -85,10 +86,15 @@ def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, m
     examples = make_examples(slides=6)
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
     values = change(examples.values)
-    novelty_detector = NoveltyDetector.fit(values, codes, groups, 1.0, 0.05)
     means = np.stack([values[groups == group].mean(axis=0) for group in np.unique(groups)])
-    assert np.mean([novelty_detector.is_known(mean, 5.0) for mean in means]) > 0.9
-    assert not novelty_detector.is_known(means[0] + 100.0 * np.ptp(values, axis=0), 5.0)
+    classes = codes[np.unique(groups, return_index=True)[1]]
+    distance = ClassDistance.fit(means, classes)
+    own = np.array([distance.score(mean, code) for mean, code in zip(means, classes.tolist(), strict=True)])
+    detector = NoveltyDetector.fit({FEATURES: distance}, [own[:, None]] * len(EFFECTIVE_WINDOWS), 0.05)
+    known = [detector.novelty_score([score], 5.0) <= detector.threshold(5.0) for score in own.tolist()]
+    assert np.mean(known) > 0.9
+    far = distance.score(means[0] + 100.0 * np.ptp(values, axis=0), int(classes[0]))
+    assert detector.novelty_score([far], 5.0) > detector.threshold(5.0)
 
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')

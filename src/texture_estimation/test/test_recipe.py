@@ -49,3 +49,16 @@ def test_what_rules_decisions_about_textures_is_no_parameter_of_a_roughness_reci
     assert RoughnessRecipe.from_mapping({**INPUTS, 'training': {'folds': 5}}, 'mine').training.folds == 5
     with pytest.raises(InvalidParameter, match='false_rejection_rate'):
         RoughnessRecipe.from_mapping({**INPUTS, 'training': {'false_rejection_rate': 0.1}}, 'mine')
+
+
+def test_augmentation_is_a_section_of_training_that_only_a_network_takes():
+    recipe = load_recipe('default')
+    assert recipe.augmentation.copies == 8
+    assert Recipe.from_mapping(recipe.as_mapping(), 'again') == recipe
+    assert 'augmentation' not in load_recipe('kaboli-svm').as_mapping()['training']
+    content = {'inputs': {'signal': {'features': ['hjorth']}}, 'training': {'augmentation': {'copies': 3}}}
+    with pytest.raises(TextureError, match="learner 'svm_rbf' cannot be trained so; use 'mlp'"):
+        Recipe.from_mapping(content, 'mine')
+    wrong = {**content, 'learner': 'mlp', 'training': {'augmentation': {'copy': 3}}}
+    with pytest.raises(TextureError, match=r"recipe 'mine', training, augmentation: .*'copies'"):
+        Recipe.from_mapping(wrong, 'mine')

@@ -6,7 +6,10 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.features import FeatureVector
 from texture_estimation.classification.training import train
+from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.recipe import load_recipe
+from texture_features.augmentation.augmentation import Augmentation
+from texture_features.augmentation.augmented_features import AugmentedFeatures, FeatureCopies
 from texture_features.labelled_features import LabelledFeatures
 
 RECIPE = load_recipe('default')
@@ -117,6 +120,76 @@ def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
         for share in (0.0, 0.1)
     )
     assert train(trusting, examples).novelty_detector is None
-    novelty_detector = train(strict, examples).novelty_detector
-    assert novelty_detector is not None
-    assert not novelty_detector.is_known(examples.values.mean(axis=0) + 50.0, 3.0)
+    model = train(strict, examples)
+    assert model.novelty_detector is not None
+    values = examples.values[examples.groups == examples.groups[0]]
+    assert final_estimate(model, values).known
+    assert not final_estimate(model, values + 50.0).known
+
+
+def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_examples):
+    labels = ('cork', 'felt', 'wood', 'slate', 'glass', 'paper')
+    examples = make_examples(labels=labels, slides=12, features=8, seed=3)
+    recipe = dataclasses.replace(RECIPE, training=dataclasses.replace(RECIPE.training, false_rejection_rate=0.05))
+    model = train(recipe, pick(examples, examples.labels != 'glass'))
+    new = make_examples(labels=labels, slides=12, features=8, seed=4)
+    known = {
+        label: [e.known for slide in range(12) for e in estimates(model, new.values[new.groups == f'{label}/{slide}'])]
+        for label in labels
+    }
+    assert np.mean(known.pop('glass')) < 0.2
+    assert np.mean(list(known.values())) > 0.9
+
+
+def estimates(model, values):
+    """Return what the model says after each window of a slide and at its end."""
+    evidence = EvidenceAccumulator(model)
+    vectors = [
+        FeatureVector(k * 10**8, 'e', 0.5, 0.1, model.names, row, feature_set=model.feature_set)
+        for k, row in enumerate(values)
+    ]
+    return [evidence.update(vector) for vector in (*vectors, FeatureVector(10**10, 'e', 0.0, 0.1, last=True))]
+
+
+def final_estimate(model, values):
+    return estimates(model, values)[-1]
+
+
+def augmented(examples, response, copies=2, shift=0.0):
+    """Return the examples with copies of their windows, changed by a shift."""
+    groups = np.tile(examples.groups, copies)
+    numbers = np.repeat(np.arange(copies), len(examples.groups))
+    values = np.tile(examples.values, (copies, 1)) + shift
+    nothing = FeatureCopies(values[:0].astype(np.float32), groups[:0], numbers[:0], groups[:0])
+    kinds = np.zeros(len(groups), dtype='<U1')
+    made = FeatureCopies(values.astype(np.float32), groups, numbers, kinds)
+    return dataclasses.replace(examples, augmented=AugmentedFeatures(made, nothing, response))
+
+
+def test_a_classifier_trained_with_gains_recognises_what_is_amplified(make_examples):
+    examples = make_examples(slides=6, features=6)
+    response = np.array([2.0, 2.0, 2.0, 0.0, 0.0, 0.0])
+    plain = dataclasses.replace(load_recipe('default'), augmentation=Augmentation())
+    params = Augmentation(copies=2, gain_range=5.0, slide_jitter=0.0)
+    trained = {
+        name: train(dataclasses.replace(plain, augmentation=own), augmented(examples, response))
+        for name, own in {'plain': Augmentation(), 'augmented': params}.items()
+    }
+    louder = make_examples(slides=6, features=6, seed=9)
+    values = louder.values + np.log(4.0) * response
+    right = {name: np.mean(np.array(model.decide(values)) == louder.labels) for name, model in trained.items()}
+    assert right['augmented'] > right['plain'] + 0.1
+
+
+def test_copies_of_slides_that_are_not_among_the_examples_are_ignored(make_examples):
+    examples = augmented(make_examples(slides=4), np.zeros(6))
+    recipe = dataclasses.replace(load_recipe('default'), augmentation=Augmentation(copies=2))
+    model = train(recipe, pick(examples, examples.labels != 'wood'))
+    assert model.labels == ('cork', 'felt', 'slate')
+
+
+def test_a_recipe_without_augmentation_ignores_copies(make_examples):
+    examples = make_examples(slides=4)
+    recipe = dataclasses.replace(load_recipe('default'), augmentation=Augmentation())
+    with_copies, without = train(recipe, augmented(examples, np.zeros(6))), train(recipe, examples)
+    np.testing.assert_array_equal(with_copies.parameters['hidden'], without.parameters['hidden'])

@@ -12,7 +12,7 @@ from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
 from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.model import TextureModel
-from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS
+from texture_estimation.open_set.novelty import SlideNovelty
 from texture_features.slide_conditions import RunningConditions
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
@@ -22,10 +22,9 @@ NO_WINDOW = 'no window could be used: the slide was too short, or its samples we
 class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
-    A new exploration id, or a vector after the `last` one, starts a new slide. Novelty detection runs once the label is
-    certain, and at the end; until then a label counts as known. An exploration under conditions that were not trained
-    is neither known nor decided, and the message says which condition it is. Equally probable labels give no label:
-    unclassified.
+    A new exploration id, or a vector after the `last` one, starts a new slide. Every estimate says whether the surface
+    is known; a label is certain only while it is. An exploration under conditions that were not trained is neither known
+    nor decided, and the message says which condition it is. Equally probable labels give no label: unclassified.
 
     Parameters
     ----------
@@ -62,9 +61,8 @@ class EvidenceAccumulator:
         self._message = '' if self.model else NO_MODEL
         self._sum = np.zeros(len(self.model.labels) if self.model else 0)
         self._zeros = np.zeros(len(self.model.names) if self.model else 0)
-        self._values = self._zeros.copy()
-        self._novelty_windows = 0
-        self._known: bool | None = None  # not looked at yet
+        detector = self.model.active_novelty_detector if self.model else None
+        self._novelty = SlideNovelty(detector.distances, len(self._sum)) if detector else None
         self._conditions = RunningConditions()
         self._deviation = ''  # of these conditions from those of the training
 
@@ -89,15 +87,17 @@ class EvidenceAccumulator:
             return
         self._conditions.update(vector)
         self._deviation = model.domain.deviation(self._conditions.get())
-        self._sum += model.recipe.evidence.window_evidence(model.predictor(vector.values))
+        window_evidence = model.recipe.evidence.window_evidence(model.predictor(vector.values))
+        self._sum += window_evidence
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns
         self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
         self._end_ns = max(end, self._end_ns)
-        if self._evidence_ns <= EFFECTIVE_WINDOWS[-1] * self._window_ns:
-            self._values += vector.values
-            self._novelty_windows += 1
+        if self._novelty is not None:
+            best = int(window_evidence.argmax())
+            effective_windows = self._evidence_ns / self._window_ns
+            self._novelty.add(vector.values, model.activations(vector.values), best, effective_windows)
 
     def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
         model = self.model
@@ -118,17 +118,15 @@ class EvidenceAccumulator:
         confidence = max(listed)
         best, decided = listed.index(confidence), listed.count(confidence) == 1
         within = not self._deviation
-        certain = decided and within and model.stopping_rule.certain(confidence, effective_windows)
-        if (certain and not self._known) or final:
-            self._known = model.active_novelty_detector is None or model.active_novelty_detector.is_known(
-                self._values / self._novelty_windows, effective_windows
-            )
+        novelty_score, known = self._novelty_score(model, mean, best, effective_windows)
+        known = known and within
+        certain = decided and known and model.stopping_rule.certain(confidence, effective_windows, novelty_score)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
             frame_id=vector.frame_id,
             label=model.labels[best] if decided else '',
-            known=decided and within and self._known is not False,
+            known=decided and known,
             confidence=confidence,
             labels=model.labels,
             probabilities=tuple(listed),
@@ -145,6 +143,17 @@ class EvidenceAccumulator:
         """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
         no_set = model.prediction_sets.reason if final and not self._deviation else ''
         return '; '.join(filter(None, (self._deviation, self._message, no_set)))
+
+    def _novelty_score(
+        self, model: TextureModel, mean: Array, best: int, effective_windows: float
+    ) -> tuple[float, bool]:
+        """Return the novelty score of the slide, and whether it is that of a known surface."""
+        detector = model.active_novelty_detector
+        if self._novelty is None or detector is None:
+            return 0.0, True
+        second, first = np.partition(mean, -2)[-2:].tolist()
+        novelty_score = detector.novelty_score(self._novelty.scores(best, first - second), effective_windows)
+        return novelty_score, novelty_score <= detector.threshold(effective_windows)
 
     @staticmethod
     def _candidates(model: TextureModel, probabilities: Array, effective_windows: float) -> tuple[str, ...]:

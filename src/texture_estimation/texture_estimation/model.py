@@ -5,7 +5,7 @@ Adding slides does not change the two files.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,11 +19,11 @@ from texture_estimation import model_files
 from texture_estimation.incremental.added_slides import AddedSlide, read_added_slides
 from texture_estimation.incremental.ridge_classifier import RidgeClassifier
 from texture_estimation.incremental.training_examples import TrainingExamples
-from texture_estimation.learners.learner import Predictor
+from texture_estimation.learners.learner import Predictor, hidden_layer
 from texture_estimation.log_probabilities import is_tied, log_softmax
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
 from texture_estimation.open_set.domain import Domain
-from texture_estimation.open_set.novelty import NoveltyDetector
+from texture_estimation.open_set.novelty import NoveltyDetector, SlideNovelty, space_means
 from texture_estimation.open_set.prediction_sets import PredictionSets
 from texture_estimation.open_set.stopping_rule import StoppingRule
 from texture_estimation.recipe import Recipe
@@ -103,7 +103,17 @@ class TextureModel:
             return self.novelty_detector
         windows = self.recipe.feature_set.windows
         overlap = min(windows.hop_s / windows.length_s, 1.0)
-        return self.novelty_detector.with_slides([added_slide.values for added_slide in self.added_slides], overlap)
+        means = [space_means(added.values, self.activations(added.values), overlap) for added in self.added_slides]
+        numbers = np.array([self.labels.index(added.label) for added in self.added_slides])
+        return self.novelty_detector.with_slides(means, numbers)
+
+    @cached_property
+    def _hidden_layer(self) -> Callable[[Array], Array] | None:
+        return hidden_layer(self.recipe.learner.predictor(self.parameters))
+
+    def activations(self, values: Array) -> Array | None:
+        """Return the outputs of the trained hidden layer, (..., n_hidden); None if the classifier has none."""
+        return self._hidden_layer(values) if self._hidden_layer is not None else None
 
     def predict_log_proba(self, values: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
@@ -165,7 +175,9 @@ class TextureModel:
         self.prediction_sets.members(np.exp(answer), 1.0)
         self.stopping_rule.certain(0.5, 1.0)
         if self.novelty_detector is not None:
-            self.novelty_detector.is_known(nothing, 1.0)
+            novelty = SlideNovelty(self.novelty_detector.distances, len(self.labels))
+            novelty.add(nothing, self.activations(nothing), 0, 1.0)
+            self.novelty_detector.novelty_score(novelty.scores(0, 0.0), 1.0)
         if self.next_touch_model is not None:
             self.next_touch_model.check(nothing)
         if self.examples is not None:

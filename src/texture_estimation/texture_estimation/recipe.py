@@ -14,12 +14,15 @@ from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, Evi
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
 from texture_estimation.open_set.domain import DomainMargins
+from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_features.recipe_entry import choose, entry_of
 from texture_features.recipe_file import read_recipe
 from texture_features.windowing.windows import WindowParams
 
 KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
+AUGMENTATION = 'augmentation'  # section within `training`
+AUGMENTABLE = ('mlp',)
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,7 @@ class Recipe:
     evidence: EvidenceRule
     training: DecisionParams = dataclasses.field(default_factory=DecisionParams)
     description: str = ''
+    augmentation: Augmentation = dataclasses.field(default_factory=Augmentation)
 
     @property
     def training_windows(self) -> WindowParams:
@@ -120,13 +124,20 @@ class Recipe:
                 raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
         learner = choose(LEARNERS, content.get('learner', 'svm_rbf'), 'learner', where)
         evidence = choose(EVIDENCE_RULES, content.get('evidence', 'soft_vote'), 'evidence rule', where)
+        training, augmentation = _training(content.get('training') or {}, where)
+        if augmentation.copies and learner[0] not in AUGMENTABLE:
+            raise InvalidParameter(
+                f"{where}: training is augmented, but learner '{learner[0]}' cannot be trained so; use 'mlp' or remove "
+                "the section 'augmentation'"
+            )
         return cls(
             name,
             FeatureSet.from_mapping(content, where),
             *learner,
             *evidence,
-            from_mapping(DecisionParams, content.get('training') or {}, f'{where}, training'),
+            training,
             str(content.get('description', '')),
+            augmentation,
         )
 
     def as_mapping(self) -> dict[str, Any]:
@@ -136,8 +147,23 @@ class Recipe:
             **self.feature_set.as_mapping(),
             'learner': {self.learner_name: entry_of(self.learner)},
             'evidence': {self.evidence_name: dataclasses.asdict(self.evidence)},
-            'training': dataclasses.asdict(self.training),
+            'training': {**dataclasses.asdict(self.training), **self._augmentation_mapping()},
         }
+
+    def _augmentation_mapping(self) -> dict[str, Any]:
+        return {AUGMENTATION: dataclasses.asdict(self.augmentation)} if self.augmentation.copies else {}
+
+
+def _training(section: Any, where: str) -> tuple[DecisionParams, Augmentation]:
+    """Return the parameters of the section `training`, and those of its own section for augmentation."""
+    augmentation: Any = {}
+    if isinstance(section, Mapping):
+        augmentation = section.get(AUGMENTATION) or {}
+        section = {name: value for name, value in section.items() if name != AUGMENTATION}
+    return (
+        from_mapping(DecisionParams, section, f'{where}, training'),
+        from_mapping(Augmentation, augmentation, f'{where}, training, augmentation'),
+    )
 
 
 def load_recipe(name_or_path: str) -> Recipe:

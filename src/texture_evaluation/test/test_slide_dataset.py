@@ -7,6 +7,8 @@ import pytest
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_estimation.recipe import load_recipe
+from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import CutWindow, WindowParams
 from texture_recordings import slides as slides_module
@@ -179,3 +181,16 @@ def test_lost_samples_leave_windows_out_but_are_refused_where_all_are_needed(tmp
     ]
     with pytest.raises(InvalidData, match='has lost samples'):
         dataset.to_numpy()
+
+
+def test_augmented_features_hold_copies_of_every_slide_and_the_windows_stay_the_same() -> None:
+    rng = np.random.default_rng(0)
+    arrays = {'signal': [rng.normal(size=(3000, 1)) for _ in range(4)]}
+    dataset = SlideDataset.from_arrays(arrays, ['cork', 'cork', 'felt', 'felt'], {'signal': 1000.0})
+    features = load_recipe('default').feature_set
+    augmented, plain = dataset.features(features, Augmentation(copies=2)), dataset.features(features)
+    np.testing.assert_array_equal(augmented.values, plain.values)
+    assert augmented.augmented is not None
+    assert set(augmented.augmented.copies.groups.tolist()) == {'cork/1', 'cork/2', 'felt/1', 'felt/2'}
+    assert augmented.augmented.gain_response[:32] == pytest.approx(np.full(32, 2.0))  # logarithms of powers
+    assert plain.augmented is None

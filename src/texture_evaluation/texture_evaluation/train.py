@@ -10,6 +10,7 @@ from texture_core.errors import InvalidParameter
 from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_features.labelled_features import LabelledFeatures
 from texture_recordings.bags import find_bags
 from texture_recordings.slide_dataset import SlideDataset
 
@@ -52,13 +53,19 @@ def train_from_bags(
         With one sentence, if recipe, bags, slides or place are wrong.
     """
     plan = with_channels(load_recipe(recipe), channels)
-    windows = replace(plan.feature_set, windows=plan.training_windows)
-    examples = SlideDataset.from_bags(bags, slides, namespace, windows.topics).features(windows)
+    dataset = SlideDataset.from_bags(bags, slides, namespace, plan.feature_set.topics)
+    examples = training_examples(plan, dataset)
     default = Path(out).name.removesuffix('.skops') if out else plan.name
     model = train(plan, examples, name or default)
     if out is not None:
         _save(model, Path(out), bags, slides)
     return model
+
+
+def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures:
+    """Return the windows of labelled slides as the training of a recipe needs them, with its augmentation."""
+    windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+    return dataset.features(windows, recipe.augmentation)
 
 
 def with_channels(recipe: Recipe, channels: str) -> Recipe:

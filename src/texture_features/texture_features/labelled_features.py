@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
 from texture_core.slide_motion import SlideMotion
 from texture_features.slide_conditions import RunningConditions, SlideConditions
+
+if TYPE_CHECKING:  # which needs scipy
+    from texture_features.augmentation.augmented_features import AugmentedFeatures
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,8 @@ class LabelledFeatures:
         Start of each window, ns; without it, the windows of a slide are taken to lie `hop_s` apart.
     conditions
         Motion, sensor, speed, force and directions of each slide, as far as its windows tell them.
+    augmented
+        Changed copies of the slides for training; copies of slides that are not among `groups` are ignored.
 
     Raises
     ------
@@ -55,6 +61,7 @@ class LabelledFeatures:
     motions: Mapping[str, SlideMotion] = field(default_factory=dict)
     start_ns: NDArray[np.int64] | None = None
     conditions: Mapping[str, SlideConditions] = field(default_factory=dict)
+    augmented: AugmentedFeatures | None = None
 
     def __post_init__(self) -> None:
         shape = (len(self.labels), len(self.names))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,12 +17,14 @@ from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_features.labelled_features import LabelledFeatures
-from texture_features.windowing.windows import WindowEvent, cut_recording
+from texture_features.windowing.windows import WindowEvent, WindowParams, cut_recording
 from texture_recordings.motion_of_states import motion_made
 from texture_recordings.slide_samples import SlideSamples
 from texture_recordings.slides import STREAMS, LabelledSlide, number_slides, parse_selection, read_labelled_slides
 
 if TYPE_CHECKING:  # which needs scipy: reading, selecting and exporting do not
+    from texture_features.augmentation.augmentation import Augmentation
+    from texture_features.augmentation.augmented_features import AugmentedFeatures
     from texture_features.feature_set import FeatureSet
 
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays
@@ -257,8 +260,15 @@ class SlideDataset:
         for slide in self.slides:
             yield slide, cut_slide(slide, feature_set)
 
-    def features(self, feature_set: FeatureSet) -> LabelledFeatures:
+    def features(self, feature_set: FeatureSet, augmentation: Augmentation | None = None) -> LabelledFeatures:
         """Return features `X`, labels `y` and slides `groups` of all windows, with their times.
+
+        Parameters
+        ----------
+        feature_set
+            Windows, inputs and features.
+        augmentation
+            Changes of copies of the slides, for training; with None or without copies there are none.
 
         Raises
         ------
@@ -277,7 +287,17 @@ class SlideDataset:
             raise no_window(self, feature_set)
         features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
-        return replace(features, motions=motions)
+        return replace(features, motions=motions, augmented=self._augmented(feature_set, augmentation))
+
+    def _augmented(self, feature_set: FeatureSet, augmentation: Augmentation | None) -> AugmentedFeatures | None:
+        if augmentation is None or not augmentation.copies:
+            return None
+        from texture_features.augmentation.augmented_features import Augmenter  # noqa: PLC0415  # needs scipy
+
+        augmenter = Augmenter(feature_set, augmentation)
+        for slide in self.slides:
+            augmenter.add(slide.name, partial(_cut_by, slide, feature_set))
+        return augmenter.result()
 
     def samples(self, topic: str) -> list[SlideSamples]:
         """Return the samples of one topic of each slide without gaps, with speed, force and direction.
@@ -317,6 +337,10 @@ def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent
         )
     used = {topic: slide.signals[topic] for topic in feature_set.topics}
     return list(cut_recording(used, slide.states, feature_set.windows))
+
+
+def _cut_by(slide: LabelledSlide, feature_set: FeatureSet, windows: WindowParams) -> list[WindowEvent]:
+    return cut_slide(slide, replace(feature_set, windows=windows, _layouts={}))
 
 
 def no_window(dataset: SlideDataset, feature_set: FeatureSet) -> InvalidData:

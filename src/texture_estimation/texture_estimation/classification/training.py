@@ -12,8 +12,11 @@ from scipy.optimize import minimize_scalar
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_estimation.classification.evidence_rules import EvidenceRule
+from texture_estimation.classification.novelty_training import SlideTrace, fit_novelty
 from texture_estimation.incremental.training_examples import TrainingExamples
+from texture_estimation.learners.augmented_examples import AugmentedExamples
 from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.mlp import Mlp
 from texture_estimation.log_probabilities import is_tied, log_loss
 from texture_estimation.model import TextureModel
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
@@ -59,6 +62,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     slides_held_out = _held_out_slides(fitted, codes, groups, recipe.evidence, overlap)
     tempering_exponent = _fit_tempering_exponent(slides_held_out, recipe.evidence)
     decisions = recipe.training
+    rule, novelty_detector = _fit_open_set(recipe, fitted, examples, slides_held_out, tempering_exponent)
     return TextureModel(
         name=name or recipe.name,
         labels=tuple(labels.tolist()),
@@ -67,11 +71,9 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         recipe=recipe,
         parameters=fitted.parameters,
         tempering_exponent=tempering_exponent,
-        stopping_rule=_fit_stopping(slides_held_out, recipe.evidence, tempering_exponent, decisions.max_error_rate),
+        stopping_rule=rule,
         prediction_sets=_fit_prediction_sets(slides_held_out, recipe.evidence, tempering_exponent, decisions.coverage),
-        novelty_detector=NoveltyDetector.fit(examples.values, codes, groups, overlap, decisions.false_rejection_rate)
-        if decisions.false_rejection_rate
-        else None,
+        novelty_detector=novelty_detector,
         next_touch_model=_fit_next_touch_model(examples),
         training={
             'windows': len(codes),
@@ -109,15 +111,62 @@ def _fit(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
     """
     if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < MIN_SLIDES:
         return recipe.learner.fit(examples.values, codes, groups)
-    starting = max(1, round(examples.window_s / examples.hop_s))
-    times = np.ones(len(codes), dtype=np.intp)
-    for group in np.unique(groups):
-        times[np.flatnonzero(groups == group)[:starting]] = recipe.training.start_weight
+    times = _times(groups, examples, recipe.training.start_weight)
     rows = np.repeat(np.arange(len(codes)), times)
-    fitted = recipe.learner.fit(examples.values[rows], codes[rows], groups[rows])
+    augmented = _augmented_examples(recipe, examples, codes, groups)
+    if augmented is not None and isinstance(recipe.learner, Mlp):
+        fitted = recipe.learner.fit(examples.values[rows], codes[rows], groups[rows], augmented)
+    else:
+        fitted = recipe.learner.fit(examples.values[rows], codes[rows], groups[rows])
     if fitted.held_out is None:
         return fitted
     return replace(fitted, held_out=fitted.held_out[np.cumsum(times) - times])
+
+
+def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:
+    """Return how often each window counts, (n,): more often those that begin within the length of the first one.
+
+    `runs` are the numbers of the slides or copies to which the windows belong, (n,).
+    """
+    starting = max(1, round(examples.window_s / examples.hop_s))
+    times = np.ones(len(runs), dtype=np.intp)
+    for run in np.unique(runs):
+        times[np.flatnonzero(runs == run)[:starting]] = start_weight
+    return times
+
+
+def _augmented_examples(
+    recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
+) -> AugmentedExamples | None:
+    """Return what the learner draws besides the examples; None without augmentation or without copies of the slides."""
+    if examples.augmented is None or not recipe.augmentation.copies:
+        return None
+    copies = examples.augmented.copies
+    names, first = np.unique(examples.groups, return_index=True)
+    own = np.isin(copies.groups, names)
+    copied = np.searchsorted(names, copies.groups[own])
+    runs = np.unique(np.stack([copied, copies.copies[own]]), axis=1, return_inverse=True)[1].reshape(-1)
+    means = slide_means(examples.values, groups)
+    classes = codes[first]
+    centres = np.stack([means[classes == code].mean(axis=0) for code in range(int(codes.max()) + 1)])
+    return AugmentedExamples(
+        values=copies.values[own],
+        codes=classes[copied],
+        groups=copied,
+        rows=np.repeat(np.arange(len(copied)), _times(runs, examples, recipe.training.start_weight)),
+        gain_response=examples.augmented.gain_response,
+        slide_deviations=means - centres[classes],
+        slides=np.arange(len(names)),
+        augmentation=recipe.augmentation,
+    )
+
+
+def slide_means(values: Array, groups: Codes) -> Array:
+    """Return the mean of the windows of each slide, (n_slides, n_features); slides are numbered from 0."""
+    means = np.zeros((int(groups.max()) + 1, values.shape[1]))
+    np.add.at(means, groups, values)
+    means /= np.bincount(groups)[:, None]
+    return means
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +213,49 @@ def _fit_tempering_exponent(slides: Sequence[_HeldOut], rule: EvidenceRule) -> f
     return float(minimize_scalar(loss, bounds=(0.0, 1.0), method='bounded').x)
 
 
+def _fit_open_set(
+    recipe: Recipe,
+    fitted: Fitted,
+    examples: LabelledFeatures,
+    slides: Sequence[_HeldOut],
+    tempering_exponent: float,
+) -> tuple[stopping_rule.StoppingRule, NoveltyDetector | None]:
+    """Return when a slide may end, and the novelty detector; None if none is asked for or there are too few slides."""
+    decisions = recipe.training
+    found = None
+    if decisions.false_rejection_rate:
+        found = fit_novelty(
+            recipe.learner,
+            fitted,
+            examples,
+            recipe.evidence,
+            decisions.false_rejection_rate,
+            gain_range=recipe.augmentation.gain_range,
+        )
+    if found is None:
+        return _fit_stopping(slides, recipe.evidence, tempering_exponent, decisions.max_error_rate), None
+    detector, traces = found
+    courses = [_course(trace, detector, recipe.evidence, tempering_exponent) for trace in traces]
+    return stopping_rule.fit_open_set_rule(courses, decisions.max_error_rate), detector
+
+
+def _course(
+    trace: SlideTrace, detector: NoveltyDetector, rule: EvidenceRule, tempering_exponent: float
+) -> stopping_rule.SlideCourse:
+    posterior = rule.log_posterior(trace.means, trace.effective_windows[:, None], tempering_exponent)
+    steps = list(zip(trace.scores.tolist(), trace.effective_windows.tolist(), strict=True))
+    novelty_scores = np.array([detector.novelty_score(scores, windows) for scores, windows in steps])
+    thresholds = np.array([detector.threshold(windows) for _, windows in steps])
+    return stopping_rule.SlideCourse(
+        confidences=np.exp(posterior.max(axis=1)),
+        right=(posterior.argmax(axis=1) == trace.truth) & ~is_tied(posterior),
+        effective_windows=trace.effective_windows,
+        known=novelty_scores <= thresholds,
+        novelty_scores=novelty_scores,
+        disturbance=trace.disturbance,
+    )
+
+
 def _fit_stopping(
     slides: Sequence[_HeldOut], rule: EvidenceRule, tempering_exponent: float, wrong: float
 ) -> stopping_rule.StoppingRule:
@@ -196,9 +288,7 @@ def _fit_prediction_sets(
 def _fit_next_touch_model(examples: LabelledFeatures) -> NextTouchModel | None:
     """Return what textures look like under each motion, from the mean features of slides."""
     slides, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
-    means = np.zeros((len(slides), examples.values.shape[1]))
-    np.add.at(means, groups, examples.values)
-    means /= np.bincount(groups)[:, None]
+    means = slide_means(examples.values, groups)
     made = [examples.motions.get(slide) for slide in slides.tolist()]
     return NextTouchModel.of_slides(means, examples.labels[first].tolist(), made)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -21,6 +21,35 @@ class Predictor(Protocol):
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
 
 
+class HiddenPredictor(Protocol):
+    """A predictor with a hidden layer."""
+
+    def activations(self, values: Array) -> Array:
+        """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features)."""
+
+
+def hidden_layer(predictor: Predictor | HiddenPredictor) -> Callable[[Array], Array] | None:
+    """Return what computes the outputs of the hidden layer of a predictor; None if it has none."""
+    found: Callable[[Array], Array] | None = getattr(predictor, 'activations', None)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class FoldFit:
+    """What a learner has learnt without some slides.
+
+    Parameters
+    ----------
+    held_out
+        Numbers of the slides that it has not seen.
+    parameters
+        As in the model file, calibrated like the final ones.
+    """
+
+    held_out: Codes
+    parameters: Mapping[str, Any]
+
+
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """Fitted parameters of a learner.
@@ -33,11 +62,14 @@ class Fitted:
         Log-probabilities of each example by a learner that has not seen its slide; None if there are too few examples.
     note
         How the probabilities were calibrated, in words for the model's card.
+    folds
+        What the learner has learnt without each part of the slides; () if it does not say.
     """
 
     parameters: Mapping[str, Any]
     held_out: Array | None
     note: str
+    folds: Sequence[FoldFit] = ()
 
 
 class Learner(Protocol):

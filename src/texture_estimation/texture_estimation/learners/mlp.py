@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,9 @@ from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
+from texture_estimation.learners.augmented_examples import AugmentedBatches, AugmentedExamples
 from texture_estimation.learners.folds import assign_folds
-from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.learner import Codes, Fitted, FoldFit
 from texture_estimation.log_probabilities import log_loss, log_softmax
 
 Weights = list[NDArray[np.float32]]  # hidden: (n_features, hidden), (hidden,); output: (hidden, n_labels), (n_labels,)
@@ -66,23 +68,34 @@ class Mlp:
         low=0,
     )
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
+    def fit(self, values: Array, codes: Codes, groups: Codes, augmented: AugmentedExamples | None = None) -> Fitted:
+        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,).
+
+        With augmented examples, the number of passes counts those over the undisturbed ones. A network for the
+        calibration makes half of them.
+        """
         n_labels = int(codes.max()) + 1
         split = assign_folds(codes, groups, self.folds)
         if split is None:
-            return Fitted(self._fit(values, codes, n_labels), None, 'not calibrated, as a label has a single window')
+            fitted = self._fit(values, codes, n_labels, augmented)
+            return Fitted(fitted, None, 'not calibrated, as a label has a single window')
         folds_of, note = split
         scores = np.empty((len(codes), n_labels))
+        short = self if augmented is None else dataclasses.replace(self, epochs=-(-self.epochs // 2))
+        folds = []
         for part in np.unique(folds_of):
             held = folds_of == part
-            scores[held] = self.predictor(self._fit(values[~held], codes[~held], n_labels))(values[held])
+            slides = np.unique(groups[held])
+            rest = augmented.without(slides) if augmented else None
+            folds.append(FoldFit(slides, short._fit(values[~held], codes[~held], n_labels, rest)))
+            scores[held] = self.predictor(folds[-1].parameters)(values[held])
         best = minimize_scalar(
             lambda log_t: log_loss(log_softmax(scores / math.exp(log_t)), codes), bounds=(-2.0, 4.0), method='bounded'
         )
         temperature = math.exp(best.x)
-        fitted = self._fit(values, codes, n_labels, temperature)
-        return Fitted(fitted, log_softmax(scores / temperature), note)
+        fitted = _calibrated(self._fit(values, codes, n_labels, augmented), temperature)
+        folds = [FoldFit(fold.held_out, _calibrated(fold.parameters, temperature)) for fold in folds]
+        return Fitted(fitted, log_softmax(scores / temperature), note, folds)
 
     @staticmethod
     def predictor(folds_of: Mapping[str, Any]) -> MlpPredictor:
@@ -91,37 +104,63 @@ class Mlp:
         names = MlpPredictor.__dataclass_fields__
         return MlpPredictor(*(np.asarray(folds_of[name], dtype=np.float64, order='F') for name in names))
 
-    def _fit(self, values: Array, codes: Codes, n_labels: int, temperature: float = 1.0) -> dict[str, Array]:
-        """Return the layers, with standardisation and temperature worked into them."""
+    def _fit(self, values: Array, codes: Codes, n_labels: int, augmented: AugmentedExamples | None) -> dict[str, Array]:
+        """Return the layers, with the standardisation worked into them."""
         mean, scale = values.mean(axis=0), values.std(axis=0)
         scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # what is constant tells nothing
-        weights = self._descend(((values - mean) / scale).astype(np.float32), codes, n_labels)
+        inputs, rng = ((values - mean) / scale).astype(np.float32), np.random.default_rng(self.seed)
+        drawn: _Draws = (
+            AugmentedBatches(inputs, codes, augmented, rng, mean=mean, scale=scale)
+            if augmented
+            else _Batches(inputs, codes, rng)
+        )
+        weights = self._descend(drawn, inputs.shape, n_labels, rng)
         hidden, hidden_offset, output, output_offset = (part.astype(np.float64) for part in weights)
         hidden /= scale[:, None]
         return {
             'hidden': hidden,
             'hidden_offset': hidden_offset - mean @ hidden,
-            'output': output / temperature,
-            'output_offset': output_offset / temperature,
+            'output': output,
+            'output_offset': output_offset,
         }
 
-    def _descend(self, inputs: NDArray[np.float32], codes: Codes, n_labels: int) -> Weights:
-        rng = np.random.default_rng(self.seed)
-        weights = _first_weights(inputs.shape[1], self.hidden, n_labels, rng)
-        truth = np.eye(n_labels, dtype=np.float32)[codes]
-        batches = -(-len(inputs) // BATCH)
-        steps = max(self.epochs * batches, MIN_STEPS)
+    def _descend(self, drawn: _Draws, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator) -> Weights:
+        """Return the weights after all passes over so many examples, (n, n_features)."""
+        n_examples, n_features = shape
+        weights = _first_weights(n_features, self.hidden, n_labels, rng)
+        truth = np.eye(n_labels, dtype=np.float32)
+        steps = max(self.epochs * -(-n_examples // BATCH), MIN_STEPS)
         adam = _Adam(weights)
         for step in range(steps):
-            if step % batches == 0:
-                order = rng.permutation(len(inputs))
-            rows = order[step % batches :: batches]
-            noisy = inputs[rows] + np.float32(self.noise) * rng.standard_normal(inputs[rows].shape, dtype=np.float32)
-            slopes = _slopes(weights, noisy, truth[rows])
+            inputs, codes = drawn.draw(min(BATCH, n_examples))
+            noisy = inputs + np.float32(self.noise) * rng.standard_normal(inputs.shape, dtype=np.float32)
+            slopes = _slopes(weights, noisy, truth[codes])
             for layer in (0, 2):
-                slopes[layer] += np.float32(self.decay / len(inputs)) * weights[layer]
+                slopes[layer] += np.float32(self.decay / n_examples) * weights[layer]
             adam.step(weights, slopes, RATE * 0.5 * (1.0 + math.cos(math.pi * step / steps)))
         return weights
+
+
+class _Draws(Protocol):
+    def draw(self, count: int) -> tuple[NDArray[np.float32], Codes]:
+        """Return standardised inputs, (about count, n_features), and their labels."""
+
+
+class _Batches:
+    """The examples in batches of nearly equal size, in a new order at each pass."""
+
+    def __init__(self, inputs: NDArray[np.float32], codes: Codes, rng: np.random.Generator) -> None:
+        self._inputs, self._codes, self._rng = inputs, codes, rng
+        self._count = -(-len(inputs) // BATCH)
+        self._drawn = 0
+        self._order: Codes = np.zeros(0, np.intp)
+
+    def draw(self, _count: int) -> tuple[NDArray[np.float32], Codes]:
+        if self._drawn % self._count == 0:
+            self._order = self._rng.permutation(len(self._inputs))
+        rows = self._order[self._drawn % self._count :: self._count]
+        self._drawn += 1
+        return self._inputs[rows], self._codes[rows]
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,14 +180,24 @@ class MlpPredictor:
     output: Array
     output_offset: Array
 
-    def __call__(self, values: Array) -> Array:
-        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        active = values @ self.hidden
+    def activations(self, values: Array) -> Array:
+        """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features)."""
+        active: Array = values @ self.hidden
         active += self.hidden_offset
         np.maximum(active, 0.0, out=active)
-        scores: Array = active @ self.output
+        return active
+
+    def __call__(self, values: Array) -> Array:
+        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
+        scores: Array = self.activations(values) @ self.output
         scores += self.output_offset
         return scores
+
+
+def _calibrated(parameters: Mapping[str, Array], temperature: float) -> dict[str, Array]:
+    """Return the layers with the temperature worked into them."""
+    output = {name: parameters[name] / temperature for name in ('output', 'output_offset')}
+    return {**parameters, **output}
 
 
 class _Adam:

@@ -1,180 +1,262 @@
-"""Novelty detection: the distance of a slide to the training slides."""
+"""Novelty detection: how rare a slide is among those of the class for which it is taken."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.learners.learner import Codes
+from texture_estimation.open_set.class_distance import ClassDistance
 
-# Chosen on slides 1-24 against 25-30 of recorded materials, five of twenty left out of the training.
-NEAREST = 3  # slides to which the distance counts: one alone may be an odd one
-SHRINKAGE = 0.6  # of the covariances towards their diagonals: there are hardly more slides than features
-FLOOR = 0.18  # of the mean variance within surfaces, added to each
-SMALLEST = 1e-9  # variance within surfaces, in that of all: slides that are the same to the last bit
-FOLDS = 5
-MIN_SLIDES = 3  # of a surface: with one held out, two tell how much slides differ
-# Lengths of evidence at which the threshold is fitted, in windows that do not overlap. The start of a slide is like no
-# other part, so slides are compared by the same stretch: by all that was measured, up to the last of these.
+# Lengths of evidence at which tails and thresholds are fitted, in windows that do not overlap. The start of a slide is
+# like no other part, so slides are compared by the same stretch: by all that was measured, up to the last of these.
 EFFECTIVE_WINDOWS = (1.0, 1.5, 2.0, 3.0, 5.0)
+# Spaces in which a slide is compared with the slides of its class, and the length of its start that is compared. The
+# first windows of slides are compared by themselves, as this shows soonest that something differs.
+FEATURES, HIDDEN, ONSET = 'features', 'hidden', 'onset'
+SPACES: Mapping[str, float] = {FEATURES: EFFECTIVE_WINDOWS[-1], HIDDEN: EFFECTIVE_WINDOWS[-1], ONSET: 1.5}
+OTHER_SCORES = 2  # negative log-odds of the best to the second label, negative fraction of windows that agree with it
+TAIL_QUANTILE = 0.9
+LEAST_SPREAD = 1e-6  # of a score, relative to its median: slides that are all the same
+LEAST_AGREEMENT_SPREAD = 0.1  # in most slides all windows may agree, which makes one that does not no novelty
 
 
 @dataclass(frozen=True, eq=False)
 class NoveltyDetector:
-    """Novelty score of the mean features of a slide, and the threshold above which the surface is unknown.
+    """Sum of the one-sided tails of several scores, and the threshold above which the surface is unknown.
 
-    The score is the squared distance to the nearest training slides less that to the centre of all surfaces, in the
-    metric of the covariance within surfaces, as in probabilistic linear discriminant analysis.
+    Each score is compared with those of training slides when they were held out and labelled rightly: what exceeds the
+    median counts in units of the distance from the median to the 90 % quantile, which is the negative logarithm of an
+    exponential tail but for a factor; what lies below counts nothing, so no score makes up for another. The thresholds
+    are those of split conformal prediction.
 
-    Source: Ioffe 2006, "Probabilistic linear discriminant analysis", with slides in place of the mean of a class.
+    Source: Fisher 1932 for the sum of logarithms of tail probabilities; Vovk, Gammerman & Shafer 2005 for thresholds.
 
     Parameters
     ----------
-    projection : (n_features, n_features)
-        Makes the covariance within surfaces the identity, and that between them diagonal.
-    references : (n_slides, n_features)
-        Training slides, projected.
-    centre, weights : (n_features,)
-        Mean of the surfaces, projected, and one over the variance about it.
-    effective_window_counts, thresholds : (n,)
-        Score that known surfaces exceed at the false rejection rate, by the effective window count.
+    distances
+        By space, in the order of the scores: mean features, mean outputs of the hidden layer if the classifier has one,
+        mean features of the onset.
+    medians, spreads : (n_levels, n_scores)
+        Of the scores of held-out slides, by the effective window count.
+    thresholds, distance_thresholds : (n_levels,)
+        Largest novelty score of known surfaces at the false rejection rate: of all scores, and of the distances alone.
+    distances_only
+        Whether the distances alone count: the other scores of an incremental classifier are of another size.
     """
 
-    projection: Array
-    references: Array
-    centre: Array
-    weights: Array
-    effective_window_counts: Array
+    distances: Mapping[str, ClassDistance]
+    medians: Array
+    spreads: Array
     thresholds: Array
-
-    @cached_property
-    def _squares(self) -> Array:
-        squares: Array = np.einsum('ij,ij->i', self.references, self.references)
-        return squares
+    distance_thresholds: Array
+    distances_only: bool = False
 
     @classmethod
     def fit(
-        cls, values: Array, codes: Codes, groups: Codes, overlap: float, false_rejection_rate: float
-    ) -> NoveltyDetector | None:
-        """Fit to the windows of slides, in temporal order; return None if there are too few.
-
-        Each surface needs LEAST_SLIDES, and all together one over the share of false rejections.
+        cls, distances: Mapping[str, ClassDistance], held_out: Sequence[Array], false_rejection_rate: float
+    ) -> NoveltyDetector:
+        """Fit tails and thresholds.
 
         Parameters
         ----------
-        values : (n, n_features)
-        codes, groups : (n,)
-            Number of the surface and of the slide of each window.
-        overlap
-            Distance of two windows over their length, at most 1.
+        distances
+            Fitted to all slides.
+        held_out : of each of EFFECTIVE_WINDOWS (n_slides, n_scores)
+            Scores of slides when they were held out and labelled rightly.
         false_rejection_rate
-            Share of the slides over known surfaces that may be taken for unknown: of new slides like those held out, no
-            more are, on average.
+            Fraction of the slides over known surfaces that may be taken for unknown: of new slides like those held out,
+            no more are, on average. With too few slides for the fraction, none of those held out is.
         """
-        slides = [np.flatnonzero(groups == group) for group in np.unique(groups)]
-        surfaces = codes[[rows[0] for rows in slides]]
-        allowed = math.floor((len(slides) + 1) * false_rejection_rate)
-        own = np.unique(surfaces, return_counts=True)[1]
-        if len(own) < 2 or own.min() < MIN_SLIDES or not allowed:
-            return None
-        means = np.stack([values[rows[: _count(EFFECTIVE_WINDOWS[-1], overlap)]].mean(axis=0) for rows in slides])
-        novelty_scores: list[list[float]] = [[] for _ in EFFECTIVE_WINDOWS]
-        for train, test in _folds(surfaces):
-            known = cls._of(means[train], surfaces[train])
-            for slide in np.flatnonzero(test):
-                for level, effective_windows in enumerate(EFFECTIVE_WINDOWS):
-                    part = slides[slide][: _count(effective_windows, overlap)]
-                    novelty_scores[level].append(float(known.novelty_score(values[part].mean(axis=0))))
-        thresholds = [sorted(level)[-allowed] for level in novelty_scores]
-        whole = cls._of(means, surfaces)
-        return cls(
-            whole.projection,
-            whole.references,
-            whole.centre,
-            whole.weights,
-            np.array(EFFECTIVE_WINDOWS),
-            np.array(thresholds),
+        medians = np.stack([np.median(scores, axis=0) for scores in held_out])
+        spreads = np.stack([np.quantile(scores, TAIL_QUANTILE, axis=0) for scores in held_out]) - medians
+        spreads = np.maximum(spreads, LEAST_SPREAD * (1.0 + np.abs(medians)))
+        if spreads.shape[1] == len(distances) + OTHER_SCORES:
+            spreads[:, -1] = np.maximum(spreads[:, -1], LEAST_AGREEMENT_SPREAD)
+        tails = [
+            np.maximum(scores - median, 0.0) / spread
+            for scores, median, spread in zip(held_out, medians, spreads, strict=True)
+        ]
+        thresholds, distance_thresholds = (
+            np.array([_conformal(tail[:, :count].sum(axis=1), false_rejection_rate) for tail in tails])
+            for count in (None, len(distances))
         )
+        return cls(distances, medians, spreads, thresholds, distance_thresholds)
 
-    def novelty_score(self, mean_values: Array) -> float:
-        """Return the novelty score of the mean (n_features,) of the first windows of a slide."""
-        projected = mean_values @ self.projection
-        off = self._squares - 2.0 * (self.references @ projected)
-        near = np.partition(off, min(NEAREST, len(off)) - 1)[:NEAREST]
-        away = projected - self.centre
-        return float(near.mean() + projected @ projected - (away * away) @ self.weights)
+    @cached_property
+    def _levels(self) -> list[tuple[float, ...]]:
+        """By level, one number after the other: threshold, then medians, then spreads of the scores that count."""
+        count = len(self.distances) if self.distances_only else self.medians.shape[1]
+        thresholds = self.distance_thresholds if self.distances_only else self.thresholds
+        table = np.column_stack([thresholds, self.medians[:, :count], self.spreads[:, :count]])
+        return [tuple(row) for row in table.tolist()]
 
-    def is_known(self, mean_values: Array, effective_windows: float) -> bool:
-        """Return whether the novelty score is below the threshold for this effective window count."""
-        return self.novelty_score(mean_values) <= float(
-            np.interp(effective_windows, self.effective_window_counts, self.thresholds)
-        )
+    def novelty_score(self, scores: Sequence[float], effective_windows: float) -> float:
+        """Return the novelty score from the scores of a slide after this effective window count."""
+        row = self._row(effective_windows)
+        count = len(row) // 2
+        medians, spreads = row[1 : 1 + count], row[1 + count :]
+        tails = zip(scores, medians, spreads, strict=False)
+        return sum((score - median) / spread for score, median, spread in tails if score > median)
 
-    def with_slides(self, slides: Sequence[Array], overlap: float) -> NoveltyDetector:
-        """Return the detector with more reference slides, (n_windows, n_features) each, in temporal order."""
-        means = np.stack([values[: _count(EFFECTIVE_WINDOWS[-1], overlap)].mean(axis=0) for values in slides])
-        references = np.concatenate([self.references, means @ self.projection])
-        return NoveltyDetector(
-            self.projection, references, self.centre, self.weights, self.effective_window_counts, self.thresholds
-        )
+    def threshold(self, effective_windows: float) -> float:
+        """Return the largest novelty score of a known surface after this effective window count."""
+        return self._row(effective_windows)[0]
+
+    def _row(self, effective_windows: float) -> list[float]:
+        """Return the row of `_levels`, linear between two levels."""
+        after = bisect_right(EFFECTIVE_WINDOWS, effective_windows)
+        if after == 0 or after == len(EFFECTIVE_WINDOWS):
+            return list(self._levels[max(after - 1, 0)])
+        low, high = EFFECTIVE_WINDOWS[after - 1], EFFECTIVE_WINDOWS[after]
+        share = (effective_windows - low) / (high - low)
+        pairs = zip(self._levels[after - 1], self._levels[after], strict=True)
+        return [first + share * (second - first) for first, second in pairs]
+
+    def with_slides(self, slides: Sequence[Mapping[str, Array]], classes: Codes) -> NoveltyDetector:
+        """Return the detector of an incremental classifier, with added slides.
+
+        Parameters
+        ----------
+        slides
+            Mean of each slide by space, as `space_means` returns it.
+        classes : (n_slides,)
+            Number of the label of each.
+        """
+        distances = {
+            space: distance.with_slides(np.stack([means[space] for means in slides]), classes)
+            for space, distance in self.distances.items()
+        }
+        return replace(self, distances=distances, distances_only=True)
 
     def as_arrays(self) -> dict[str, AnyArray]:
         """Return the arrays for the model file."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+        numbers = {name: getattr(self, name) for name in ('medians', 'spreads', 'thresholds', 'distance_thresholds')}
+        spaces = {
+            f'{space}/{name}': array
+            for space, distance in self.distances.items()
+            for name, array in distance.as_arrays().items()
+        }
+        return {**numbers, **spaces}
 
     @classmethod
-    def from_arrays(cls, parameters: Mapping[str, Any]) -> NoveltyDetector:
+    def from_arrays(cls, arrays: Mapping[str, Any]) -> NoveltyDetector:
         """Return what `as_arrays` gave."""
-        return cls(*(np.asarray(parameters[name], dtype=np.float64) for name in cls.__dataclass_fields__))
-
-    @classmethod
-    def _of(cls, means: Array, surfaces: Codes) -> NoveltyDetector:
-        """Learn the distance from slides, without limits."""
-        names, codes = np.unique(surfaces, return_inverse=True)
-        scale = means.std(axis=0)
-        scale[scale <= 1e-12 * np.abs(means).max(axis=0)] = np.inf  # what is constant tells nothing
-        scaled = means / scale
-        own = np.stack([scaled[codes == code].mean(axis=0) for code in range(len(names))])
-        centre = own.mean(axis=0)
-        within = _covariance(scaled - own[codes], len(means) - len(names))
-        floor = FLOOR * max(float(np.diag(within).mean()), SMALLEST)
-        between = _covariance(own - centre, len(names) - 1)
-        spread, directions = eigh(between, within + floor * np.eye(len(within)))
-        nothing = np.zeros(0)
-        return cls(
-            projection=directions / scale[:, None],
-            references=scaled @ directions,
-            centre=centre @ directions,
-            weights=1.0 / (1.0 + np.maximum(spread, 0.0)),
-            effective_window_counts=nothing,
-            thresholds=nothing,
+        distances = {
+            space: ClassDistance.from_arrays(
+                {
+                    name.removeprefix(f'{space}/'): array
+                    for name, array in arrays.items()
+                    if name.startswith(f'{space}/')
+                }
+            )
+            for space in SPACES
+            if f'{space}/projection' in arrays
+        }
+        medians, spreads, thresholds, distance_thresholds = (
+            np.asarray(arrays[name], dtype=np.float64)
+            for name in ('medians', 'spreads', 'thresholds', 'distance_thresholds')
         )
+        return cls(distances, medians, spreads, thresholds, distance_thresholds)
 
 
-def _count(effective_windows: float, overlap: float) -> int:
+class SlideNovelty:
+    """Accumulate what the scores of one slide depend on, window by window.
+
+    Parameters
+    ----------
+    distances
+        By space, as in `NoveltyDetector`.
+    n_labels
+        Number of labels of the classifier.
+    """
+
+    def __init__(self, distances: Mapping[str, ClassDistance], n_labels: int) -> None:
+        self._distances = distances
+        self._sums: dict[str, Array] = {}
+        self._counts = dict.fromkeys(distances, 0)
+        self._votes = [0] * n_labels
+        self._windows = 0
+        # Sums stop changing after a few windows, and the label rarely changes.
+        self._found: dict[tuple[str, int], float] = {}
+
+    def add(self, values: Array, hidden: Array | None, label: int, effective_windows: float) -> None:
+        """Add a window.
+
+        Parameters
+        ----------
+        values : (n_features,)
+        hidden : (n_hidden,) or None
+            Outputs of the hidden layer.
+        label
+            Number of the best label of this window alone.
+        effective_windows
+            Effective window count including this window.
+        """
+        self._windows += 1
+        self._votes[label] += 1
+        if effective_windows > EFFECTIVE_WINDOWS[-1] + 1e-9 and self._sums:
+            return
+        self._found.clear()
+        for space in self._distances:
+            if effective_windows > SPACES[space] + 1e-9 and self._counts[space]:
+                continue
+            own = hidden if space == HIDDEN and hidden is not None else values
+            self._sums[space] = self._sums[space] + own if self._counts[space] else own
+            self._counts[space] += 1
+
+    def scores(self, label: int, log_odds: float) -> list[float]:
+        """Return the scores for a label: distances, then what `OTHER_SCORES` counts; larger ones are rarer.
+
+        Parameters
+        ----------
+        label
+            Number of the best label of the slide.
+        log_odds
+            Mean evidence of it less that of the second best label.
+        """
+        distances = [self._distance(space, label) for space in self._distances]
+        return [*distances, -log_odds, -self._votes[label] / self._windows]
+
+    def _distance(self, space: str, label: int) -> float:
+        found = self._found.get((space, label))
+        if found is None:
+            found = self._distances[space].score(self._sums[space] / self._counts[space], label)
+            self._found[space, label] = found
+        return found
+
+
+def space_means(values: Array, hidden: Array | None, overlap: float) -> dict[str, Array]:
+    """Return the mean of the windows of a slide in each space.
+
+    Parameters
+    ----------
+    values : (n_windows, n_features)
+        In temporal order.
+    hidden : (n_windows, n_hidden) or None
+        Outputs of the hidden layer.
+    overlap
+        Distance of two windows over their length, at most 1.
+    """
+    by_space = {FEATURES: values, HIDDEN: hidden, ONSET: values}
+    return {
+        space: own[: window_count(SPACES[space], overlap)].mean(axis=0)
+        for space, own in by_space.items()
+        if own is not None
+    }
+
+
+def window_count(effective_windows: float, overlap: float) -> int:
     """Return how many windows count as so many that do not overlap."""
     return 1 + round((effective_windows - 1.0) / overlap)
 
 
-def _covariance(deviations: Array, freedom: int) -> Array:
-    """Return the covariance, drawn to its diagonal: few surfaces do not show all directions in which others differ."""
-    covariance = deviations.T @ deviations / max(freedom, 1)
-    shrunk: Array = (1.0 - SHRINKAGE) * covariance + SHRINKAGE * np.diag(np.diag(covariance))
-    return shrunk
-
-
-def _folds(surfaces: Codes) -> Iterator[tuple[AnyArray, AnyArray]]:
-    """Yield train and test slides of each part; neighbours in time are apart, for a limit that is not too generous."""
-    part = np.empty(len(surfaces), dtype=np.intp)
-    for surface in np.unique(surfaces):
-        rows = np.flatnonzero(surfaces == surface)
-        part[rows] = np.arange(len(rows)) % FOLDS
-    for held in np.unique(part):
-        yield part != held, part == held
+def _conformal(novelty_scores: Array, false_rejection_rate: float) -> float:
+    rank = max(1, int((len(novelty_scores) + 1) * false_rejection_rate))
+    return float(np.sort(novelty_scores)[-rank])

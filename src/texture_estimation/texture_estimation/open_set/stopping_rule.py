@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,13 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 
 Mask = NDArray[np.bool_]
-# Rules tried: end at this confidence, or after so much sliding whatever the confidence. In windows that do not overlap.
+# Rules tried: end at this confidence and novelty score, or after so much sliding whatever they are. Without a novelty
+# detector the novelty score is 0. In windows that do not overlap.
 CONFIDENCES = 1.0 - np.geomspace(0.5, 1e-4, 50)
 MAX_WINDOWS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0)
+NEVER = 1e6
+NOVELTY_SCORES = (NEVER, 9.0, 6.0, 4.5, 3.5, 2.5, 2.0, 1.5, 1.0)
+MAX_DISTURBED_ERRORS = 0.03  # of the slides disturbed in one way that may be stopped with a wrong label
 
 
 @dataclass(frozen=True)
@@ -29,14 +34,46 @@ class StoppingRule:
         Decision threshold on the probability of the best label.
     max_windows
         Effective window count at which a slide is stopped whatever the confidence.
+    novelty_score
+        Largest novelty score at which a slide is stopped.
     """
 
     confidence: float = 0.95
-    max_windows: float = 1e6
+    max_windows: float = NEVER
+    novelty_score: float = NEVER
 
-    def certain(self, confidence: float, effective_windows: float) -> bool:
+    def certain(self, confidence: float, effective_windows: float, novelty_score: float = 0.0) -> bool:
         """Return whether the slide may end."""
-        return confidence >= self.confidence or effective_windows >= self.max_windows
+        confident = confidence >= self.confidence and novelty_score <= self.novelty_score
+        return confident or effective_windows >= self.max_windows
+
+
+@dataclass(frozen=True, eq=False)
+class SlideCourse:
+    """What was said of one held-out slide after each window.
+
+    Parameters
+    ----------
+    confidences : (n_windows,)
+        Of the best label.
+    right : (n_windows,)
+        Whether it is the true one.
+    effective_windows : (n_windows,)
+        Length of the evidence.
+    known : (n_windows,)
+        Whether the surface was taken for known; all without a novelty detector.
+    novelty_scores : (n_windows,)
+        0 without a novelty detector.
+    disturbance
+        Kind of the disturbance; '' for none.
+    """
+
+    confidences: Array
+    right: Mask
+    effective_windows: Array
+    known: Mask
+    novelty_scores: Array
+    disturbance: str = ''
 
 
 def fit_stopping_rule(
@@ -58,6 +95,63 @@ def fit_stopping_rule(
     least = max(wrong, min(errors for errors, _ in outcomes))
     good = [(mean, number) for number, (errors, mean) in enumerate(outcomes) if errors <= least]
     return tried[min(good)[1]]
+
+
+def fit_open_set_rule(courses: Sequence[SlideCourse], wrong: float) -> StoppingRule:
+    """Return the rule with the shortest mean undisturbed slide that rarely stops a slide with a wrong label.
+
+    A slide is stopped only while its surface is taken for known. At most `wrong` of the undisturbed slides, and
+    MAX_DISTURBED_ERRORS of those disturbed in each way, may be stopped with a wrong label; if no rule reaches this, the
+    one that exceeds it least is returned.
+
+    Parameters
+    ----------
+    courses
+        Of undisturbed slides and of disturbed copies.
+    wrong
+        Share of the undisturbed slides that may be stopped with a wrong label.
+    """
+    table = _CourseTable(courses)
+    kinds = {'': wrong} | {course.disturbance: MAX_DISTURBED_ERRORS for course in courses if course.disturbance}
+    best, rule = (np.inf, np.inf), StoppingRule()
+    for confidence, novelty_score in product(CONFIDENCES.tolist(), NOVELTY_SCORES):
+        errors, windows = table.outcome(confidence, novelty_score)
+        excess = sum(max(0.0, errors[kind] - allowed) for kind, allowed in kinds.items())
+        if (excess, windows) < best:
+            best, rule = (excess, windows), StoppingRule(confidence, NEVER, novelty_score)
+    return rule
+
+
+class _CourseTable:
+    """Courses as arrays (n_slides, n_windows), the shorter ones filled with what never stops a slide."""
+
+    def __init__(self, courses: Sequence[SlideCourse]) -> None:
+        longest = max(len(course.right) for course in courses)
+
+        def filled(rows: Iterable[Array | Mask], value: float) -> Array:
+            table = np.full((len(courses), longest), value)
+            for number, row in enumerate(rows):
+                table[number, : len(row)] = row
+            return table
+
+        known = filled((course.known for course in courses), 0.0) > 0.0
+        self._confidences = np.where(known, filled((course.confidences for course in courses), -1.0), -1.0)
+        self._wrong = filled((~course.right for course in courses), 0.0) > 0.0
+        self._novelty = filled((course.novelty_scores for course in courses), np.inf)
+        self._windows = filled((course.effective_windows for course in courses), np.nan)
+        self._whole = np.array([course.effective_windows[-1] for course in courses])
+        kinds = np.array([course.disturbance for course in courses])
+        self._kinds = {str(kind): kinds == kind for kind in np.unique(kinds)}
+
+    def outcome(self, confidence: float, novelty_score: float) -> tuple[dict[str, float], float]:
+        """Return the share of slides stopped with a wrong label, by disturbance, and the mean undisturbed evidence."""
+        stops = (self._confidences >= confidence) & (self._novelty <= novelty_score)
+        places, stopped = stops.argmax(axis=1), stops.any(axis=1)
+        rows = np.arange(len(places))
+        wrong = stopped & self._wrong[rows, places]
+        taken = np.where(stopped, self._windows[rows, places], self._whole)
+        errors = {kind: float(wrong[own].mean()) for kind, own in self._kinds.items()}
+        return errors, float(taken[self._kinds['']].mean())
 
 
 def _outcome(

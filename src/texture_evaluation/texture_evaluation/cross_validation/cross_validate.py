@@ -163,8 +163,9 @@ def cross_validate(
     splits = _split(splitter, dataset.labels, columns)
     tested = dataset.features(recipe.feature_set)
     trained = tested
-    if recipe.training_windows != recipe.feature_set.windows:
-        trained = dataset.features(replace(recipe.feature_set, windows=recipe.training_windows, _layouts={}))
+    if recipe.training_windows != recipe.feature_set.windows or recipe.augmentation.copies:
+        windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+        trained = dataset.features(windows, recipe.augmentation)
     names = dataset.names
     jobs = [
         (

@@ -1,0 +1,80 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_benchmarks.result import BenchmarkOptions
+from texture_benchmarks.robustness.scenes import FORCE_N, SCENE, SLIDE_S, SPEED_M_S, TouchConditions
+from texture_benchmarks.robustness.scenes import simulate_slide_signals as simulate
+from texture_benchmarks.trust.run import run
+from texture_benchmarks.trust.trial import ROWS, UNDISTURBED, Outcome, Row, disturbed
+from texture_core.estimates import TextureEstimate
+from texture_evaluation.metrics import SlideResult
+from texture_recordings.slides import LabelledSlide
+from texture_simulation.scene import load_scene
+from texture_simulation.simulated_slide import SimulatedSlide
+
+
+@pytest.fixture(scope='module')
+def slide() -> LabelledSlide:
+    conditions = TouchConditions(load_scene(SCENE), SimulatedSlide(SPEED_M_S, FORCE_N, SLIDE_S))
+    return simulate(conditions, 1, np.random.default_rng(0))[0]
+
+
+@pytest.fixture(params=ROWS)
+def row(request: pytest.FixtureRequest) -> Row:
+    return ROWS[request.param]
+
+
+def samples(item: LabelledSlide) -> np.ndarray:
+    return np.concatenate([batch.samples for batch in item.signals['signal']])
+
+
+def test_every_row_changes_the_samples_and_keeps_the_slide(row: Row, slide: LabelledSlide) -> None:
+    for strength in row.strengths:
+        # A short slide may lose nothing of one in a thousand, so some seeds are tried.
+        changed = [disturbed(slide, row, strength, np.random.default_rng(seed)) for seed in range(40)]
+        assert changed[0].name == slide.name
+        before = samples(slide)
+        assert any(_differ(samples(one), before) for one in changed)
+
+
+def _differ(own: np.ndarray, before: np.ndarray) -> bool:
+    return own.shape != before.shape or not np.array_equal(own, before, equal_nan=True)
+
+
+def test_the_same_other_finger_touches_all_slides(slide: LabelledSlide) -> None:
+    finger = ROWS['another finger']
+    one, other = (samples(disturbed(slide, finger, 2.0, np.random.default_rng(seed))) for seed in (0, 1))
+    np.testing.assert_array_equal(one, other)
+
+
+def estimate(label: str, *, known: bool, decided: bool, evidence_s: float, final: bool = False) -> TextureEstimate:
+    return TextureEstimate(
+        stamp_ns=0, exploration_id='e', final=final, label=label, known=known, decided=decided, windows=1,
+        evidence_s=evidence_s,
+    )  # fmt: skip
+
+
+def test_outcomes_are_counted_at_the_first_certain_estimate_and_at_the_end() -> None:
+    unsure = estimate('felt', known=True, decided=False, evidence_s=0.5)
+    right = estimate('cork', known=True, decided=True, evidence_s=1.0)
+    wrong = estimate('felt', known=True, decided=True, evidence_s=1.5)
+    rejected = estimate('cork', known=False, decided=False, evidence_s=2.0)
+    slides = [[unsure, right, wrong], [unsure, wrong, rejected], [unsure, rejected], []]
+    outcome = Outcome.of([SlideResult('cork', [], estimates) for estimates in slides])
+    assert dataclasses.astuple(outcome) == (4, 1, 1, 0, 1, pytest.approx(1.5), 2)
+
+
+def test_the_quick_form_on_simulated_slides_gives_figures_and_a_chart(tmp_path: Path) -> None:
+    result = run(BenchmarkOptions(out=tmp_path, quick=True))
+    assert [chart.name for chart in result.charts] == ['trust.png']
+    outcomes = result.numbers['fast']['outcomes']
+    assert 'simulated' in result.data
+    assert len(outcomes) == 1 + 8 + 3
+    clean = outcomes[UNDISTURBED]
+    assert clean['slides'] == 36
+    assert clean['label_right'] > 18  # chance is 3
+    for outcome in outcomes.values():
+        assert outcome['early_right'] + outcome['early_wrong'] <= outcome['slides']

@@ -1,0 +1,160 @@
+"""Slides under a disturbance, and whether they end right, unknown or with a wrong label taken for known."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_benchmarks.recipes.trial import at_rate, extract_features
+from texture_benchmarks.robustness.degradations import DEGRADATIONS
+from texture_core.arrays import Array
+from texture_core.features import FeatureVector
+from texture_core.signal import TactileSignal
+from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.model import TextureModel
+from texture_evaluation.metrics import SlideResult
+from texture_features.augmentation.disturbances import smooth_response
+from texture_recordings.slides import LabelledSlide
+
+VIBRATION = 'signal'
+FINGER_SEED = 7  # the same other finger for all slides
+UNDISTURBED = 'undisturbed'
+# (samples (n, n_channels), rate in Hz, strength, random, whether it is the vibration) -> samples
+Change = Callable[[Array, float, float, np.random.Generator, bool], Array]
+
+
+def _shared(name: str) -> Change:
+    """Return a degradation of both inputs."""
+    change = DEGRADATIONS[name].change
+    return lambda samples, rate_hz, strength, rng, _vibration: change(samples, rate_hz, strength, rng)
+
+
+def _of_vibration(name: str) -> Change:
+    """Return a degradation of the vibration alone."""
+    change = DEGRADATIONS[name].change
+    return lambda samples, rate_hz, strength, rng, vibration: (
+        change(samples, rate_hz, strength, rng) if vibration else samples
+    )
+
+
+def _other_finger(
+    samples: Array, _rate_hz: float, strength: float, _rng: np.random.Generator, vibration: bool
+) -> Array:
+    """Filter the vibration by one smooth random response (dB); other gains and offsets of the slow channels."""
+    rng = np.random.default_rng([FINGER_SEED, round(1000 * strength), vibration])
+    mean: Array = samples.mean(axis=0)
+    deviation = samples - mean
+    if vibration:
+        response = smooth_response(len(samples) // 2 + 1, strength, rng)
+        filtered: Array = np.fft.irfft(np.fft.rfft(deviation, axis=0) * response[:, None], len(samples), axis=0)
+        return mean + filtered
+    gains = np.exp(0.05 * strength * rng.standard_normal(samples.shape[1]))
+    offsets = 3.0 * strength * rng.standard_normal(samples.shape[1])
+    changed: Array = mean + gains * deviation + offsets
+    return changed
+
+
+@dataclass(frozen=True)
+class Row:
+    """One disturbance at several strengths."""
+
+    change: Change
+    strengths: Sequence[float]
+    axis: str
+
+
+ROWS: Mapping[str, Row] = {
+    'gain': Row(_of_vibration('lower gain'), (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0), 'factor'),
+    'white noise': Row(_shared('white noise'), (0.003, 0.01, 0.03, 0.1), "of the slide's rms"),
+    'speed': Row(_shared('slower than trained'), (0.4, 0.7, 0.9, 0.95, 1.05, 1.1, 1.4, 2.0), 'of that trained'),
+    'another finger': Row(_other_finger, (1.0, 2.0, 4.0), 'dB'),
+    'wear': Row(_of_vibration('wear'), (800.0, 300.0), 'cut-off (Hz)'),
+    'offset drift': Row(_shared('offset drift'), (0.1, 1.0, 10.0), 'rms/s'),
+    'lost samples': Row(_of_vibration('lost samples'), (0.001, 0.005, 0.01), 'fraction'),
+    'hidden losses': Row(_of_vibration('losses hidden'), (0.003, 0.01, 0.03, 0.1), 'fraction'),
+    'clipped': Row(_of_vibration('clipping'), (3.0, 2.0, 1.0), 'rms'),
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the slides of one cell ended.
+
+    Parameters
+    ----------
+    slides
+        How many.
+    early_right, early_wrong
+        Slides with a right and with a wrong label at the first certain estimate; the others were never certain.
+    final_right, final_wrong
+        Slides with a right and with a wrong label that were taken for known at the end; the others were rejected.
+    mean_s
+        Mean sliding time until the first certain estimate, or to the end.
+    label_right
+        Slides with the right label at the end, whether they were taken for known or not.
+    """
+
+    slides: int
+    early_right: int
+    early_wrong: int
+    final_right: int
+    final_wrong: int
+    mean_s: float
+    label_right: int
+
+    @classmethod
+    def of(cls, results: Sequence[SlideResult]) -> Outcome:
+        """Return the outcome of slides; one without a window counts as rejected."""
+        measured = [result for result in results if result.estimates]
+        first = [(next((e for e in result.estimates if e.decided), None), result) for result in measured]
+        early = [estimate.label == result.surface for estimate, result in first if estimate is not None]
+        final = [result.end.label == result.surface for result in measured if result.end.known]
+        times = [(estimate or result.estimates[-1]).evidence_s for estimate, result in first]
+        return cls(
+            slides=len(results),
+            early_right=sum(early),
+            early_wrong=len(early) - sum(early),
+            final_right=sum(final),
+            final_wrong=len(final) - sum(final),
+            mean_s=float(np.mean(times)) if times else math.nan,
+            label_right=sum(result.end.label == result.surface for result in measured),
+        )
+
+
+def disturbed(item: LabelledSlide, row: Row, strength: float, rng: np.random.Generator) -> LabelledSlide:
+    """Return a slide under a disturbance of this strength."""
+    signals = {topic: _changed(item, topic, row, strength, rng) for topic in item.signals}
+    return dataclasses.replace(item, signals=signals)
+
+
+def evaluate_slides(model: TextureModel, slides: Sequence[LabelledSlide]) -> list[SlideResult]:
+    """Return what a model says of slides, window by window."""
+    return [evaluate_vectors(model, item.surface, extract_features(model.recipe, item)) for item in slides]
+
+
+def evaluate_vectors(model: TextureModel, surface: str, vectors: Sequence[FeatureVector]) -> SlideResult:
+    """Return what a model says of the windows of one slide."""
+    evidence = EvidenceAccumulator(model)
+    estimates = [evidence.update(vector) for vector in vectors]
+    alone = model.decide(np.stack([vector.values for vector in vectors])) if vectors else []
+    return SlideResult(surface, alone, [estimate for estimate in estimates if estimate.windows])
+
+
+def _changed(
+    item: LabelledSlide, topic: str, row: Row, strength: float, rng: np.random.Generator
+) -> list[TactileSignal]:
+    batches = item.signals[topic]
+    whole = at_rate(item, topic, batches[0].sampling_rate_hz).signals[topic]
+    return [
+        dataclasses.replace(
+            run,
+            samples=row.change(
+                run.samples.astype(np.float64), run.sampling_rate_hz, strength, rng, topic == VIBRATION
+            ).astype(np.float32),
+        )
+        for run in whole
+    ]

@@ -1,0 +1,200 @@
+"""Fit novelty detection on slides held out of the training, and follow these slides window by window."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_estimation.classification.evidence_rules import EvidenceRule
+from texture_estimation.learners.folds import assign_folds
+from texture_estimation.learners.learner import Codes, Fitted, Learner, Predictor, hidden_layer
+from texture_estimation.open_set.class_distance import ClassDistance
+from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, NoveltyDetector, SlideNovelty, space_means
+from texture_features.augmentation.augmented_features import FeatureCopies
+from texture_features.labelled_features import LabelledFeatures
+
+MIN_SLIDES = 3  # of a class: with one held out, two tell how much slides differ
+MIN_ALL_SLIDES = 20
+FOLDS = 5
+REFERENCE_COPIES = 3  # of each slide, at random gains, among the slides to which the distance is measured
+
+
+@dataclass(frozen=True, eq=False)
+class SlideTrace:
+    """One held-out slide, or a disturbed copy of it, as a classifier that has not seen it follows it.
+
+    Parameters
+    ----------
+    truth
+        Number of its label.
+    means : (n_windows, n_labels)
+        Mean evidence after each window.
+    effective_windows : (n_windows,)
+        Length of the evidence.
+    scores : (n_windows, n_scores)
+        Of its novelty; (n_windows, 0) where none were computed.
+    disturbance
+        Kind of the disturbance; '' for none.
+    """
+
+    truth: int
+    means: Array
+    effective_windows: Array
+    scores: Array
+    disturbance: str = ''
+
+
+@dataclass(frozen=True, eq=False)
+class _Slide:
+    group: int
+    truth: int
+    values: Array
+    disturbance: str = ''
+
+
+def fit_novelty(
+    learner: Learner,
+    fitted: Fitted,
+    examples: LabelledFeatures,
+    rule: EvidenceRule,
+    false_rejection_rate: float,
+    *,
+    gain_range: float = 1.0,
+) -> tuple[NoveltyDetector, Sequence[SlideTrace]] | None:
+    """Return the detector, and the held-out slides and disturbed copies by which it was fitted.
+
+    Returns None if there are too few slides: MIN_SLIDES of each class are needed, and in all MIN_ALL_SLIDES or one over
+    the rate of false rejections.
+    """
+    classes = np.unique(examples.labels, return_inverse=True)[1]
+    names, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
+    counts = np.bincount(classes[first])
+    enough = len(names) >= MIN_ALL_SLIDES or (len(names) + 1) * false_rejection_rate >= 1.0
+    if fitted.held_out is None or len(counts) < 2 or counts.min() < MIN_SLIDES or not enough:
+        return None
+    overlap = min(examples.hop_s / examples.window_s, 1.0)
+    slides = [
+        _Slide(number, int(classes[first[number]]), examples.values[groups == number]) for number in range(len(names))
+    ]
+    disturbed, copies = (
+        _disturbed_slides(examples, names, classes[first]),
+        _reference_copies(examples, names, classes[first], gain_range),
+    )
+    traces: list[SlideTrace] = []
+    for held_out, predictor in _folds(learner, fitted, classes, groups):
+        distances = _fit_distances(
+            [slide for slide in slides if slide.group not in held_out],
+            [copy for copy in copies if copy.group not in held_out],
+            predictor,
+            overlap,
+        )
+        for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
+            if predictor is not None:
+                log_probabilities = predictor(slide.values)
+            elif not slide.disturbance:
+                log_probabilities = fitted.held_out[groups == slide.group]
+            else:
+                continue
+            traces.append(_trace(slide, rule.window_evidence(log_probabilities), predictor, distances, overlap))
+    final = learner.predictor(fitted.parameters)
+    distances = _fit_distances(slides, copies, final if hidden_layer(final) else None, overlap)
+    held_out_scores = [_scores_at(traces, level) for level in EFFECTIVE_WINDOWS]
+    if min(map(len, held_out_scores)) < MIN_SLIDES:
+        return None
+    return NoveltyDetector.fit(distances, held_out_scores, false_rejection_rate), traces
+
+
+def _folds(
+    learner: Learner, fitted: Fitted, classes: Codes, groups: Codes
+) -> Iterator[tuple[frozenset[int], Predictor | None]]:
+    """Yield the slides that are held out together, and what was learnt without them, if the learner tells."""
+    if fitted.folds:
+        for fold in fitted.folds:
+            yield frozenset(fold.held_out.tolist()), learner.predictor(fold.parameters)
+        return
+    split = assign_folds(classes, groups, FOLDS)
+    parts = split[0] if split else np.zeros(len(groups), np.intp)
+    for part in np.unique(parts):
+        yield frozenset(groups[parts == part].tolist()), None
+
+
+def _disturbed_slides(examples: LabelledFeatures, names: Any, classes: Codes) -> list[_Slide]:
+    return list(_copied_slides(examples.augmented.disturbed, names, classes)) if examples.augmented else []
+
+
+def _reference_copies(examples: LabelledFeatures, names: Any, classes: Codes, gain_range: float) -> list[_Slide]:
+    """Return augmented copies of the slides at random gains, to which slides may be as near as to undisturbed ones."""
+    if examples.augmented is None or not REFERENCE_COPIES:
+        return []
+    rng = np.random.default_rng(0)
+    rows = examples.augmented.copies.copies < REFERENCE_COPIES
+    widest = math.log(gain_range)
+    return [
+        replace(copy, values=copy.values + rng.uniform(-widest, widest) * examples.augmented.gain_response)
+        for copy in _copied_slides(examples.augmented.copies.select(rows), names, classes)
+    ]
+
+
+def _copied_slides(copies: FeatureCopies, names: Any, classes: Codes) -> Iterator[_Slide]:
+    number = {name: place for place, name in enumerate(names.tolist())}
+    changes = (copies.groups[1:] != copies.groups[:-1]) | (copies.copies[1:] != copies.copies[:-1])
+    starts = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(copies.groups)]])
+    for start, stop in pairwise(starts.tolist()):
+        group = number.get(str(copies.groups[start])) if stop > start else None
+        if group is not None:
+            values = copies.values[start:stop].astype(np.float64)
+            yield _Slide(group, int(classes[group]), values, str(copies.kinds[start]))
+
+
+def _fit_distances(
+    slides: Sequence[_Slide], copies: Sequence[_Slide], predictor: Predictor | None, overlap: float
+) -> Mapping[str, ClassDistance]:
+    """Return the distances, with the metric of undisturbed slides and references among the copies, too."""
+    hidden = hidden_layer(predictor) if predictor is not None else None
+    means, more = (
+        [space_means(slide.values, hidden(slide.values) if hidden else None, overlap) for slide in those]
+        for those in (slides, copies)
+    )
+    classes, more_classes = (np.array([slide.truth for slide in those]) for those in (slides, copies))
+    found = {space: ClassDistance.fit(np.stack([own[space] for own in means]), classes) for space in means[0]}
+    if not more:
+        return found
+    return {
+        space: distance.with_slides(np.stack([own[space] for own in more]), more_classes)
+        for space, distance in found.items()
+    }
+
+
+def _trace(
+    slide: _Slide, evidence: Array, predictor: Predictor | None, distances: Mapping[str, ClassDistance], overlap: float
+) -> SlideTrace:
+    hidden = hidden_layer(predictor) if predictor is not None else None
+    activations = hidden(slide.values) if hidden else [None] * len(slide.values)
+    count = np.arange(1, len(evidence) + 1)
+    means = np.cumsum(evidence, axis=0) / count[:, None]
+    effective_windows = np.asarray(1.0 + (count - 1) * overlap, dtype=np.float64)
+    highest = np.sort(means, axis=1)[:, -2:]
+    novelty = SlideNovelty(distances, evidence.shape[1])
+    scores = []
+    for number, label in enumerate(means.argmax(axis=1).tolist()):
+        novelty.add(
+            slide.values[number], activations[number], int(evidence[number].argmax()), float(effective_windows[number])
+        )
+        scores.append(novelty.scores(label, float(highest[number, 1] - highest[number, 0])))
+    return SlideTrace(slide.truth, means, effective_windows, np.array(scores), slide.disturbance)
+
+
+def _scores_at(traces: Sequence[SlideTrace], effective_windows: float) -> Array:
+    """Return the scores of undisturbed slides with the right label after so many windows, (n_slides, n_scores)."""
+    found = []
+    for trace in traces:
+        place = int(np.abs(trace.effective_windows - effective_windows).argmin())
+        if not trace.disturbance and int(trace.means[place].argmax()) == trace.truth:
+            found.append(trace.scores[place])
+    return np.array(found)

@@ -1,0 +1,134 @@
+"""Augmented copies against what physics says of them."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from texture_core.window import Window
+from texture_features.augmentation.augmentation import Augmentation
+from texture_features.augmentation.augmented_features import Augmenter
+from texture_features.augmentation.disturbances import (
+    DISTURBANCES,
+    SlideWindows,
+    add_drift,
+    amplify,
+    at_speed,
+    clip,
+    hold_lost,
+    smooth_response,
+)
+from texture_features.feature_set import FeatureSet
+from texture_features.windowing.windows import CutWindow, SlideEnd
+
+RATE_HZ, TONE_HZ = 2000.0, 100.0
+FEATURES = FeatureSet.from_mapping(
+    {
+        'windows': {'length_s': 0.5, 'hop_s': 0.25},
+        'inputs': {'signal': {'features': [{'mean_log_bands': {'bands': 8}}, 'moments', 'power_autocorrelation']}},
+    }
+)
+
+
+def cut(params, slide_s=3.0, tone_hz=TONE_HZ):
+    """Return the windows of a slide with a tone and some noise."""
+    rng = np.random.default_rng(5)
+    time_s = np.arange(round(slide_s * RATE_HZ)) / RATE_HZ
+    samples = (np.sin(2 * np.pi * tone_hz * time_s) + 0.1 * rng.standard_normal(len(time_s)))[:, None]
+    length, hop = round(params.length_s * RATE_HZ), round(params.hop_s * RATE_HZ)
+    starts = range(0, len(samples) - length + 1, hop)
+    windows = [
+        CutWindow(
+            start_ns=round(1e9 * start / RATE_HZ),
+            exploration_id='e',
+            length_s=params.length_s,
+            hop_s=params.hop_s,
+            windows={'signal': Window(samples[start : start + length], RATE_HZ, ('x',))},
+        )
+        for start in starts
+    ]
+    return [*windows, SlideEnd(round(1e9 * slide_s), 'e', params.hop_s)]
+
+
+def augmented(**params):
+    augmenter = Augmenter(FEATURES, Augmentation(**{'copies': 2, **params}))
+    for name in ('cork/1', 'cork/2'):
+        augmenter.add(name, cut)
+    return augmenter.result()
+
+
+def one_input(samples, vibration=True):
+    return SlideWindows(samples, RATE_HZ, np.arange(len(samples)) * 0.25, vibration)
+
+
+def test_the_gain_response_of_a_log_power_is_two_and_that_of_a_shape_is_none() -> None:
+    [vector] = FEATURES.extract_many(cut(FEATURES.windows)[:1])
+    response = dict(zip(vector.names, augmented().gain_response, strict=True))
+    bands = [value for name, value in response.items() if 'mean_log_bands' in name]
+    assert bands == pytest.approx([2.0] * 8, abs=1e-6)
+    rhythm = [value for name, value in response.items() if 'power_autocorrelation' in name]
+    assert rhythm == pytest.approx([0.0] * len(rhythm), abs=1e-6)
+
+
+def test_a_copy_at_twice_the_speed_has_twice_the_frequency() -> None:
+    time_s = np.arange(2400) / RATE_HZ
+    windows = one_input(np.sin(2 * np.pi * TONE_HZ * time_s)[None, :, None])
+    faster = at_speed(windows, 2.0, 1000)[0, :, 0]
+    assert faster.shape == (1000,)
+    assert np.abs(np.fft.rfft(faster)).argmax() * RATE_HZ / 1000 == pytest.approx(2 * TONE_HZ)
+    np.testing.assert_array_equal(at_speed(windows, 1.0, 1000), windows.samples[:, :1000])
+
+
+def test_copies_are_of_the_slides_they_are_named_after_and_repeatable() -> None:
+    first, again = augmented(), augmented()
+    assert set(first.copies.groups) == {'cork/1', 'cork/2'}
+    assert set(first.copies.copies) == {0, 1}
+    assert set(first.copies.kinds) == {''}
+    assert set(first.disturbed.kinds) <= {'speed', *DISTURBANCES}
+    np.testing.assert_array_equal(first.copies.values, again.copies.values)
+
+
+def test_copies_without_any_range_are_the_slide_itself() -> None:
+    same = augmented(speed_range=0.0, noise_range=0.0, copies=1, disturbed_copies=0)
+    values = np.stack([vector.values for vector in FEATURES.extract_many(cut(FEATURES.windows)[:-1])])
+    own = same.copies.values[same.copies.groups == 'cork/1']
+    np.testing.assert_allclose(own, values[: len(own)], rtol=1e-5, atol=1e-5)
+    assert len(own) >= len(values) - 1
+    assert len(same.disturbed.groups) == 0
+
+
+def test_without_copies_there_is_nothing() -> None:
+    assert augmented(copies=0) is None
+
+
+def test_only_the_vibration_is_amplified_clipped_and_held() -> None:
+    rng = np.random.default_rng(0)
+    windows = one_input(rng.standard_normal((3, 400, 2)))
+    slow = dataclasses.replace(windows, vibration=False)
+    np.testing.assert_array_equal(amplify(windows, 0.5, rng), 0.5 * windows.samples)
+    assert np.abs(clip(windows, 1.0, rng) - windows.mean).max() == pytest.approx(windows.rms.max())
+    held = hold_lost(windows, 0.5, rng)
+    assert 0.2 < np.mean(held[:, 1:] == held[:, :-1]) < 0.8
+    for disturbance in (amplify, clip, hold_lost):
+        np.testing.assert_array_equal(disturbance(slow, 0.5, rng), windows.samples)
+
+
+def test_drift_grows_over_the_slide_and_not_from_zero_in_each_window() -> None:
+    windows = one_input(np.random.default_rng(0).standard_normal((3, 500, 1)))
+    offset = add_drift(windows, 2.0, np.random.default_rng(0)) - windows.samples
+    assert offset[2, 0, 0] == pytest.approx(2.0 * windows.rms[0] * 0.5)
+    assert offset[2, -1, 0] == pytest.approx(2.0 * windows.rms[0] * (0.5 + 499 / RATE_HZ))
+
+
+def test_the_response_of_another_finger_deviates_by_about_the_strength_in_db() -> None:
+    rng = np.random.default_rng(1)
+    deviations = [20 * np.log10(smooth_response(500, 3.0, rng)) for _ in range(300)]
+    assert np.std(deviations) == pytest.approx(3.0, rel=0.15)
+    assert smooth_response(500, 0.0, rng) == pytest.approx(np.ones(500))
+
+
+def test_noise_raises_the_power_of_the_quiet_bands_as_much_as_it_has_power() -> None:
+    loud = augmented(speed_range=0.0, noise_range=10.0, copies=8, disturbed_copies=0).copies
+    quiet = augmented(speed_range=0.0, noise_range=0.0, copies=1, disturbed_copies=0).copies
+    assert loud.values[:, 7].max() > quiet.values[:, 7].max() + 2 * math.log(3.0)

@@ -1,0 +1,139 @@
+"""Disturbances of the windows of one slide: one kind at a time, by a strength."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+from scipy.signal import resample_poly
+
+from texture_core.arrays import Array
+
+BURST_S = 0.01  # samples are lost by the packet
+CURVE_TERMS = 5  # of the random response of another finger over frequency
+RATIO_LIMIT = 40  # numerator and denominator of a speed ratio: the resampling filter grows with them
+
+
+@dataclass(frozen=True, eq=False)
+class SlideWindows:
+    """Windows of one input over one slide.
+
+    Parameters
+    ----------
+    samples : (n_windows, n_samples, n_channels)
+    rate_hz
+        Sampling rate.
+    starts_s : (n_windows,)
+        Start of each window after that of the first.
+    vibration
+        Whether this is the vibration input; gain, loss of samples, clipping and the response of a finger act on it.
+    """
+
+    samples: Array
+    rate_hz: float
+    starts_s: Array
+    vibration: bool
+
+    @property
+    def mean(self) -> Array:
+        """Mean of each channel over the slide, (n_channels,)."""
+        mean: Array = self.samples.mean(axis=(0, 1))
+        return mean
+
+    @property
+    def rms(self) -> Array:
+        """Root mean square of each channel about its mean over the slide, (n_channels,)."""
+        rms: Array = self.samples.std(axis=(0, 1))
+        return rms
+
+
+# (windows of an input, strength, random) -> samples (n_windows, n_samples, n_channels)
+Disturbance = Callable[[SlideWindows, float, np.random.Generator], Array]
+
+
+def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
+    """Return the first `count` samples of each window as they are at a multiple of the speed.
+
+    The windows must hold at least speed · count samples.
+    """
+    longer = windows.samples
+    ratio = Fraction(1.0 / speed).limit_denominator(RATIO_LIMIT)
+    if ratio != 1:
+        longer = resample_poly(longer, ratio.numerator, ratio.denominator, axis=1, padtype='line')
+    resampled: Array = longer[:, :count]
+    return resampled
+
+
+def add_noise(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
+    """Add white noise with a multiple of the root mean square of the slide."""
+    return windows.samples + strength * windows.rms * rng.standard_normal(windows.samples.shape)
+
+
+def amplify(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
+    """Multiply the vibration."""
+    return strength * windows.samples if windows.vibration else windows.samples
+
+
+def add_drift(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
+    """Add an offset that grows by a multiple of the root mean square of the slide per second."""
+    times = windows.starts_s[:, None] + np.arange(windows.samples.shape[1]) / windows.rate_hz
+    return windows.samples + strength * windows.rms * times[..., None]
+
+
+def hold_lost(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
+    """Replace a fraction of the vibration, by bursts, by the last value before."""
+    n_windows, n_samples, _ = windows.samples.shape
+    if not windows.vibration:
+        return windows.samples
+    burst = max(1, round(BURST_S * windows.rate_hz))
+    lost = np.repeat(rng.random((n_windows, -(-n_samples // burst))) < strength, burst, axis=1)[:, :n_samples]
+    lost[:, 0] = False
+    last = np.maximum.accumulate(np.where(lost, 0, np.arange(n_samples)), axis=1)
+    held: Array = np.take_along_axis(windows.samples, last[..., None], axis=1)
+    return held
+
+
+def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
+    """Limit the vibration to a multiple of its root mean square about the mean."""
+    if not windows.vibration:
+        return windows.samples
+    limit = strength * windows.rms
+    return np.clip(windows.samples, windows.mean - limit, windows.mean + limit)
+
+
+def other_finger(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
+    """Filter the vibration by a smooth random response with this standard deviation in dB; shift slow channels."""
+    n_channels = windows.samples.shape[2]
+    deviation = windows.samples - windows.mean
+    if not windows.vibration:
+        gains = np.exp(0.05 * strength * rng.standard_normal(n_channels))
+        return windows.mean + gains * deviation + 3.0 * strength * rng.standard_normal(n_channels)
+    response = smooth_response(windows.samples.shape[1] // 2 + 1, strength, rng)
+    filtered = np.fft.irfft(np.fft.rfft(deviation, axis=1) * response[:, None], windows.samples.shape[1], axis=1)
+    return windows.mean + filtered
+
+
+def smooth_response(count: int, strength_db: float, rng: np.random.Generator) -> Array:
+    """Return a smooth random amplitude response over `count` frequencies from 0 to half the rate."""
+    frequencies = np.linspace(0.0, 1.0, count)
+    terms = np.cos(np.pi * np.arange(CURVE_TERMS)[:, None] * frequencies)
+    curve = rng.standard_normal(CURVE_TERMS) @ terms / math.sqrt(3.0)  # standard deviation about 1
+    response: Array = 10.0 ** (strength_db * curve / 20.0)
+    return response
+
+
+# Smallest and largest strength on which early stopping is fitted; from harmless to useless.
+DISTURBANCES: Mapping[str, tuple[Disturbance, float, float]] = {
+    'gain': (amplify, 0.4, 2.5),
+    'noise': (add_noise, 0.003, 0.3),
+    'finger': (other_finger, 0.3, 5.0),
+    'drift': (add_drift, 0.1, 10.0),
+    'held': (hold_lost, 0.003, 0.3),
+    'clipped': (clip, 0.7, 4.0),
+}
+SPEED = 'speed'
+SPEED_RANGE = (0.35, 2.2)
+KINDS = (SPEED, *DISTURBANCES)
