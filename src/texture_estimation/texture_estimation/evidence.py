@@ -23,8 +23,8 @@ class EvidenceAccumulator:
     """Accumulate the window predictions of one slide; the same code runs live and offline.
 
     A new exploration id, or a vector after the `last` one, starts a new slide. Every estimate says whether the surface
-    is known; a label is certain only while it is. An exploration under conditions that were not trained is neither known
-    nor decided, and the message says which condition it is. Equally probable labels give no label: unclassified.
+    is known; a label is certain only while it is. An exploration under conditions that were not trained is neither
+    known nor decided, and the message says which condition it is. Equally probable labels give no label: unclassified.
 
     Parameters
     ----------

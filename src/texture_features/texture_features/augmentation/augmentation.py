@@ -17,10 +17,15 @@ class Augmentation:
     one class have among themselves.
     """
 
-    copies: int = param(0, 'Number of augmented copies of each training slide; 0: no augmentation.', low=0, high=100)
+    copies: int = param(
+        0,
+        'Number of augmented copies that are made of each training slide; 0 disables the augmentation.',
+        low=0,
+        high=100,
+    )
     speed_range: float = param(
         0.15,
-        'Largest relative change of the speed of a copy, to either side; half of the copies keep their speed.',
+        'Largest relative change of the speed of a copy, to either side; half of the copies keep the speed they have.',
         low=0.0,
         high=1.0,
     )
@@ -37,8 +42,8 @@ class Augmentation:
     gain_probability: float = param(0.7, 'Fraction of the drawn examples whose gain is changed.', low=0.0, high=1.0)
     slide_jitter: float = param(
         1.5,
-        'Standard deviation of the factor of the slide deviation added to a drawn example; larger ones tolerate more '
-        'drift and cost accuracy without drift.',
+        'Standard deviation of the factor by which a slide deviation is added to a drawn example; larger values make '
+        'the classifier tolerate more drift and cost accuracy without drift.',
         low=0.0,
         high=10.0,
     )
