@@ -18,6 +18,7 @@ SIDE_BY_SIDE = (
     'robustness',
     'speed_force',
     'decisions',
+    'trust',
     'ablation',
     'learning',
     'biotac20',
@@ -27,7 +28,9 @@ SIDE_BY_SIDE = (
     'clock',
 )
 # These take half a minute or more for other things than recognition, or ten and more for it.
-LONG = frozenset({'recipes', 'optimise', 'optimise_large', 'scenes', 'load', 'motion', 'sensors', 'stick_slip'})
+LONG = frozenset(
+    {'recipes', 'optimise', 'optimise_large', 'scenes', 'load', 'motion', 'sensors', 'stick_slip', 'trust'}
+)
 # What many of them read is imported once.
 IMPORTED = ('biotac20', 'ntp21')
 
