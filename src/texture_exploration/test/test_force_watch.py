@@ -108,3 +108,21 @@ def test_a_pause_of_the_arm_is_no_frozen_reading():
     state = ArmState(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.5)
     assert not any(watch.frozen(state, ArmCommand()) for _ in range(100))
     assert watch.frozen(replace(state, time_ns=400_000_000), ArmCommand()) == ''  # one state after a pause
+
+
+@pytest.mark.parametrize(
+    ('lift', 'drifted'),
+    [
+        ([(0.0, 1.0)] * 6 + [(0.004, 0.0)], False),  # a busy machine saw one state of the lift
+        ([(0.0, 1.0)] * 6 + [(0.004, 0.8), (0.008, 0.8)], True),
+        ([(0.0, 1.0)] * 6, False),  # and here none
+        ([], False),
+    ],
+)
+def test_only_what_was_measured_above_the_surface_counts_as_free_air(lift, drifted):
+    watch = ForceWatch(SafetyLimits(), ForceReading.NOISY, wanted_n=1.0)
+    for step in range(40):
+        watch.note(Phase.APPROACH, ArmState(step * 10_000_000, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), 0.0), ArmCommand())
+    for height_m, force_n in lift:
+        watch.note(Phase.LIFT, ArmState(10**9, (0.0, 0.0, height_m), (0.0, 0.0, 0.0), force_n), ArmCommand())
+    assert bool(watch.drifted()) is drifted

@@ -15,7 +15,8 @@ HELD_SHARE = 0.1  # a force this close to the wanted one is being held
 ZEROING_S = 0.1  # an arm may zero its force sensor while it stands, or as it moves off
 BEFORE = 1000  # states before the contact
 LOW_SHARE = 0.25  # of them lie below the force in free air: on a soft surface the force rises long before it counts
-AFTER = 5  # readings at the end of the lift
+AFTER = 5  # readings in the upper half of the lift
+MIN_RISE_M = 0.001  # a lift that was seen from less far below says nothing of free air
 
 
 class ForceWatch:
@@ -50,7 +51,7 @@ class ForceWatch:
         self._repeats = 0
         self._before: deque[float] = deque(maxlen=BEFORE)
         self._begin_ns: int | None = None
-        self._after: deque[float] = deque(maxlen=AFTER)
+        self._lift: deque[tuple[float, float]] = deque(maxlen=BEFORE)  # height, m, and force, N
 
     def frozen(self, arm: ArmState, command: ArmCommand) -> str:
         """Return in a sentence that the reading is frozen, '' if not; `command` is what the arm was doing."""
@@ -76,13 +77,14 @@ class ForceWatch:
         if phase is Phase.APPROACH:
             self._note_free(arm, command)
         elif phase is Phase.LIFT:
-            self._after.append(arm.force_n)
+            self._lift.append((arm.position[2], arm.force_n))
 
     def drifted(self) -> str:
         """Return in a sentence that the force in free air has changed over the exploration, '' if it has not."""
-        if not self._before or not self._after:
+        after = self._forces_above()
+        if not self._before or not after:
             return ''
-        before_n, after_n = self._free_air_n, statistics.median(self._after)
+        before_n, after_n = self._free_air_n, statistics.median(after)
         if abs(after_n - before_n) <= self._limits.force_drift_share * self._wanted_n:
             return ''
         return (
@@ -96,6 +98,19 @@ class ForceWatch:
         if arm.time_ns - self._begin_ns <= ZEROING_S * 1e9:
             self._before.clear()
         self._before.append(arm.force_n)
+
+    def _forces_above(self) -> list[float]:
+        """Return the last forces in the upper half of the lift.
+
+        The finger still presses while it brakes, and a busy machine may see but few states of the lift itself.
+        """
+        if not self._lift:
+            return []
+        low_m, high_m = min(height_m for height_m, _ in self._lift), self._lift[-1][0]
+        if high_m - low_m < MIN_RISE_M:
+            return []
+        middle_m = 0.5 * (low_m + high_m)
+        return [force_n for height_m, force_n in self._lift if height_m > middle_m][-AFTER:]
 
     @property
     def _free_air_n(self) -> float:
