@@ -16,8 +16,8 @@ from texture_benchmarks.endurance.robot_faults import (
     ROBOT_FAULTS,
     SIMULATED_ARM,
     UR,
-    PlannedFault,
-    Session,
+    PlannedRobotFault,
+    RobotSession,
     sessions,
 )
 from texture_benchmarks.endurance.robot_record import ExplorerExit, RobotExploration, RobotRecord
@@ -198,7 +198,7 @@ def test_a_fault_that_kills_the_explorer_is_the_last_of_its_session():
 def test_every_parameter_of_a_rig_is_one_of_the_explorer_and_every_fault_has_an_action(rig):
     starts = [name for name, fault in ROBOT_FAULTS[rig].items() if fault.when == AT_START]
     for start in (NO_FAULT, *starts):
-        made = RIG_CLASSES[rig](Session(rig, start, (), 'SIGINT'))
+        made = RIG_CLASSES[rig](RobotSession(rig, start, (), 'SIGINT'))
         known = (ARM_PARAMS[rig], TouchParams, SafetyLimits, SignalWatchParams)
         assert set(made.parameters) - {'arm'} <= {item.name for cls in known for item in parameters_of(cls)}
         assert {fault.action for fault in ROBOT_FAULTS[rig].values()} - set(made.actions) == set()
@@ -219,4 +219,4 @@ def test_a_planned_fault_has_the_strength_of_its_kind():
         for trial in session.trials:
             kind = ROBOT_FAULTS[session.rig][trial.fault.name]
             assert kind.low <= trial.fault.strength <= kind.high
-            assert isinstance(trial.fault, PlannedFault)
+            assert isinstance(trial.fault, PlannedRobotFault)

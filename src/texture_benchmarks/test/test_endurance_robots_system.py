@@ -8,7 +8,7 @@ import pytest
 pytestmark = pytest.mark.ros
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_benchmarks.endurance.robot_faults import HAND, UR, PlannedFault, RobotTrial, Session  # noqa: E402
+from texture_benchmarks.endurance.robot_faults import HAND, UR, PlannedRobotFault, RobotSession, RobotTrial  # noqa: E402
 from texture_benchmarks.endurance.robot_requirements import check_robots  # noqa: E402
 from texture_benchmarks.endurance.robot_run import RobotPlan, endure_robots  # noqa: E402
 from texture_core.exploration import ExplorationRequest  # noqa: E402
@@ -23,7 +23,7 @@ def needs(module):
 
 
 def run(rig, start_fault, trials, tmp_path, exit_by='SIGINT'):
-    session = Session(rig, start_fault, trials, exit_by)
+    session = RobotSession(rig, start_fault, trials, exit_by)
     log = tmp_path / 'explorers.log'
     kept = []
     record = endure_robots(RobotPlan(DEADLINE_S), log, lambda _: None, [session], kept.append)
@@ -36,8 +36,8 @@ def run(rig, start_fault, trials, tmp_path, exit_by='SIGINT'):
 @needs('rtde_control')
 def test_another_program_is_named_then_a_lost_surface_aborts_and_the_same_request_succeeds(tmp_path):
     trials = [
-        RobotTrial(SLIDE, PlannedFault('another program at connect')),
-        RobotTrial(SLIDE, PlannedFault('surface lost', 0.012, 0.2)),
+        RobotTrial(SLIDE, PlannedRobotFault('another program at connect')),
+        RobotTrial(SLIDE, PlannedRobotFault('surface lost', 0.012, 0.2)),
     ]
     record = run(UR, 'another program at connect', trials, tmp_path)
     named, _, lost, _ = record.explorations
@@ -48,7 +48,7 @@ def test_another_program_is_named_then_a_lost_surface_aborts_and_the_same_reques
 
 @needs('dynamixel_sdk')
 def test_an_exception_in_the_bus_thread_is_named_and_no_motor_keeps_its_torque(tmp_path):
-    trials = [RobotTrial(RUB, PlannedFault('exception in the bus thread', 0.0, 0.3))]
+    trials = [RobotTrial(RUB, PlannedRobotFault('exception in the bus thread', 0.0, 0.3))]
     record = run(HAND, 'none', trials, tmp_path, 'SIGKILL')
     assert 'InjectedError' in record.explorations[0].message
     assert record.explorations[-1].ending == 'success'

@@ -51,8 +51,8 @@ class RunningConditions:
 
     def __init__(self) -> None:
         self._motion = self._sensor = ''
-        self._speed = _Mean()
-        self._force = _Mean()
+        self._speed = _RunningMean()
+        self._force = _RunningMean()
         self._directions: dict[float, None] = {}  # in the order in which they came
 
     def update(self, vector: FeatureVector) -> None:
@@ -77,7 +77,7 @@ class RunningConditions:
         )
 
 
-class _Mean:
+class _RunningMean:
     """Mean of the finite values, and the range in which it has been so far."""
 
     def __init__(self) -> None:

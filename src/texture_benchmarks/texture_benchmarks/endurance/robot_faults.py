@@ -85,7 +85,7 @@ ROBOT_FAULTS: Mapping[str, Mapping[str, RobotFault]] = {
 
 
 @dataclass(frozen=True)
-class PlannedFault:
+class PlannedRobotFault:
     """A fault with its strength; `at_share` is the share of the planned slide after which it is injected."""
 
     name: str
@@ -98,11 +98,11 @@ class RobotTrial:
     """An exploration to ask for, and the fault that is injected meanwhile."""
 
     request: ExplorationRequest
-    fault: PlannedFault
+    fault: PlannedRobotFault
 
 
 @dataclass(frozen=True)
-class Session:
+class RobotSession:
     """One life of the explorer on one rig.
 
     Parameters
@@ -129,14 +129,14 @@ class Session:
     seed: int = 0
 
 
-def sessions(seed: int) -> Iterator[Session]:
+def sessions(seed: int) -> Iterator[RobotSession]:
     """Yield sessions without end, one rig after the other."""
     rng = np.random.default_rng((seed, 2))
     for rig in cycle(RIGS):
         yield draw_session(rng, rig)
 
 
-def draw_session(rng: np.random.Generator, rig: str) -> Session:
+def draw_session(rng: np.random.Generator, rig: str) -> RobotSession:
     """Return a session with faults drawn by their weights; a fault that kills the explorer comes last."""
     faults = ROBOT_FAULTS[rig]
     starts = {name: fault for name, fault in faults.items() if fault.when == AT_START}
@@ -150,7 +150,7 @@ def draw_session(rng: np.random.Generator, rig: str) -> Session:
     killing = [name for name in names if faults[name].kills][:1]
     names = [name for name in names if not faults[name].kills] + killing
     trials = [RobotTrial(_request(rng, rig), _planned(rng, name, faults[name])) for name in names]
-    return Session(
+    return RobotSession(
         rig, start, trials, str(rng.choice(EXITS)), force_mode=bool(rng.random() < 0.5), seed=int(rng.integers(1000))
     )
 
@@ -160,8 +160,8 @@ def _draw(rng: np.random.Generator, faults: Mapping[str, RobotFault]) -> str:
     return str(rng.choice(list(faults), p=weights / weights.sum()))
 
 
-def _planned(rng: np.random.Generator, name: str, fault: RobotFault) -> PlannedFault:
-    return PlannedFault(name, float(rng.uniform(fault.low, fault.high)), float(rng.uniform(0.0, LATEST_SHARE)))
+def _planned(rng: np.random.Generator, name: str, fault: RobotFault) -> PlannedRobotFault:
+    return PlannedRobotFault(name, float(rng.uniform(fault.low, fault.high)), float(rng.uniform(0.0, LATEST_SHARE)))
 
 
 def _request(rng: np.random.Generator, rig: str) -> ExplorationRequest:

@@ -19,8 +19,8 @@ from texture_benchmarks.endurance.robot_faults import (
     ROBOT_FAULTS,
     SIMULATED_ARM,
     UR,
-    PlannedFault,
-    Session,
+    PlannedRobotFault,
+    RobotSession,
 )
 from texture_benchmarks.motion.robot_trials import FingerLog
 from texture_core.errors import DeviceError
@@ -39,7 +39,7 @@ PATIENCE: Mapping[str, Any] = {'state_timeout_s': 1.0, 'watch_signal': False}
 TOUCH = TouchParams()
 
 
-class Rig(Protocol):
+class RobotRig(Protocol):
     """An emulated robot with its fault switches.
 
     `fingers` is what the emulator reports of the true force.
@@ -55,14 +55,14 @@ class Rig(Protocol):
     def program(self) -> Sequence[str]:
         """Command for the explorer instead of the installed executable; empty for that."""
 
-    def __enter__(self) -> Rig: ...
+    def __enter__(self) -> RobotRig: ...
 
     def __exit__(self, *_: object) -> None: ...
 
-    def inject(self, fault: PlannedFault, pid: int) -> str:
+    def inject(self, fault: PlannedRobotFault, pid: int) -> str:
         """Inject a fault; `pid` is the explorer. Return its strength in words."""
 
-    def restore(self, fault: PlannedFault) -> None:
+    def restore(self, fault: PlannedRobotFault) -> None:
         """Remove what the fault changed around the robot, as a person at the robot would, once it rests."""
 
     def taken_over(self) -> str:
@@ -77,14 +77,14 @@ class SimulatedArmRig:
 
     program: Sequence[str] = ()
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: RobotSession) -> None:
         self.fingers = FingerLog()
         fault = ROBOT_FAULTS[SIMULATED_ARM][session.start_fault]
         self.parameters = {
             **PATIENCE, 'arm': 'simulated', 'finger_port': self.fingers.port, 'force_mode': session.force_mode,
             'seed': session.seed, **fault.surface,
         }  # fmt: skip
-        self.actions: Mapping[str, Callable[[PlannedFault, int], str]] = {
+        self.actions: Mapping[str, Callable[[PlannedRobotFault, int], str]] = {
             'none': _do_nothing, 'surface': _do_nothing, 'kill': _kill, 'freeze': _freeze
         }  # fmt: skip
 
@@ -95,11 +95,11 @@ class SimulatedArmRig:
     def __exit__(self, *_: object) -> None:
         self.fingers.__exit__()
 
-    def inject(self, fault: PlannedFault, pid: int) -> str:
-        """See `Rig.inject`."""
+    def inject(self, fault: PlannedRobotFault, pid: int) -> str:
+        """See `RobotRig.inject`."""
         return self.actions[ROBOT_FAULTS[SIMULATED_ARM][fault.name].action](fault, pid)
 
-    def restore(self, fault: PlannedFault) -> None:
+    def restore(self, fault: PlannedRobotFault) -> None:
         """The surface stays as it is."""
 
     def taken_over(self) -> str:
@@ -116,7 +116,7 @@ class UrRig:
 
     program: Sequence[str] = ()
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: RobotSession) -> None:
         self.fingers = FingerLog()
         self.parameters = {**PATIENCE, 'arm': 'ur', 'ip': UR_IP, 'silence_s': 1.0}
         self._session = session
@@ -129,7 +129,7 @@ class UrRig:
             )
         )
         self._open = ExitStack()
-        self.actions: Mapping[str, Callable[[PlannedFault, int], str]] = {
+        self.actions: Mapping[str, Callable[[PlannedRobotFault, int], str]] = {
             'none': _do_nothing, 'another program': _do_nothing, 'kill': _kill, 'freeze': _freeze,
             'freeze worker': _freeze_worker, 'protective stop': self._stop, 'slow': self._slow, 'drop': self._drop,
         }  # fmt: skip
@@ -145,12 +145,12 @@ class UrRig:
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def inject(self, fault: PlannedFault, pid: int) -> str:
-        """See `Rig.inject`."""
+    def inject(self, fault: PlannedRobotFault, pid: int) -> str:
+        """See `RobotRig.inject`."""
         return self.actions[ROBOT_FAULTS[UR][fault.name].action](fault, pid)
 
-    def restore(self, fault: PlannedFault) -> None:
-        """See `Rig.restore`."""
+    def restore(self, fault: PlannedRobotFault) -> None:
+        """See `RobotRig.restore`."""
         action = ROBOT_FAULTS[UR][fault.name].action
         if action == 'another program':
             self._controller.ask('stop')
@@ -176,14 +176,14 @@ class UrRig:
         finger = self.fingers.fingers[-1]
         return finger.vx_m_s == finger.vy_m_s == finger.vz_m_s == 0.0
 
-    def _stop(self, _fault: PlannedFault, _pid: int) -> str:
+    def _stop(self, _fault: PlannedRobotFault, _pid: int) -> str:
         return self._controller.ask('emulate protective stop')
 
-    def _slow(self, fault: PlannedFault, _pid: int) -> str:
+    def _slow(self, fault: PlannedRobotFault, _pid: int) -> str:
         self._controller.ask(f'emulate slow {fault.strength:.3f}')
         return f'blocking calls are acknowledged after {1e3 * fault.strength:.0f} ms'
 
-    def _drop(self, _fault: PlannedFault, _pid: int) -> str:
+    def _drop(self, _fault: PlannedRobotFault, _pid: int) -> str:
         self._controller.ask(f'emulate drop {DROP_M}')
         return f'the surface drops by {1e3 * DROP_M:.0f} mm'
 
@@ -193,7 +193,7 @@ class HandRig:
 
     program: Sequence[str] = (sys.executable, '-m', 'texture_benchmarks.endurance.ros.hand_explorer')
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: RobotSession) -> None:
         self.fingers = FingerLog()
         self._session = session
         self._folder = tempfile.TemporaryDirectory(prefix='endurance_hand_')
@@ -204,7 +204,7 @@ class HandRig:
             'speed_tolerance': 0.3, 'force_tolerance': 0.2,
         }  # fmt: skip
         self._open = ExitStack()
-        self.actions: Mapping[str, Callable[[PlannedFault, int], str]] = {
+        self.actions: Mapping[str, Callable[[PlannedRobotFault, int], str]] = {
             'none': _do_nothing, 'kill': _kill, 'overload': self._overload, 'unplug': self._unplug, 'drop': self._drop,
             'exception': _signalled(signal.SIGUSR1, 'an exception is raised in the bus thread'),
             'NaN force': _signalled(signal.SIGUSR2, 'the next force goal is NaN'),
@@ -221,13 +221,13 @@ class HandRig:
     def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def inject(self, fault: PlannedFault, pid: int) -> str:
-        """See `Rig.inject`."""
+    def inject(self, fault: PlannedRobotFault, pid: int) -> str:
+        """See `RobotRig.inject`."""
         known = ROBOT_FAULTS[HAND][fault.name]
         return '' if fault.name == self._session.start_fault else self.actions[known.action](fault, pid)
 
-    def restore(self, fault: PlannedFault) -> None:
-        """See `Rig.restore`."""
+    def restore(self, fault: PlannedRobotFault) -> None:
+        """See `RobotRig.restore`."""
         if ROBOT_FAULTS[HAND][fault.name].action == 'drop':
             self._hand.ask(f'stiffness {STIFFNESS_N_M}')
 
@@ -243,34 +243,38 @@ class HandRig:
     def _motor(self) -> int:
         return OVERLOADED_MOTORS[self._session.seed % len(OVERLOADED_MOTORS)]
 
-    def _overload(self, _fault: PlannedFault, _pid: int) -> str:
+    def _overload(self, _fault: PlannedRobotFault, _pid: int) -> str:
         self._hand.ask(f'overload {self._motor()}')
         return f'motor {self._motor()}'
 
-    def _unplug(self, fault: PlannedFault, _pid: int) -> str:
+    def _unplug(self, fault: PlannedRobotFault, _pid: int) -> str:
         self._hand.ask('unplug')
         time.sleep(fault.strength)
         self._hand.ask('plug')
         return f'for {fault.strength:.2f} s'
 
-    def _drop(self, _fault: PlannedFault, _pid: int) -> str:
+    def _drop(self, _fault: PlannedRobotFault, _pid: int) -> str:
         self._hand.ask('stiffness 0')
         return 'the object is gone'
 
 
-RIG_CLASSES: Mapping[str, Callable[[Session], Rig]] = {UR: UrRig, HAND: HandRig, SIMULATED_ARM: SimulatedArmRig}
+RIG_CLASSES: Mapping[str, Callable[[RobotSession], RobotRig]] = {
+    UR: UrRig,
+    HAND: HandRig,
+    SIMULATED_ARM: SimulatedArmRig,
+}
 
 
-def _do_nothing(_fault: PlannedFault, _pid: int) -> str:
+def _do_nothing(_fault: PlannedRobotFault, _pid: int) -> str:
     return ''
 
 
-def _kill(_fault: PlannedFault, pid: int) -> str:
+def _kill(_fault: PlannedRobotFault, pid: int) -> str:
     os.kill(pid, signal.SIGKILL)
     return f'process {pid}'
 
 
-def _freeze(fault: PlannedFault, pid: int) -> str:
+def _freeze(fault: PlannedRobotFault, pid: int) -> str:
     """Stop a process for a while: it gives no commands."""
     os.kill(pid, signal.SIGSTOP)
     try:
@@ -281,7 +285,7 @@ def _freeze(fault: PlannedFault, pid: int) -> str:
     return f'no command for {fault.strength:.2f} s'
 
 
-def _freeze_worker(fault: PlannedFault, pid: int) -> str:
+def _freeze_worker(fault: PlannedRobotFault, pid: int) -> str:
     """Freeze the process that talks to the UR controller, so that the watchdog of the controller trips."""
     threads = Path(f'/proc/{pid}/task').iterdir()
     children = [child for thread in threads for child in (thread / 'children').read_text(encoding='ascii').split()]
@@ -290,8 +294,8 @@ def _freeze_worker(fault: PlannedFault, pid: int) -> str:
     return _freeze(fault, int(children[0]))
 
 
-def _signalled(number: int, told: str) -> Callable[[PlannedFault, int], str]:
-    def act(_fault: PlannedFault, pid: int) -> str:
+def _signalled(number: int, told: str) -> Callable[[PlannedRobotFault, int], str]:
+    def act(_fault: PlannedRobotFault, pid: int) -> str:
         os.kill(pid, number)
         return told
 

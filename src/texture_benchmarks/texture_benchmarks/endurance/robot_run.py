@@ -15,8 +15,8 @@ from pathlib import Path
 from texture_benchmarks.endurance.robot_faults import (
     IN_SLIDE,
     ROBOT_FAULTS,
+    RobotSession,
     RobotTrial,
-    Session,
     planned_slide_s,
     sessions,
 )
@@ -29,7 +29,7 @@ from texture_benchmarks.endurance.robot_requirements import (
     REFUSED,
     SUCCESS,
 )
-from texture_benchmarks.endurance.robot_rigs import RIG_CLASSES, TOUCH, Rig
+from texture_benchmarks.endurance.robot_rigs import RIG_CLASSES, TOUCH, RobotRig
 from texture_benchmarks.endurance.ros.robot_client import RobotClient
 from texture_benchmarks.endurance.true_contact import true_contact
 from texture_bringup.demo.isolation import isolate
@@ -57,7 +57,7 @@ class ExplorerSession:
         ROS domain of this run.
     """
 
-    def __init__(self, session: Session, rig: Rig, domain_id: int) -> None:
+    def __init__(self, session: RobotSession, rig: RobotRig, domain_id: int) -> None:
         self.explorations: list[RobotExploration] = []
         self._session = session
         self._rig = rig
@@ -114,7 +114,7 @@ class ExplorerSession:
         begin_s = time.monotonic()
         self._client.begin()
         when = self._faults[trial.fault.name].when if attempt == 0 else ''
-        with Injection(trial, self._rig, self._client, self._process.process.pid, when) as injection:
+        with TimedFaultInjection(trial, self._rig, self._client, self._process.process.pid, when) as injection:
             ending, message, exploration_id = self._ask(trial)
         end_s = time.monotonic()
         fingers = [item for item in list(self._rig.fingers.fingers) if begin_s <= item.time_ns * 1e-9 <= end_s]
@@ -163,7 +163,7 @@ class ExplorerSession:
         return '; '.join([*answers, f'reboot: {message}'])
 
 
-class Injection:
+class TimedFaultInjection:
     """A fault that is injected in a thread while somebody waits for the exploration; use it in a `with` block.
 
     Attributes
@@ -172,14 +172,14 @@ class Injection:
         Whether it was injected, and its strength in words.
     """
 
-    def __init__(self, trial: RobotTrial, rig: Rig, client: RobotClient, pid: int, when: str) -> None:
+    def __init__(self, trial: RobotTrial, rig: RobotRig, client: RobotClient, pid: int, when: str) -> None:
         self.done, self.detail = False, ''
         self._trial, self._rig, self._client, self._pid = trial, rig, client, pid
         self._when = when
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name='injection', daemon=True)
 
-    def __enter__(self) -> Injection:
+    def __enter__(self) -> TimedFaultInjection:
         if self._when == IN_SLIDE:
             self._thread.start()
         elif self._when:
@@ -223,7 +223,7 @@ def endure_robots(
     plan: RobotPlan,
     log: Path,
     say: Callable[[str], None],
-    given: Iterable[Session] = (),
+    given: Iterable[RobotSession] = (),
     keep: Callable[[RobotRecord], object] = lambda _record: None,
 ) -> RobotRecord:
     """Let faults strike the emulated robots for a while; return what happened.
@@ -272,7 +272,7 @@ def endure_robots(
 
 
 def _run_session(
-    session: Session,
+    session: RobotSession,
     domain_id: int,
     tell: Callable[[str], object],
     explorations: list[RobotExploration],
@@ -300,7 +300,7 @@ def _ending(answer: ExplorationResult) -> str:
     return SUCCESS if answer.success else ABORTED if answer.exploration_id else REFUSED
 
 
-def _progress(session: Session, explorations: list[RobotExploration], until_s: float) -> str:
+def _progress(session: RobotSession, explorations: list[RobotExploration], until_s: float) -> str:
     good = sum(item.ending == SUCCESS for item in explorations)
     last = explorations[-1]
     return (

@@ -62,7 +62,7 @@ class SlideCoverage:
         self._states: deque[tuple[int, int, float, float, float]] = deque(maxlen=MAX_STATES)
         self._promising = False
         self._withdrawn = False
-        self._force = _Mean()
+        self._force = _WeightedMean()
         self.add(state)
 
     def add(self, state: ExplorationState) -> bool:
@@ -114,8 +114,8 @@ class SlideCoverage:
         states = self._states
         while len(states) > 1 and states[1][0] <= start and states[0][1] < end:
             states.popleft()
-        speeds = _Mean()
-        forces = _Mean()
+        speeds = _WeightedMean()
+        forces = _WeightedMean()
         directions = _MeanDirection()
         for number, (stamp, covered, speed, force, direction) in enumerate(states):
             enough = covered >= end
@@ -129,7 +129,7 @@ class SlideCoverage:
         return CoveredSpan(start, end, speeds.value, forces.value, directions.value)
 
 
-class _Mean:
+class _WeightedMean:
     """Weighted mean of what is known."""
 
     def __init__(self) -> None:
