@@ -65,7 +65,7 @@ def test_an_explorer_that_was_started_again_is_not_waited_for(monkeypatch):
         operator.wait_for_explorer(30.0)
         second = threading.Timer(1.0, lambda: later.enter_context(silent_explorer()))
         second.start()
-        with pytest.raises(MotionAborted, match='started anew'):
+        with pytest.raises(MotionAborted, match='started again'):
             operator.explore(ExplorationRequest('linear_slide'))
         second.join()
 

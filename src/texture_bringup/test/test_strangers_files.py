@@ -441,7 +441,7 @@ def peak_mb(work: Callable[[], None]) -> float:
         [line] = [line for line in status.read_text().split('\n') if line.startswith(name)]
         return float(line.split()[1]) / 1024
 
-    Path('/proc/self/clear_refs').write_text('5')  # the peak begins anew
+    Path('/proc/self/clear_refs').write_text('5')  # the peak starts again
     before = reported('VmRSS')
     work()
     return reported('VmHWM') - before

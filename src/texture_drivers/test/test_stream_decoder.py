@@ -83,7 +83,7 @@ def test_sequence_and_time_wrap_without_a_trace():
 def test_a_device_that_begins_again_goes_on_at_the_index_of_the_hosts_clock():
     line = StreamDecoder([stream()])
     before = run(line, range(1000))['signal'][-1]
-    after = run(line, range(200), offset_ns=START + 10 * SECOND)['signal'][0]  # it began anew 6 s later
+    after = run(line, range(200), offset_ns=START + 10 * SECOND)['signal'][0]  # it started again 6 s later
     assert line.restarts == 1
     assert (after.stamp_ns - before.stamp_ns) / SECOND * 2500 == pytest.approx(
         after.first_sample - before.first_sample, abs=1

@@ -158,7 +158,7 @@ def optimise_from_bags(
     search_slides = SearchSlides(BagSlides(dataset, feature_set), params.halves, params.seed)
     checkpoint = checkpoint_of(target)
     if resume and not _checkpoints(checkpoint):
-        raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to begin anew")
+        raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to start again")
     options: dict[str, Any] = {'checkpoint': checkpoint, 'resume': checkpoint if resume else None}
     with over() as parallel_map:
         if wanted.per_pair:

@@ -128,7 +128,7 @@ def read_bag(
             else:
                 value = decode(message.data, message.msgtype)
         except InvalidData as error:
-            raise InvalidData(f"the bag '{path}' is damaged: {error}; record it anew") from error
+            raise InvalidData(f"the bag '{path}' is damaged: {error}; record it again") from error
         yield short_name(message.topic), message.log_ns, value
 
 
@@ -163,7 +163,7 @@ def _read(
                 raise ReaderError(f'{missing} of its messages are missing')
     except BROKEN as error:
         raise InvalidData(
-            f"the bag '{path}' cannot be read, it is damaged or cut off: {error}; record it anew"
+            f"the bag '{path}' cannot be read, it is damaged or cut off: {error}; record it again"
         ) from error
 
 
@@ -188,7 +188,7 @@ def _of_namespace(path: Path, connections: list[Connection], namespace: str | No
     for connection in ours:
         if connection.digest and connection.digest != typestore().hash_rihs01(connection.msgtype):
             raise InvalidData(
-                f"the bag '{path}' was recorded with another definition of {connection.msgtype}; record it anew"
+                f"the bag '{path}' was recorded with another definition of {connection.msgtype}; record it again"
             )
     found = sorted({c.topic.rsplit('/', 1)[0] or '/' for c in ours})
     if namespace is None and len(found) > 1:

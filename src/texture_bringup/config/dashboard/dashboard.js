@@ -231,7 +231,7 @@ function connect() {
     connected = true;
     last = Date.now();
     say('');
-    loadMotions().catch(() => say('the list of motions did not come; load the page anew', true));
+    loadMotions().catch(() => say('the list of motions did not come; load the page again', true));
   };
   socket.onmessage = (message) => {
     const frame = JSON.parse(message.data);

@@ -31,7 +31,7 @@ class Ring:
         self.lost = 0
 
     def update(self, signal: TactileSignal) -> None:
-        """Append a batch; a stream of another sensor or rate begins anew, lost samples leave a gap of NaN."""
+        """Append a batch; a stream of another sensor or rate starts again, lost samples leave a gap of NaN."""
         if (signal.sensor, signal.sampling_rate_hz) != (self.sensor, self.rate_hz):
             self._begin(signal)
         gap = 0 if self._next is None else max(0, signal.first_sample - self._next)

@@ -37,7 +37,7 @@ GONE_S = 10.0
 SILENT_S = 75.0
 # So long until a goal is taken: that takes no time, unless the request has been lost with an explorer that just died.
 ACCEPT_S = 15.0
-# After so much silence the explorer is asked again: one that was started anew says that it knows of nothing.
+# After so much silence the explorer is asked again: one that was started again says that it knows of nothing.
 RETRY_PERIOD_S = 5.0
 # What this process sees, the other processes see soon after.
 DISCOVERY_S = 1.0

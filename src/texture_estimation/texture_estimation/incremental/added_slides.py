@@ -51,7 +51,7 @@ def remove_added_slide(model: str | Path, number: int) -> None:
 def read_added_slides(model: str | Path, feature_set: str, names: Sequence[str]) -> tuple[AddedSlide, ...]:
     """Return the added slides of a model in their order; none if there is no folder.
 
-    They hold features, so they stay valid when the model is trained anew with the same features.
+    They hold features, so they stay valid when the model is trained again with the same features.
 
     Raises
     ------

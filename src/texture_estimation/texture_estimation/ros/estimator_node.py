@@ -74,7 +74,7 @@ class EstimatorNode(Node):
         self._estimates += 1
 
     def _count_lost(self, number: int) -> None:
-        """Count the vectors that did not come: their numbers run on, and begin anew with another extractor."""
+        """Count the vectors that did not come: their numbers run on, and start again with another extractor."""
         if self._next_number is not None:
             self._lost += number - (self._next_number if number >= self._next_number else 0)
         self._next_number = number + 1

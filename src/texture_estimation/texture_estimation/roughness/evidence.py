@@ -21,7 +21,7 @@ PRIOR_WINDOWS = 4.0
 class RoughnessAccumulator:
     """Join the grades of the windows of one slide; the same code on the robot and on recordings.
 
-    A new exploration id, or a vector after the `last` one, begins anew.
+    A new exploration id, or a vector after the `last` one, starts again.
 
     Parameters
     ----------

@@ -94,6 +94,6 @@ class ScoreCache:
         if differing:
             raise InvalidData(
                 f"checkpoint '{path}' belongs to another search (other {', '.join(differing)}); "
-                'give the same recipe, bags and options as then, or begin anew without it'
+                'give the same recipe, bags and options as then, or start again without it'
             )
         self.records.update(records)

@@ -134,7 +134,7 @@ def cross_validate(
     Parameters
     ----------
     recipe
-        Trained anew for each fold.
+        Trained again for each fold.
     dataset
         The slides.
     splitter

@@ -125,7 +125,7 @@ def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[BiotacSli
                     fields = {name: content[f'{slide}/{name}'] for name in FIELDS}
                     yield BiotacSlide(file.stem, slide, epoch=float(content[f'{slide}/epoch']), **fields)
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it anew") from error
+        raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it again") from error
 
 
 def frame_indices(frame_time: AnyArray) -> AnyArray:

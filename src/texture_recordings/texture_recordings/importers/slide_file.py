@@ -40,7 +40,7 @@ class SlideFile:
         for key in content:
             place = self.place(key)
             if place is None:
-                raise InvalidData(f"'{self.name}' holds '{key}', which is no slide of this data set; fetch it anew")
+                raise InvalidData(f"'{self.name}' holds '{key}', which is no slide of this data set; fetch it again")
             found[place[0]].append((place[1], key))
         for name in surfaces:
             if name not in found:
@@ -62,7 +62,7 @@ class SlideFile:
             return self.slide(key, surface, condition, values)
         except (ValueError, LookupError, ArithmeticError) as error:
             raise InvalidData(
-                f"'{key}' of '{self.name}' is no slide of this data set: {error}; fetch it anew"
+                f"'{key}' of '{self.name}' is no slide of this data set: {error}; fetch it again"
             ) from error
 
     def _read(self, folder: Path) -> dict[str, AnyArray]:
@@ -74,7 +74,7 @@ class SlideFile:
                 content = Arrays(opened)
                 return {key: _slide(key, content[key]) for key in content.names}
         except (OSError, ValueError, KeyError) as error:
-            raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it anew") from error
+            raise InvalidData(f"'{file}' is no file of this data set: {error}; fetch it again") from error
 
 
 def _slide(key: str, values: AnyArray) -> AnyArray:

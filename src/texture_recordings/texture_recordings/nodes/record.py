@@ -63,7 +63,7 @@ class RecordNode(Node):
         try:
             self._bag.close()
         except OSError as error:
-            self.get_logger().error(f"'{self._path}' cannot be completed: {error}; free some space and record anew")
+            self.get_logger().error(f"'{self._path}' cannot be completed: {error}; free some space and record again")
         else:
             self.get_logger().info(f"'{self._path}' is complete: {self._report()[1]}")
             self._diagnostics.end()
@@ -105,7 +105,7 @@ class RecordNode(Node):
 
     def _check(self) -> None:
         if self._error is not None:
-            raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record anew")
+            raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record again")
 
     def _report(self) -> DiagnosticReport:
         faults = {

@@ -22,7 +22,7 @@ from texture_recordings.ros.topics import TOPICS
 from texture_recordings.schedule import Schedule
 from texture_recordings.slides import find_slides
 
-# What is derived from these is left out: the live graph derives it anew.
+# What is derived from these is left out: the live graph derives it again.
 INPUTS = ('signal', 'signal_static', 'exploration')
 EARLY_S = 0.0005  # what is due so soon is published now: waking up again would cost more than it gains
 POLL_S = 0.05
