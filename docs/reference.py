@@ -83,7 +83,7 @@ def _experiment(content: dict[str, Any]) -> str:
 
 def difficulty(chosen: dict[str, Any]) -> str:
     """Return which figure the scene was made for: it is no result."""
-    return f'The difficulty of the scene ({chosen["knob"]}) was set by {chosen["set_by"]}.\n' if chosen else ''
+    return f'The difficulty of the scene ({chosen["setting"]}) was set by {chosen["set_by"]}.\n' if chosen else ''
 
 
 def grades(root: Path) -> str:

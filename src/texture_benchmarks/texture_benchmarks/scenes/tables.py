@@ -19,8 +19,8 @@ def cost_table(
         kind = f'`{name}`, stick-slip' if sticks else f'`{name}`'
         times = (f'{value:.2f}' for value in (cost.together_ms, cost.worst_ms, cost.alone_ms))
         rows.append((kind, *times, f'{target_ms[sticks]:g}', device))
-    regressors = ('scene', 'each of many at once (ms)', 'dearest surface (ms)', 'alone (ms)', 'allowed (ms)')
-    return _table((*regressors, 'device in real time (% of a core)'), rows)
+    headings = ('scene', 'each of many at once (ms)', 'dearest surface (ms)', 'alone (ms)', 'allowed (ms)')
+    return _table((*headings, 'device in real time (% of a core)'), rows)
 
 
 def term_table(ablations: Sequence[Ablation]) -> str:
@@ -38,8 +38,8 @@ def term_table(ablations: Sequence[Ablation]) -> str:
         for ablation in ablations
         for term_effect in ablation.term_effects
     ]
-    regressors = ('scene', 'term', 'costs (µs a slide)', 'change if nowhere (points)', 'change if held out (points)')
-    return _table((*regressors, "the paper's method, if nowhere", 'verdict'), rows)
+    headings = ('scene', 'term', 'costs (µs a slide)', 'change if nowhere (points)', 'change if held out (points)')
+    return _table((*headings, "the paper's method, if nowhere", 'verdict'), rows)
 
 
 def added_table(added: Sequence[Ablation]) -> str:
@@ -49,13 +49,13 @@ def added_table(added: Sequence[Ablation]) -> str:
         for term_effect in ablation.term_effects:
             known, novel = (_points(difference) for difference in (_less(term_effect.easier), term_effect.unprepared))
             rows.append((f'`{term_effect.term}`', f'{term_effect.cost_us:.0f}', known, novel, term_effect.verdict))
-    regressors = (
+    headings = (
         'effect',
         'costs (µs a slide)',
         'change if in test and training (points)',
         'further change if not in training (points)',
     )
-    return _table((*regressors, 'verdict'), rows)
+    return _table((*headings, 'verdict'), rows)
 
 
 def _less(difference: MeanDifference) -> MeanDifference:
@@ -66,6 +66,6 @@ def _points(difference: MeanDifference) -> str:
     return f'{100 * difference.mean:+.1f} ± {100 * difference.half:.1f}'
 
 
-def _table(regressors: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = (regressors, ['---'] * len(regressors), *rows)
+def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = (headings, ['---'] * len(headings), *rows)
     return ''.join(f'| {" | ".join(line)} |\n' for line in lines)
