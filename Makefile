@@ -3,7 +3,7 @@ PYTHON ?= python3
 RUN := .venv/bin/ros-run
 # Tests that run against the clock mostly wait, but a crowd of them would disturb one another.
 TEST_JOBS ?= 2
-REALTIME_JOBS ?= 2
+REALTIME_JOBS ?= 3
 # Public recordings for evaluation, if they lie beside the repository or where the user says.
 export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 

@@ -23,7 +23,7 @@ def test_a_feature_is_left_out_another_added_and_parameters_changed_where_it_is_
     assert list(features(smaller)['signal']) == ['mean_log_bands', 'power_autocorrelation', 'log_bands']
     assert features(smaller)['signal']['power_autocorrelation'].lags == 8
     assert features(smaller)['signal']['mean_log_bands'] == features(recipe)['signal']['mean_log_bands']
-    assert (recipe.learner.hidden, smaller.learner.hidden) == (128, 32)
+    assert (recipe.learner.hidden, smaller.learner.hidden) == (256, 32)
     assert changed(recipe, {}) == recipe
 
 

@@ -24,6 +24,8 @@ from texture_simulation.devices.rails_firmware import RailsMachine
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
 
+pytestmark = pytest.mark.realtime
+
 DEADLINE_S = 30.0
 TRIES = 3  # on a machine so busy that the robot seems silent, it may not come to a slide
 BUSY_S = 0.5  # a machine that stalls tells later; the figures are recorded
@@ -138,7 +140,6 @@ from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
-pytestmark = pytest.mark.realtime
 name, parameters, request = sys.argv[1], eval(sys.argv[2]), eval(sys.argv[3])
 touch = TouchParams(speed_tolerance=0.3, force_tolerance=0.2)
 limits = SafetyLimits(state_timeout_s=1.0)

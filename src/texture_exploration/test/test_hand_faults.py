@@ -33,6 +33,7 @@ from texture_simulation.devices.dynamixel_motors import (
     leap_hand,
 )
 
+pytestmark = pytest.mark.realtime
 DEADLINE_S = 30.0
 LEAP = load_profile('leap')
 THUMB = LEAP.fingers['thumb']['press'].id
@@ -40,7 +41,6 @@ PARENT = """
 import sys, time
 from texture_exploration.hands.dynamixel import DynamixelHand
 
-pytestmark = pytest.mark.realtime
 hand = DynamixelHand('leap', sys.argv[1])
 hand.connect()
 hand.grip({'thumb': 2.0})
