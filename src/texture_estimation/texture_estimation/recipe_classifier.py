@@ -32,9 +32,10 @@ class RecipeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  #
 
     Examples
     --------
+    >>> import numpy as np
     >>> X = np.array([[0.0], [0.1], [0.2], [1.0], [1.1], [1.2]])
     >>> y = np.array(['cork', 'cork', 'cork', 'felt', 'felt', 'felt'])
-    >>> RecipeClassifier('jamali').fit(X, y).predict([[0.05], [1.05]]).tolist()
+    >>> RecipeClassifier('kaboli-svm').fit(X, y).predict([[0.05], [1.05]]).tolist()
     ['cork', 'felt']
     """
 

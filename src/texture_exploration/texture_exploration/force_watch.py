@@ -22,7 +22,7 @@ MIN_RISE_M = 0.001  # a lift that was seen from less far below says nothing of f
 class ForceWatch:
     """Compare each measured force with what the arm does.
 
-    A reading is frozen if it stays the same to the last bit for `frozen_force_s`, in at least `LEAST_REPEATS` states
+    A reading is frozen if it stays the same to the last bit for `frozen_force_s`, in at least `MIN_REPEATS` states
     with new stamps, and this cannot be:
 
     - a sensor that always carries noise (`ForceReading.NOISY`): at any time;

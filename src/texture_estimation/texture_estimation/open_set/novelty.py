@@ -23,7 +23,7 @@ FEATURES, HIDDEN, ONSET = 'features', 'hidden', 'onset'
 SPACES: Mapping[str, float] = {FEATURES: EFFECTIVE_WINDOWS[-1], HIDDEN: EFFECTIVE_WINDOWS[-1], ONSET: 1.5}
 OTHER_SCORES = 2  # negative log-odds of the best to the second label, negative fraction of windows that agree with it
 TAIL_QUANTILE = 0.9
-LEAST_SPREAD = 1e-6  # of a score, relative to its median: slides that are all the same
+MIN_SPREAD = 1e-6  # of a score, relative to its median: slides that are all the same
 LEAST_AGREEMENT_SPREAD = 0.1  # in most slides all windows may agree, which makes one that does not no novelty
 
 
@@ -76,7 +76,7 @@ class NoveltyDetector:
         """
         medians = np.stack([np.median(scores, axis=0) for scores in held_out])
         spreads = np.stack([np.quantile(scores, TAIL_QUANTILE, axis=0) for scores in held_out]) - medians
-        spreads = np.maximum(spreads, LEAST_SPREAD * (1.0 + np.abs(medians)))
+        spreads = np.maximum(spreads, MIN_SPREAD * (1.0 + np.abs(medians)))
         if spreads.shape[1] == len(distances) + OTHER_SCORES:
             spreads[:, -1] = np.maximum(spreads[:, -1], LEAST_AGREEMENT_SPREAD)
         tails = [
