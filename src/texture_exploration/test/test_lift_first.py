@@ -52,6 +52,25 @@ def test_a_force_sensor_that_cannot_be_zeroed_aborts_in_the_air(table, lifting_f
     assert table.arm.state().force_n == 0.0
 
 
+def test_an_arm_that_needs_a_longer_rise_to_zero_its_force_sensor_gets_it(table, lifting_first, monkeypatch):
+    """An arm may have seen less of the first lift than the explorer: standing still would never zero its sensor."""
+    highest_m = 0.0
+    state = table.arm.state
+
+    def seen():
+        nonlocal highest_m
+        reading = state()
+        highest_m = max(highest_m, reading.position[2])
+        lifting_first[0] = highest_m > table.home[2] + 2.5 * TOUCH.clearance_m
+        return reading
+
+    lifting_first[0] = False
+    monkeypatch.setattr(table.arm, 'state', seen)
+    outcome = table.explore(REQUEST)
+    assert outcome.success, outcome.message
+    assert highest_m < table.home[2] + 5 * TOUCH.clearance_m
+
+
 def test_a_force_that_never_stops_changing_aborts_after_the_travel_of_an_approach(table, lifting_first, monkeypatch):
     state = table.arm.state
 

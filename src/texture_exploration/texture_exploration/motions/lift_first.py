@@ -14,6 +14,7 @@ from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 CALM_S = 0.15  # at rest; an arm that zeroes its force sensor does so now
+PATIENCE_S = 0.6  # an arm that has not zeroed its force sensor by then will not do so where it stands
 
 
 class Rise(Stage):
@@ -44,15 +45,36 @@ class Rise(Stage):
 
 
 class CalmDown(Stage):
-    """Stand still, until the force sensor can be believed."""
+    """Stand still, until the force sensor can be believed.
 
-    def __init__(self, zeroed: Callable[[], bool], limits: SafetyLimits) -> None:
+    An arm that proves free air by itself may have seen less of the lift than the explorer did, or its controller may
+    not have taken the command to zero. Standing still would prove nothing more, so that the finger rises again.
+    """
+
+    def __init__(self, zeroed: Callable[[], bool], touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.lift_timeout_s, 'the arm to zero its force sensor')
         self._zeroed = zeroed
+        self._touch = touch
+        self._rest_ns = 0
+        self._start_m = self._rest_m = 0.0
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """Note when and where the arm came to rest."""
+        super().begin(time_ns, arm)
+        self._rest_ns, self._start_m, self._rest_m = time_ns, arm.position[2], arm.position[2]
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Wait."""
-        return None if self.elapsed_s(time_ns) >= CALM_S and self._zeroed() else ArmCommand()
+        """Wait; rise by the clearance whenever the arm has not zeroed its force sensor within `PATIENCE_S`."""
+        rested_s = (time_ns - self._rest_ns) * 1e-9
+        if rested_s >= CALM_S and self._zeroed():
+            return None
+        height_m = arm.position[2]
+        if rested_s < PATIENCE_S or height_m - self._start_m > self._touch.approach_travel_m:
+            return ArmCommand()
+        if height_m - self._rest_m < self._touch.clearance_m:
+            return ArmCommand(normal_m_s=self._touch.lift_speed_m_s)
+        self._rest_ns, self._rest_m = time_ns, height_m
+        return ArmCommand()
 
 
 class LiftFirst:
@@ -70,7 +92,7 @@ class LiftFirst:
 
     def __init__(self, motion: Motion, touch: TouchParams, limits: SafetyLimits, zeroed: Callable[[], bool]) -> None:
         self._motion = motion
-        self._ahead: list[Stage] = [Rise(touch, limits), CalmDown(zeroed, limits)]
+        self._ahead: list[Stage] = [Rise(touch, limits), CalmDown(zeroed, touch, limits)]
         self._stage: Stage | None = None
 
     def step(self, time_ns: int, arm: ArmState) -> MotionStep:
