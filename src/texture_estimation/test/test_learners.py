@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from sklearn.mixture import GaussianMixture
 from sklearn.naive_bayes import CategoricalNB, GaussianNB
 from sklearn.preprocessing import StandardScaler
@@ -17,7 +18,11 @@ from texture_estimation.learners.em_mixture import EmMixture
 from texture_estimation.learners.levenberg_marquardt import Network, _by_examples, _by_weights, fit_network
 from texture_estimation.learners.naive_bayes import NaiveBayes, bins_of
 from texture_estimation.learners.pair_votes import PairVotes
-from texture_estimation.learners.passive_aggressive import OnlineLinearClassifier, PassiveAggressive
+from texture_estimation.learners.passive_aggressive import (
+    CrammerSingerClassifier,
+    OnlineLinearClassifier,
+    PassiveAggressive,
+)
 from texture_estimation.learners.svm_linear import SvmLinear
 from texture_estimation.learners.svm_max_wins import SvmMaxWins, principal_components
 from texture_estimation.learners.svm_pairs import SvmPairs
@@ -332,6 +337,45 @@ def test_no_example_moves_a_plane_further_than_c():
     online = OnlineLinearClassifier(np.zeros((2, 2)), c=0.1)
     online.update(np.array([0.1]), 0)
     np.testing.assert_allclose(online.planes, [[0.01, 0.1], [-0.01, -0.1]])
+
+
+@pytest.mark.parametrize('c', [0.01, 1.0])
+def test_multi_class_planes_move_as_little_as_the_example_demands(c):
+    # Crammer et al. 2006, section 8: least ||W - W'||² / 2 + c · slack, the true label ahead of its strongest rival.
+    rng = np.random.default_rng(3)
+    for code in range(3):
+        planes, values = rng.normal(size=(3, 4)), rng.normal(size=3)
+        extended = np.append(values, 1.0)
+        scores = planes @ extended
+        rival = max(set(range(3)) - {code}, key=lambda label: scores[label])
+
+        def cost(unknown, planes=planes):
+            return 0.5 * np.square(unknown[:-1] - planes.ravel()).sum() + c * unknown[-1]
+
+        def margin(unknown, code=code, rival=rival, extended=extended):
+            weights = unknown[:-1].reshape(3, 4)
+            return (weights[code] - weights[rival]) @ extended - 1.0 + unknown[-1]
+
+        least = minimize(
+            cost,
+            np.append(planes.ravel(), 10.0),
+            method='SLSQP',
+            constraints=[{'type': 'ineq', 'fun': margin}, {'type': 'ineq', 'fun': lambda unknown: unknown[-1]}],
+            options={'ftol': 1e-12, 'maxiter': 200},
+        )
+        online = CrammerSingerClassifier(planes.copy(), c)
+        online.update(values, code)
+        np.testing.assert_allclose(online.planes, least.x[:-1].reshape(3, 4), atol=1e-4)
+
+
+def test_two_labels_learn_together_what_opposite_planes_of_half_the_length_learn():
+    rng = np.random.default_rng(0)
+    together, apart = CrammerSingerClassifier(np.zeros((2, 3)), 5.0), OnlineLinearClassifier(np.zeros((2, 3)), 10.0)
+    for _ in range(20):
+        values, code = rng.normal(size=2), int(rng.integers(2))
+        together.update(values, code)
+        apart.update(values, code)
+        np.testing.assert_allclose(together.planes[0] - together.planes[1], apart.planes[0], atol=1e-12)
 
 
 def test_online_learning_may_stop_after_some_examples_of_each_label(make_examples):

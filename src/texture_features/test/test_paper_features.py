@@ -6,10 +6,13 @@ import pywt
 from scipy import signal as scipy_signal
 from scipy import stats
 
+from texture_core.errors import InvalidData
 from texture_features.catalogue import FEATURES
 from texture_features.feature import WindowBatch
+from texture_features.feature_set import FeatureSet
 from texture_features.features.correlation import Correlation, cell_means, ranks
 from texture_features.features.log_spectrum import LogSpectrum
+from texture_features.features.mean_hjorth import MeanHjorth
 from texture_features.features.ordinal_patterns import OrdinalPatterns
 from texture_features.features.region_peaks import RegionPeaks, region_peaks
 from texture_features.features.short_time_fourier import ShortTimeFourier
@@ -224,3 +227,42 @@ def test_many_joined_windows_give_the_very_values_of_each():
     together = Correlation()(joined(fast, slow))
     for index in range(4):
         np.testing.assert_array_equal(Correlation()(joined(fast[index], slow[index])), together[index])
+
+
+SLOW = ('tdc', 'tac', 'pdc', 'electrode1', 'electrode2')
+BIOTAC = ('tdc', 'tac', 'pdc', *(f'electrode{number}' for number in range(1, 20)))
+
+
+def test_means_may_leave_channels_out_so_that_electrodes_alone_count():
+    samples = noise(200, 5) * np.array([50.0, 90.0, 30.0, 1.0, 2.0])
+    named = WindowBatch(samples, 100.0, channels=SLOW)
+    electrodes = MeanHjorth(log_activity=False, omit='tdc tac pdc')(named)[0]
+    assert electrodes[0] == pytest.approx(samples[:, 3:].var(axis=0).mean())
+    assert MeanHjorth(log_activity=False)(named)[0, 0] == pytest.approx(samples.var(axis=0).mean())
+
+
+def test_correlations_may_leave_channels_out():
+    fast, slow = noise(1100, 1), noise(50, 5, seed=1)
+    averaged = fast[:, 0].reshape(50, 22).mean(axis=1)
+    windows_of_both = WindowBatch(fast, 2200.0, joined=(WindowBatch(slow, 100.0, channels=SLOW),), channels=('pac',))
+    expected = [np.mean([measure(averaged, column)[0] for column in slow[:, 3:].T])
+                for measure in (stats.pearsonr, stats.spearmanr)]  # fmt: skip
+    np.testing.assert_allclose(Correlation(omit='tdc tac pdc')(windows_of_both), [expected], atol=1e-12)
+
+
+def test_channels_cannot_be_left_out_where_they_have_no_names_or_where_none_is_left():
+    with pytest.raises(InvalidData, match='do not name their channels'):
+        MeanHjorth(omit='tac')(windows(noise(200, 2)))
+    with pytest.raises(InvalidData, match=r'all channels \(tac\) are omitted'):
+        MeanHjorth(omit='tac')(WindowBatch(noise(200, 1), 100.0, channels=('tac',)))
+
+
+def test_the_recipes_of_kaboli_take_the_19_electrodes_of_a_biotac_alone():
+    samples = noise(200, len(BIOTAC))
+    for recipe in ('kaboli-svm', 'kaboli-pa', 'kaboli-em'):
+        inputs = {item.topic: dict(item.features) for item in FeatureSet.load(recipe).inputs}
+        mean = inputs['signal_static']['mean_hjorth'](WindowBatch(samples, 100.0, channels=BIOTAC))[0, 0]
+        electrodes = [number for number, name in enumerate(BIOTAC) if name.startswith('electrode')]
+        assert len(electrodes) == 19
+        assert mean == pytest.approx(samples[:, electrodes].var(axis=0).mean())
+        assert inputs['signal+signal_static']['correlation'].omit == inputs['signal_static']['mean_hjorth'].omit

@@ -29,6 +29,8 @@ class WindowBatch:
         Mean speed and normal force in each window; NaN if unknown.
     joined
         The same stretches of time of other inputs, for features that join several; of the same leading axes.
+    channels
+        Name of each channel; () where nothing names them.
     """
 
     samples: Samples
@@ -36,6 +38,7 @@ class WindowBatch:
     speed_m_s: Array = field(default_factory=lambda: np.array(np.nan))
     force_n: Array = field(default_factory=lambda: np.array(np.nan))
     joined: tuple[WindowBatch, ...] = ()
+    channels: tuple[str, ...] = ()
     _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -62,6 +65,33 @@ class WindowBatch:
     def moving_m_s(self) -> Array:
         """The speed, (...); NaN where it is unknown or not above 0."""
         return self.shared('moving_m_s', lambda: np.where(np.greater(self.speed_m_s, 0), self.speed_m_s, np.nan))
+
+    def without(self, omitted: str) -> list[int]:
+        """Return the numbers of the channels that are left when some are omitted.
+
+        Parameters
+        ----------
+        omitted
+            Names separated by spaces; one that no channel has is passed over.
+
+        Raises
+        ------
+        InvalidData
+            If some are to be omitted and the channels have no names, or none is left.
+        """
+        if not omitted:
+            return list(range(self.samples.shape[-1]))
+        if not self.channels:
+            raise InvalidData(
+                f"channels '{omitted}' are to be omitted, but the windows do not name their channels; give WindowBatch "
+                'its `channels`'
+            )
+        left = [number for number, name in enumerate(self.channels) if name not in omitted.split()]
+        if not left:
+            raise InvalidData(
+                f"all channels ({', '.join(self.channels)}) are omitted by '{omitted}'; leave one or more"
+            )
+        return left
 
     def shared(self, key: Hashable, compute: Callable[[], T]) -> T:
         """Return an intermediate result that several features need; it is computed once."""

@@ -128,7 +128,9 @@ class FeatureSet:
             )
         inputs = [event.windows[topic] for topic in self.topics]
         speed, force = np.array(event.speed_m_s), np.array(event.force_n)
-        values = self._values([WindowBatch(item.samples, item.rate_hz, speed, force) for item in inputs])
+        values = self._values(
+            [WindowBatch(item.samples, item.rate_hz, speed, force, channels=item.channels) for item in inputs]
+        )
         return self._vector(event, _layout(inputs), values)
 
     def extract_many(self, events: Iterable[WindowEvent]) -> list[FeatureVector]:
@@ -167,7 +169,13 @@ class FeatureSet:
         force = np.array([event.force_n for event in events])
         inputs = [events[0].windows[topic] for topic in self.topics]
         stacked = [
-            WindowBatch(np.stack([event.windows[topic].samples for event in events]), item.rate_hz, speed, force)
+            WindowBatch(
+                np.stack([event.windows[topic].samples for event in events]),
+                item.rate_hz,
+                speed,
+                force,
+                channels=item.channels,
+            )
             for topic, item in zip(self.topics, inputs, strict=True)
         ]
         values = self._values(stacked)

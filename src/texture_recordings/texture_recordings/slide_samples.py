@@ -81,7 +81,7 @@ class SlideSamples:
         """Return a stretch of the slide, all of it by default, to be described; at another speed if one is given."""
         samples = self.samples[start : None if count is None else start + count]
         speed = self.speed_m_s if speed_m_s is None else speed_m_s
-        return WindowBatch(samples, self.rate_hz, np.array(speed), np.array(self.force_n))
+        return WindowBatch(samples, self.rate_hz, np.array(speed), np.array(self.force_n), channels=self.channels)
 
 
 def _covered(states: Sequence[ExplorationState]) -> tuple[int, int]:

@@ -81,12 +81,17 @@ def gather(scene: Scene, task: RecognitionTask, seed: int, *, slow: bool) -> Sli
     conditions = np.repeat([visits.condition for _, visits in kinds], counts)[order]
     speed = np.repeat([float(visits.sliding.speed_m_s) for _, visits in kinds], counts)[order]
     force = np.repeat([float(visits.sliding.force_n) for _, visits in kinds], counts)[order]
-    rates = {stream.topic: stream.rate_hz for stream in find(SENSORS, scene.sensor, 'sensor model').streams}
+    kind = find(SENSORS, scene.sensor, 'sensor model')
+    measured = {stream.topic: stream for stream in kind.streams}
     views = []
     for number in range(len(task.visits[0].views)):
         parts = [_measured(scene, surface, visits, number, seed, slow=slow) for surface, visits in kinds]
         streams = {
-            topic: ArrayStream(np.concatenate([part[topic] for part in parts])[order], rates[topic])
+            topic: ArrayStream(
+                np.concatenate([part[topic] for part in parts])[order],
+                measured[topic].rate_hz,
+                measured[topic].channels,
+            )
             for topic in parts[0]
         }
         views.append(SlideArrays(streams, np.asarray(surfaces)[codes], speed, force))

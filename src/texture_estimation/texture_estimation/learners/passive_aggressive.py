@@ -1,4 +1,4 @@
-"""Passive-aggressive online learning."""
+"""Passive-aggressive online learning, of one plane against all others or of all planes together."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.arrays import Array
+from texture_core.catalogue import find
 from texture_core.parameters import param
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.standardisation import standardisation
@@ -17,14 +18,21 @@ from texture_estimation.log_probabilities import log_softmax
 
 @dataclass(frozen=True)
 class PassiveAggressive:
-    """A separating plane of each label against the others, moved by each example that it does not keep at a distance.
+    """A plane for each label, moved by each example that is not at a distance from where it would be mistaken.
 
     The examples are taken in rounds: the first of each label, then the second of each, and so on. Their order matters.
 
-    Source: Crammer et al. 2006, PA-I; Kaboli et al. 2015, section V.B.
+    Source: Crammer et al. 2006, PA-I: section 4 (one label against the others), section 8 (all labels together);
+    Kaboli et al. 2015, section V.B.
     """
 
     c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
+    multiclass: str = param(
+        'one_vs_rest',
+        "Sets how planes of several labels learn: 'one_vs_rest' moves the plane of each label by itself, "
+        "'crammer_singer' moves those of the true label and of its strongest rival alone.",
+        choices=('one_vs_rest', 'crammer_singer'),
+    )
     rounds: int = param(0, 'Sets the number of examples of each label to train on; 0 takes all.', low=0)
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
@@ -32,7 +40,8 @@ class PassiveAggressive:
         order = _in_rounds(codes, self.rounds)
         # Only what was seen may be known: the scale, too, is that of the training examples.
         mean, scale = standardisation(values[order])
-        online = OnlineLinearClassifier(np.zeros((int(codes.max()) + 1, values.shape[1] + 1)), self.c)
+        classifier = find(UPDATES, self.multiclass, 'multi-class form of passive-aggressive learning')
+        online = classifier(np.zeros((int(codes.max()) + 1, values.shape[1] + 1)), self.c)
         for row in order:
             online.update((values[row] - mean) / scale, int(codes[row]))
         return Fitted(
@@ -68,6 +77,48 @@ class OnlineLinearClassifier:
         loss = np.maximum(0.0, 1.0 - side * (self.planes @ extended))
         step = np.minimum(self.c, loss / (extended @ extended))
         self.planes += (step * side)[:, None] * extended
+
+
+@dataclass
+class CrammerSingerClassifier:
+    """Planes that learn together: the true label is to score higher by 1 than every other.
+
+    Parameters
+    ----------
+    planes : (n_labels, n_features + 1)
+        Weights, and the bias last.
+    c
+        How far one example may move a plane.
+    """
+
+    planes: Array
+    c: float = 1.0
+
+    def update(self, standard: Array, code: int) -> None:
+        """Learn from one example, (n_features,), of label number `code`.
+
+        Of all planes for which the true label scores higher by 1 than the rival that scored highest, the nearest are
+        taken: tau = min(c, loss / (2 |x|²)) is added to the one and subtracted from the other, times x.
+
+        Source: Crammer et al. 2006, section 8.
+        """
+        if len(self.planes) < 2:
+            return
+        extended = np.append(standard, 1.0)
+        scores = self.planes @ extended
+        rivals = scores.copy()
+        rivals[code] = -np.inf
+        rival = int(rivals.argmax())
+        loss = max(0.0, 1.0 - float(scores[code] - scores[rival]))
+        step = min(self.c, loss / (2.0 * float(extended @ extended))) * extended
+        self.planes[code] += step
+        self.planes[rival] -= step
+
+
+UPDATES: Mapping[str, type[OnlineLinearClassifier] | type[CrammerSingerClassifier]] = {
+    'one_vs_rest': OnlineLinearClassifier,
+    'crammer_singer': CrammerSingerClassifier,
+}
 
 
 @dataclass(frozen=True, eq=False)

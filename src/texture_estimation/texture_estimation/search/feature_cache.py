@@ -107,7 +107,8 @@ class FeatureCache:
 
 
 def _some(windows: WindowBatch, rows: slice) -> WindowBatch:
-    return WindowBatch(windows.samples[rows], windows.rate_hz, windows.speed_m_s[rows], windows.force_n[rows])
+    speed, force = windows.speed_m_s[rows], windows.force_n[rows]
+    return WindowBatch(windows.samples[rows], windows.rate_hz, speed, force, channels=windows.channels)
 
 
 def _derived(block: Array, feature: Feature) -> Array:

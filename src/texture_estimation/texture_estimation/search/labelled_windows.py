@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.errors import InvalidData
+from texture_core.window import Window
 from texture_estimation.learners.learner import Codes
 from texture_features.feature import WindowBatch
 from texture_features.windowing.windows import CutWindow, WindowEvent, WindowParams
@@ -54,7 +55,9 @@ class LabelledWindows:
         """Return the examples of some surfaces alone, and which of all these are, (n,)."""
         rows = np.isin(self.labels, names)
         inputs = {
-            topic: WindowBatch(item.samples[rows], item.rate_hz, item.speed_m_s[rows], item.force_n[rows])
+            topic: WindowBatch(
+                item.samples[rows], item.rate_hz, item.speed_m_s[rows], item.force_n[rows], channels=item.channels
+            )
             for topic, item in self.inputs.items()
         }
         return LabelledWindows(inputs, self.labels[rows], self.groups[rows]), rows
@@ -93,13 +96,13 @@ Cut = Callable[[WindowParams], LabelledWindows]
 
 
 def _stacked(
-    windows: Sequence[object], topic: str, speed: NDArray[np.float64], force: NDArray[np.float64]
+    windows: Sequence[Window], topic: str, speed: NDArray[np.float64], force: NDArray[np.float64]
 ) -> WindowBatch:
-    kinds = {(item.rate_hz, item.samples.shape) for item in windows}  # type: ignore[attr-defined]
+    kinds = {(item.rate_hz, item.samples.shape, item.channels) for item in windows}
     if len(kinds) > 1:
         raise InvalidData(
             f"the windows of '{topic}' differ in rate, length or channels: "
             f'{sorted(str(kind) for kind in kinds)}; use slides of one sensor'
         )
-    samples = np.stack([item.samples for item in windows])  # type: ignore[attr-defined]
-    return WindowBatch(samples, windows[0].rate_hz, speed, force)  # type: ignore[attr-defined]
+    samples = np.stack([item.samples for item in windows])
+    return WindowBatch(samples, windows[0].rate_hz, speed, force, channels=windows[0].channels)

@@ -27,10 +27,13 @@ class ArrayStream:
     samples : (n_scans, n_samples, n_channels)
     rate_hz
         Sampling rate.
+    channels
+        Name of each channel; () where nothing names them.
     """
 
     samples: Samples
     rate_hz: float
+    channels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +83,9 @@ class SlideArrays:
             )
         speed, force = np.repeat(self.speed_m_s, count), np.repeat(self.force_n, count)
         inputs = {
-            topic: WindowBatch(_cut_stream(stream, windows, count), stream.rate_hz, speed, force)
+            topic: WindowBatch(
+                _cut_stream(stream, windows, count), stream.rate_hz, speed, force, channels=stream.channels
+            )
             for topic, stream in self.streams.items()
         }
         groups = np.array([f'{number:06d}' for number in range(len(self.labels))])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
+from texture_core.parameters import param
 from texture_features.feature import WindowBatch, centred, power
 
 TINY = 1e-150
@@ -24,20 +25,28 @@ class Correlation:
     A channel that is constant, or a single sample long, correlates with nothing: 0. Of one input alone it is the mean
     correlation of its channels with each other, 0 for a single channel.
 
-    Source: Kaboli et al. 2015, eq. 4 and 5.
+    Source: Kaboli et al. 2015, eq. 4 and 5; eq. 6 has the means over the electrodes alone.
     """
 
     per_channel: ClassVar[bool] = False
     names: ClassVar[tuple[str, ...]] = ('pearson', 'spearman')
     joins: ClassVar[bool] = True
 
+    omit: str = param(
+        '', "Sets which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
+    )
+
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the two correlations, (..., 1, 2)."""
         inputs = (windows, *windows.joined)
         count = min(item.samples.shape[-2] for item in inputs)
-        rows = [cell_means(item.centred_rows, count) for item in inputs]
+        rows = [cell_means(self._rows(item), count) for item in inputs]
         values = [_mean_correlation(of_inputs) for of_inputs in (rows, [ranks(of_input) for of_input in rows])]
         return np.stack(values, axis=-1)[..., None, :]
+
+    def _rows(self, windows: WindowBatch) -> Array:
+        rows = windows.centred_rows
+        return rows[..., windows.without(self.omit), :] if self.omit else rows
 
 
 def cell_means(rows: Array, count: int) -> Array:

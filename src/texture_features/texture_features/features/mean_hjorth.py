@@ -17,7 +17,7 @@ from texture_features.features.hjorth import Hjorth
 class MeanHjorth:
     """Means over the channels of activity (or its logarithm), mobility and complexity: what `hjorth` gives for each.
 
-    Source: Kaboli et al. 2015, eq. 6 (the electrodes, with `log_activity` off).
+    Source: Kaboli et al. 2015, eq. 6 (with `log_activity` off, and of a BioTac's slow channels the electrodes alone).
     """
 
     per_channel: ClassVar[bool] = False
@@ -25,6 +25,10 @@ class MeanHjorth:
     log_activity: bool = param(True, 'Averages the logarithm of the activity instead of the activity itself.')
     floor: float = param(
         1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
+
+    omit: str = param(
+        '', "Sets which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
     )
 
     @property
@@ -39,5 +43,7 @@ class MeanHjorth:
     def __call__(self, windows: WindowBatch) -> Array:
         """Return the means."""
         values = self._per_channel(windows)
+        if self.omit:
+            values = values[..., windows.without(self.omit), :]
         means: Array = np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
         return means

@@ -63,17 +63,24 @@ class FeatureExtractor(Node):
         try:
             add(from_msg(message))
         except TextureError as error:
-            self._invalid += 1
-            self.get_logger().warning(str(error), throttle_duration_sec=1.0)
+            self._count_invalid(error)
             return
         self._publish(self._cutter.take())
+
+    def _count_invalid(self, error: TextureError) -> None:
+        self._invalid += 1
+        self.get_logger().warning(str(error), throttle_duration_sec=1.0)
 
     def _on_timeout_timer(self) -> None:
         self._publish(self._cutter.time_out(time.monotonic()))
 
     def _publish(self, events: list[WindowEvent]) -> None:
         for event in events:
-            vector = to_msg(self._feature_set.extract(event))
+            try:
+                vector = to_msg(self._feature_set.extract(event))
+            except TextureError as error:  # such as channels that the sensor does not have
+                self._count_invalid(error)
+                continue
             vector.sequence = self._sent
             vector.header.frame_id = self._frame_id
             self._publisher.publish(vector)

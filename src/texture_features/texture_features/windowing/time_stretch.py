@@ -64,7 +64,10 @@ class Stretched:
             chosen = lengths == length
             factor = windows.samples.shape[-2] / length
             samples = resample(windows.samples[chosen], length)
-            groups[length] = (chosen, WindowBatch(samples, windows.rate_hz, speed[chosen] * factor, force[chosen]))
+            stretched = WindowBatch(
+                samples, windows.rate_hz, speed[chosen] * factor, force[chosen], channels=windows.channels
+            )
+            groups[length] = (chosen, stretched)
         return groups
 
 
