@@ -1,0 +1,93 @@
+"""The motion that ships with a paper gives the recipes that ship with it a window, on every kind of arm."""
+
+import math
+
+import numpy as np
+import pytest
+
+from texture_core.resources import folder
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_estimation.recipe import load_recipe
+from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
+from texture_exploration.exploration import Exploration, no_signal_watch
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.presets import load_preset
+from texture_exploration.safety import SafetyLimits
+from texture_features.windowing.windows import CutWindow, cut_recording
+
+START_NS = NANOSECONDS
+STEP_NS = 10_000_000  # of an exploration
+# How often an arm says where it is, and how old that is: Universal Robots, rails, hands.
+ARMS = {'every 2 ms': (2_000_000, 0), 'every 5 ms': (5_000_000, 0), 'every 10 ms, 15 ms late': (10_000_000, 15_000_000)}
+PAIRS = {
+    'ets-linear': ('ets-linear-svm', 'ets-linear-ann', 'ets-linear-svm-vote', 'ets-linear-ann-vote'),
+    'ets-linear-headings': ('ets-linear-svm', 'ets-linear-ann'),
+    'ets-circular': ('ets-circular-svm', 'ets-circular-ann'),
+    'ets-ten-textures': ('ets-fine-svm', 'ets-fine-ann'),
+    'ets-roughness': ('ets-roughness-ann1', 'ets-roughness-ann5', 'ets-roughness-svm5'),
+    'jamali': ('jamali-naive-bayes-3', 'jamali-naive-bayes-5', 'jamali-amplitude'),
+    'kaboli': ('kaboli-svm', 'kaboli-pa', 'kaboli-pa-ovr', 'kaboli-em', 'kaboli-svm-rbf'),
+    'hu': ('hu-pca-svm',),
+}
+
+
+def states_of(request, arm_step_ns, late_ns):
+    """Return the states of an exploration by an arm that is stepped by hand."""
+    now = [START_NS]
+    arm = SimulatedArm(SimulatedArmParams(), clock=lambda: now[0], own_thread=False)
+    arm.connect()
+    states = []
+
+    def pace():
+        for _ in range(STEP_NS // arm_step_ns):
+            now[0] += arm_step_ns
+            arm.step(arm_step_ns * 1e-9)
+
+    limits = SafetyLimits()
+    motion = MOTIONS[request.motion](request, arm.state().position, TouchParams(), limits)
+    exploration = Exploration(
+        'one',
+        request,
+        arm=arm,
+        motion=motion,
+        limits=limits,
+        clock=lambda: now[0] + late_ns,
+        on_state=states.append,
+        signal_fault=no_signal_watch,
+    )
+    outcome = exploration.run(pace)
+    assert outcome.success, outcome.message
+    return states
+
+
+def windows_of(states, windows, rate_hz):
+    """Return the windows of a stream that runs all the time."""
+    n_samples = math.ceil((states[-1].stamp_ns - START_NS) / NANOSECONDS * rate_hz) + 1
+    signal = TactileSignal(START_NS, 's', ('fast',), (), rate_hz, 0, np.zeros((n_samples, 1), dtype=np.float32))
+    events = cut_recording({'signal': [signal]}, states, windows)
+    return [event for event in events if isinstance(event, CutWindow)]
+
+
+def recipe_windows(name):
+    load = load_roughness_recipe if name.startswith('ets-roughness') else load_recipe
+    return load(name).feature_set.windows
+
+
+@pytest.mark.parametrize(('step_ns', 'late_ns'), ARMS.values(), ids=ARMS)
+@pytest.mark.parametrize('name', PAIRS)
+def test_every_motion_of_a_preset_gives_the_recipes_of_its_paper_a_window(name, step_ns, late_ns):
+    for request in load_preset(name).requests:
+        states = states_of(request, step_ns, late_ns)
+        for recipe in PAIRS[name]:
+            assert windows_of(states, recipe_windows(recipe), 1000.0), f'{recipe} has no window of {request}'
+
+
+def test_every_shipped_preset_and_every_recipe_of_a_paper_is_asserted_above():
+    shipped = folder('texture_exploration', 'config/presets').glob('*.yaml')
+    assert {path.stem for path in shipped} == set(PAIRS)
+    recipes = [*folder('texture_estimation', 'config/recipes').glob('*.yaml')]
+    recipes += folder('texture_estimation', 'config/roughness').glob('*.yaml')
+    of_papers = {path.stem for path in recipes if path.stem.startswith(('ets-', 'jamali-', 'kaboli-', 'hu-'))}
+    assert of_papers == {recipe for names in PAIRS.values() for recipe in names}
