@@ -7,7 +7,10 @@ import pytest
 from texture_benchmarks.result import BenchmarkOptions
 from texture_benchmarks.robustness.scenes import FORCE_N, SCENE, SLIDE_S, SPEED_M_S, TouchConditions
 from texture_benchmarks.robustness.scenes import simulate_slide_signals as simulate
+from texture_benchmarks.trust.chart import trust_table
 from texture_benchmarks.trust.run import run
+from texture_benchmarks.trust.simulated import SIMULATED
+from texture_benchmarks.trust.simulated import simulate as simulate_row
 from texture_benchmarks.trust.trial import ROWS, UNDISTURBED, Outcome, Row, disturbed
 from texture_core.estimates import TextureEstimate
 from texture_evaluation.metrics import SlideResult
@@ -72,9 +75,32 @@ def test_the_quick_form_on_simulated_slides_gives_figures_and_a_chart(tmp_path: 
     assert [chart.name for chart in result.charts] == ['trust.png']
     outcomes = result.numbers['fast']['outcomes']
     assert 'simulated' in result.data
-    assert len(outcomes) == 1 + 8 + 3
+    assert len(outcomes) == 1 + 8 + 3 + 2
     clean = outcomes[UNDISTURBED]
     assert clean['slides'] == 36
     assert clean['label_right'] > 18  # chance is 3
     for outcome in outcomes.values():
         assert outcome['early_right'] + outcome['early_wrong'] <= outcome['slides']
+    told = result.numbers['told_outside_what_was_trained']['fast']
+    assert told == {'undisturbed, simulated': 0.0, 'circle, simulated': 1.0}
+    assert 'gain × 0.5' in (tmp_path / 'trust.md').read_text()
+
+
+def test_the_table_sets_more_wrong_slides_than_allowed_in_bold() -> None:
+    rows = {
+        'gain × 0.5': Outcome(60, 50, 3, 40, 2, 1.0, 50),
+        UNDISTURBED: Outcome(200, 190, 6, 195, 0, 1.0, 199),
+    }
+    lines = trust_table({'fast': rows}, allowed=2 / 60).splitlines()
+    assert lines[2] == '| gain × 0.5 | 60 | 50, 7, **3** | 40, 18, 2 |'
+    assert lines[3] == '| undisturbed | 200 | 190, 4, 6 | 195, 5, 0 |'
+
+
+def test_simulated_slides_tell_their_conditions_only_if_asked_to() -> None:
+    told, untold = (
+        simulate_row(SIMULATED['circle, simulated'], 1, np.random.default_rng(0), told=told)[0]
+        for told in (True, False)
+    )
+    assert (told.motion_name, told.speed_m_s, told.force_n) == ('circular', SPEED_M_S, FORCE_N)
+    assert untold.motion_name == 'linear_slide'
+    assert np.isnan([untold.speed_m_s, untold.force_n]).all()

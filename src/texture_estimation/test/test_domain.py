@@ -5,7 +5,7 @@ import pytest
 
 from texture_core.errors import InvalidData
 from texture_estimation.open_set.domain import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
-from texture_features.slide_conditions import SlideConditions
+from texture_features.slide_conditions import SignalLevel, SlideConditions
 
 
 def conditions(speed_m_s=0.05, force_n=1.0, motion='linear_slide', sensor='tsf85', directions_rad=(0.0,)):
@@ -113,3 +113,38 @@ def test_a_card_with_an_impossible_range_is_refused(card):
 
 def test_slides_are_counted_by_label():
     assert Domain.of_slides([conditions()] * 3, ['cork', 'felt', 'cork']).slides == {'cork': 2, 'felt': 1}
+
+
+def at_level(rms, channel='signal/pac', **known):
+    return SlideConditions(levels=(SignalLevel(channel, rms, rms, rms),), **known)
+
+
+@pytest.mark.parametrize(('rms', 'within'), [(2.1, True), (1.9, False), (15.9, True), (16.1, False)])
+def test_a_signal_far_stronger_or_weaker_than_any_trained_is_outside(rms, within):
+    domain = trained_on(at_level(4.0), at_level(8.0), level=1.0)
+    sentence = f'outside what was trained: signal level {rms:.3g} of signal/pac, trained 4 to 8'
+    assert domain.deviation(at_level(rms)) == ('' if within else sentence)
+    assert domain.deviation(at_level(rms, 'signal/other')) == ''
+    assert Domain.from_card(json.loads(json.dumps(domain.as_card()))) == domain
+
+
+def test_added_slides_widen_the_domain():
+    added = conditions(0.1, 2.0, 'circular', 'biotac', (1.57,))
+    assert TRAINED.deviation(added)
+    wider = TRAINED.widened([added], ['oak'])
+    assert wider.deviation(added) == ''
+    assert wider.deviation(conditions()) == ''
+    assert wider.deviation(conditions(0.2)) == 'outside what was trained: speed 0.2 m/s, trained 0.045 to 0.1 m/s'
+    assert wider.slides == {'cork': 2, 'oak': 1}
+    louder = trained_on(at_level(4.0)).widened([at_level(40.0)], ['oak'])
+    assert louder.levels == {'signal/pac': (4.0, 40.0)}
+
+
+def test_an_added_slide_tells_nothing_of_what_was_unknown_in_the_training():
+    assert Domain().widened([conditions()], ['oak']).deviation(conditions(9.0, 9.0, 'circular')) == ''
+    assert TRAINED.widened([SlideConditions()], ['oak']).speed_m_s == TRAINED.speed_m_s
+
+
+def test_a_card_with_an_impossible_level_is_refused():
+    with pytest.raises(InvalidData, match='signal/pac'):
+        Domain.from_card({'levels': {'signal/pac': [2.0, 1.0]}})

@@ -8,6 +8,8 @@ from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.features import FeatureVector
 from texture_estimation.incremental.incremental_classifier import EXPLORATIONS, IncrementalClassifier
 from texture_estimation.model import load_model
+from texture_estimation.open_set.domain import Domain
+from texture_features.slide_conditions import SlideConditions
 
 
 def measured(incremental_classifier, values, exploration_id='e1', feature_set=None, last=True):
@@ -146,3 +148,21 @@ def test_one_exploration_cannot_stand_under_two_labels(model, silk):
         incremental_classifier.add('satin')
     incremental_classifier.remove_last()
     assert incremental_classifier.add('satin') == 12
+
+
+def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_restart(model, silk, tmp_path):
+    domain = Domain(motions=('linear_slide',), speed_m_s=(0.05, 0.05))
+    path = dataclasses.replace(model, domain=domain).save(tmp_path / 'surfaces')
+    incremental_classifier = IncrementalClassifier(load_model(path), path)
+    for row in silk:
+        incremental_classifier.observe(
+            FeatureVector(0, 'e1', 0.5, 0.1, model.names, row, 0.1, feature_set=model.feature_set)
+        )
+    fast = SlideConditions('linear_slide', speed_m_s=0.1)
+    assert incremental_classifier.model.active_domain.deviation(fast)
+    incremental_classifier.add('silk')
+    assert incremental_classifier.model.active_domain.deviation(fast) == ''
+    again = IncrementalClassifier(load_model(path), path)
+    assert again.model.active_domain.deviation(fast) == ''
+    again.remove_last()
+    assert again.model.active_domain == domain

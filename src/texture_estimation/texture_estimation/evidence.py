@@ -86,7 +86,7 @@ class EvidenceAccumulator:
             self._message = f"a window was left out: its feature '{bad}' is not finite"
             return
         self._conditions.update(vector)
-        self._deviation = model.domain.deviation(self._conditions.get())
+        self._deviation = model.active_domain.deviation(self._conditions.get())
         window_evidence = model.recipe.evidence.window_evidence(model.predictor(vector.values))
         self._sum += window_evidence
         self._windows += 1

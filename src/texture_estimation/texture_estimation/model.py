@@ -108,6 +108,15 @@ class TextureModel:
         return self.novelty_detector.with_slides(means, numbers)
 
     @cached_property
+    def active_domain(self) -> Domain:
+        """Domain that includes the added slides."""
+        if not self.added_slides:
+            return self.domain
+        return self.domain.widened(
+            [added.conditions for added in self.added_slides], [added.label for added in self.added_slides]
+        )
+
+    @cached_property
     def _hidden_layer(self) -> Callable[[Array], Array] | None:
         return hidden_layer(self.recipe.learner.predictor(self.parameters))
 

@@ -84,10 +84,18 @@ class DecisionParams(TrainingParams):
         high=3.2,
     )
 
+    level_margin: float = param(
+        1.0,
+        'Sets how far the signal level of an exploration may lie outside the levels of the training, relative to them; '
+        'beyond, the estimate says that it is outside what was trained.',
+        low=0.0,
+        high=1e6,
+    )
+
     @property
     def domain_margins(self) -> DomainMargins:
         """How far an exploration may lie outside the conditions of the training."""
-        return DomainMargins(self.speed_margin, self.force_margin, self.direction_margin_rad)
+        return DomainMargins(self.speed_margin, self.force_margin, self.direction_margin_rad, self.level_margin)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,8 @@
+import dataclasses
+import json
 import math
 
+import numpy as np
 import pytest
 
 from texture_core.features import FeatureVector
@@ -35,3 +38,24 @@ def test_a_long_slide_has_few_directions() -> None:
     for number in range(1000):
         running.update(window(direction_rad=math.pi * (number % 2) + 1e-4 * (number % 7)))
     assert running.get().directions_rad == (0.0, 3.14)
+
+
+def test_the_level_of_a_channel_is_the_geometric_mean_of_the_rms_of_its_windows() -> None:
+    names = ('signal/hjorth/mobility/a', 'signal/moments/signal_log_power/a', 'signal/moments/signal_log_power/b')
+    running = RunningConditions()
+    for rms in (1.0, 4.0):
+        log_power = 2.0 * math.log(rms)
+        running.update(window(names=names, values=np.array([7.0, log_power, log_power + 2.0 * math.log(10.0)])))
+    first, second = running.get().levels
+    assert first == ('signal/a', pytest.approx(2.0), pytest.approx(1.0), pytest.approx(2.0))
+    assert (second.channel, second.rms) == ('signal/b', pytest.approx(20.0))
+
+
+def test_conditions_survive_a_file() -> None:
+    running = RunningConditions()
+    names = ('signal/moments/signal_log_power/a',)
+    running.update(window(names=names, values=np.zeros(1), speed_m_s=0.05, motion='circular', direction_rad=0.5))
+    stored = json.loads(json.dumps(dataclasses.asdict(running.get())))
+    found = SlideConditions.from_mapping(stored)
+    assert repr(found) == repr(running.get())  # NaN is not equal to itself
+    assert repr(SlideConditions.from_mapping({})) == repr(SlideConditions())

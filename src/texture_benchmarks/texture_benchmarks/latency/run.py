@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +12,11 @@ import numpy as np
 
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
+from texture_estimation.model import TextureModel
 from texture_evaluation.charts import histogram_chart
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
+from texture_features.windowing.windows import WindowEvent
 from texture_recordings.slide_dataset import SlideDataset
 from texture_simulation.scene import load_scene
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
@@ -67,9 +69,10 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
 @dataclass(frozen=True, eq=False)
 class _Timing:
-    """Times of one recipe."""
+    """Times of one recipe: in one process, with and without novelty detection in turn, and through the graph."""
 
     alone_us: Array
+    without_novelty_us: Array
     live: LiveLatency
 
     @property
@@ -78,10 +81,12 @@ class _Timing:
 
     def numbers(self, driver: float) -> Mapping[str, Any]:
         median, p99 = np.percentile(self.alone_us, (50, 99))
+        without = float(np.median(self.without_novelty_us))
         live = self.live.numbers()
         cpu = {'sensor': round(100 * driver, 1), **live.pop('cpu_percent')}
         return {
             'in_process': {'windows': len(self.alone_us), 'median_us': float(median), 'p99_us': float(p99)},
+            'novelty': {'median_us_without': without, 'ratio': float(median) / without},
             'dds': live,
             'cpu_percent': {**cpu, 'all': round(sum(cpu.values()), 1)},
         }
@@ -92,8 +97,19 @@ def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: Ben
 
     model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
     cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
-    # The last of each is the end of the slide, which is no window; the first pass warms up.
-    passes = [[run_model(model, events)[2][:-1] for events in cut] for _ in range(1 + PASSES)]
-    alone_us = np.concatenate([taken for one in passes[1:] for taken in one])
+    alone_us, without_us = _in_turn((model, replace(model, novelty_detector=None)), cut)
     live = measure(folder / f'{recipe}.skops', options.seed, QUICK_LIVE_S if options.quick else LIVE_S)
-    return _Timing(alone_us, live)
+    return _Timing(alone_us, without_us, live)
+
+
+def _in_turn(models: Sequence[TextureModel], cut: Sequence[Sequence[WindowEvent]]) -> list[Array]:
+    """Return the times of the windows of slides by each model, µs; the models take turns, so load meets them alike.
+
+    The last of each slide is its end, which is no window; the first pass warms up.
+    """
+    taken: list[list[Array]] = [[] for _ in models]
+    for number in range(1 + PASSES):
+        for place, model in enumerate(models):
+            timed = [run_model(model, events)[2][:-1] for events in cut]
+            taken[place] += timed if number else []
+    return [np.concatenate(own) for own in taken]

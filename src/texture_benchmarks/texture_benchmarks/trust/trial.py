@@ -60,23 +60,42 @@ def _other_finger(
 
 @dataclass(frozen=True)
 class Row:
-    """One disturbance at several strengths."""
+    """One disturbance at several strengths.
+
+    Parameters
+    ----------
+    change
+        What is done to the samples.
+    strengths
+        How strongly.
+    form
+        Name of the disturbance at a strength.
+    percent
+        Whether the name gives the strength in percent.
+    """
 
     change: Change
     strengths: Sequence[float]
-    axis: str
+    form: str
+    percent: bool = False
+
+    def name(self, strength: float) -> str:
+        """Return the name of the disturbance at this strength."""
+        return self.form.format(100.0 * strength if self.percent else strength)
 
 
 ROWS: Mapping[str, Row] = {
-    'gain': Row(_of_vibration('lower gain'), (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0), 'factor'),
-    'white noise': Row(_shared('white noise'), (0.003, 0.01, 0.03, 0.1), "of the slide's rms"),
-    'speed': Row(_shared('slower than trained'), (0.4, 0.7, 0.9, 0.95, 1.05, 1.1, 1.4, 2.0), 'of that trained'),
-    'another finger': Row(_other_finger, (1.0, 2.0, 4.0), 'dB'),
-    'wear': Row(_of_vibration('wear'), (800.0, 300.0), 'cut-off (Hz)'),
-    'offset drift': Row(_shared('offset drift'), (0.1, 1.0, 10.0), 'rms/s'),
-    'lost samples': Row(_of_vibration('lost samples'), (0.001, 0.005, 0.01), 'fraction'),
-    'hidden losses': Row(_of_vibration('losses hidden'), (0.003, 0.01, 0.03, 0.1), 'fraction'),
-    'clipped': Row(_of_vibration('clipping'), (3.0, 2.0, 1.0), 'rms'),
+    'gain': Row(_of_vibration('lower gain'), (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0), 'gain × {:g}'),
+    'white noise': Row(_shared('white noise'), (0.003, 0.01, 0.03, 0.1), 'white noise {:g} % of the rms', percent=True),
+    'speed': Row(_shared('slower than trained'), (0.4, 0.7, 0.9, 0.95, 1.05, 1.1, 1.4, 2.0), 'speed × {:g}'),
+    'another finger': Row(_other_finger, (1.0, 2.0, 4.0), 'another finger, {:g} dB'),
+    'wear': Row(_of_vibration('wear'), (800.0, 300.0), 'low-pass {:g} Hz'),
+    'offset drift': Row(_shared('offset drift'), (0.1, 1.0, 10.0), 'drift {:g} rms/s'),
+    'lost samples': Row(_of_vibration('lost samples'), (0.001, 0.005, 0.01), 'lost samples {:g} %', percent=True),
+    'hidden losses': Row(
+        _of_vibration('losses hidden'), (0.003, 0.01, 0.03, 0.1), 'hidden losses {:g} %', percent=True
+    ),
+    'clipped': Row(_of_vibration('clipping'), (3.0, 2.0, 1.0), 'clipped at {:g} rms'),
 }
 
 
@@ -105,6 +124,11 @@ class Outcome:
     final_wrong: int
     mean_s: float
     label_right: int
+
+    @property
+    def worst_wrong(self) -> float:
+        """The larger share of slides that were wrong and known: at the first certain estimate, or at the end."""
+        return max(self.early_wrong, self.final_wrong) / self.slides
 
     @classmethod
     def of(cls, results: Sequence[SlideResult]) -> Outcome:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from texture_core.errors import ModelMismatch
 from texture_core.files import MB
 from texture_core.plain_data import load_json
 from texture_estimation import model_files
+from texture_features.slide_conditions import SlideConditions
 
 FORMAT = 1
 MAX_BYTES = 20 * MB  # of a file; a slide of a minute with 200 features has 5
@@ -21,11 +22,24 @@ MAX_BYTES = 20 * MB  # of a file; a slide of a minute with 200 features has 5
 
 @dataclass(frozen=True, eq=False)
 class AddedSlide:
-    """One slide over a known surface: its label, and the features of its windows, (n, n_features)."""
+    """One slide over a known surface.
+
+    Parameters
+    ----------
+    label
+        Of the surface.
+    exploration_id
+        Of the slide.
+    values : (n, n_features)
+        Features of its windows.
+    conditions
+        How it was made, as far as it is known.
+    """
 
     label: str
     exploration_id: str
     values: Array
+    conditions: SlideConditions = field(default_factory=SlideConditions)
 
 
 def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, feature_set: str) -> Path:
@@ -36,6 +50,7 @@ def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, f
         'label': added_slide.label,
         'exploration_id': added_slide.exploration_id,
         'values': added_slide.values.tolist(),
+        'conditions': asdict(added_slide.conditions),
     }
     path = _folder(model) / f'{number:05d}.json'
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -65,11 +80,12 @@ def _read(path: Path, feature_set: str, n_features: int) -> AddedSlide:
     try:
         content = load_json(path, MAX_BYTES)
         values = np.array(content['values'], dtype=np.float64)
-        added_slide = AddedSlide(str(content['label']), str(content['exploration_id']), values)
+        conditions = SlideConditions.from_mapping(content.get('conditions', {}))
+        added_slide = AddedSlide(str(content['label']), str(content['exploration_id']), values, conditions)
         of = str(content['feature_set'])
         if not np.isfinite(values).all():
             raise ValueError('it holds values that are not finite')
-    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise ModelMismatch(
             f"added slide '{path}' cannot be read: {type(error).__name__}: {error}; remove it and add it again"
         ) from error

@@ -14,6 +14,7 @@ from texture_core.features import FeatureVector
 from texture_core.labels import checked_label
 from texture_estimation.incremental.added_slides import AddedSlide, remove_added_slide, write_added_slide
 from texture_estimation.model import TextureModel
+from texture_features.slide_conditions import RunningConditions
 
 # Number of recent explorations that can be added, and of windows of each.
 EXPLORATIONS, WINDOWS = 20, 600
@@ -40,6 +41,7 @@ class IncrementalClassifier:
         self._ridge_classifier = model.ridge_classifier()
         self._path = path
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
+        self._conditions: dict[str, RunningConditions] = {}  # of the same explorations
 
     def observe(self, vector: FeatureVector) -> None:
         """Keep a window, so that its exploration can be added."""
@@ -49,8 +51,10 @@ class IncrementalClassifier:
         self._recent_windows.move_to_end(vector.exploration_id)
         windows.append(vector.values)
         del windows[:-WINDOWS]
+        self._conditions.setdefault(vector.exploration_id, RunningConditions()).update(vector)
         while len(self._recent_windows) > EXPLORATIONS:
-            self._recent_windows.popitem(last=False)
+            oldest, _ = self._recent_windows.popitem(last=False)
+            del self._conditions[oldest]
 
     def add(self, label: str, exploration_id: str = '') -> int:
         """Add an exploration, the last one if '', as examples of a label; return their number now.
@@ -71,7 +75,7 @@ class IncrementalClassifier:
             known = ', '.join(self._recent_windows) or 'none'
             raise InvalidData(f"exploration '{name}' has no usable window; explore first. Can be added: {known}")
         self._refuse_second_label(name, label)
-        added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]))
+        added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
         if self._path is not None:
             write_added_slide(self._path, len(self.model.added_slides) + 1, added_slide, self.model.feature_set)
         self._update((*self.model.added_slides, added_slide), label)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,11 +32,14 @@ class DomainMargins:
         Relative margins: from low / (1 + margin) to high · (1 + margin) is within.
     direction_rad
         Largest angle to a direction of the training.
+    level
+        Relative margin of the signal level.
     """
 
     speed: float = 0.15
     force: float = 0.3
     direction_rad: float = 0.35
+    level: float = 1.0
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
@@ -60,6 +63,8 @@ class Domain:
         Lowest and highest mean; None if unknown.
     directions_rad
         Arcs (from, to) that the directions of travel cover, from +x towards +y; `to` may exceed π. Empty if unknown.
+    levels
+        Lowest and highest signal level of each channel, root mean square in the unit of the signal; empty if unknown.
     slides
         Number of slides of each label.
     margins
@@ -79,12 +84,13 @@ class Domain:
     speed_m_s: Interval | None = None
     force_n: Interval | None = None
     directions_rad: tuple[Interval, ...] = ()
+    levels: Mapping[str, Interval] = field(default_factory=dict)
     slides: Mapping[str, int] = field(default_factory=dict)
     margins: DomainMargins = field(default_factory=DomainMargins)
 
     def __post_init__(self) -> None:
-        for name in ('speed_m_s', 'force_n'):
-            interval = getattr(self, name)
+        ranges = {'speed_m_s': self.speed_m_s, 'force_n': self.force_n, **self.levels}
+        for name, interval in ranges.items():
             if interval is not None and not 0.0 <= interval[0] <= interval[1] < math.inf:
                 raise InvalidData(f'{name} of a domain is {interval}; two numbers from 0 on in rising order are needed')
         for start, end in self.directions_rad:
@@ -114,8 +120,33 @@ class Domain:
             speed_m_s=_interval((slide.speed_m_s, *slide.speed_range_m_s) for slide in slides),
             force_n=_interval((slide.force_n, *slide.force_range_n) for slide in slides),
             directions_rad=_directions(slides, margins.direction_rad),
+            levels=_levels(slides),
             slides=dict(Counter(labels)),
             margins=margins,
+        )
+
+    def widened(self, conditions: Sequence[SlideConditions], labels: Iterable[str]) -> Domain:
+        """Return the domain with slides that were added after the training.
+
+        They widen what is known of the training; what was unknown there is still not compared.
+
+        Parameters
+        ----------
+        conditions
+            Of each added slide, as far as they are known.
+        labels
+            Of each added slide.
+        """
+        new = Domain.of_slides(conditions, labels, self.margins)
+        return replace(
+            self,
+            motions=_names((*self.motions, *new.motions)) if self.motions else (),
+            sensors=_names((*self.sensors, *new.sensors)) if self.sensors else (),
+            speed_m_s=_union(self.speed_m_s, new.speed_m_s),
+            force_n=_union(self.force_n, new.force_n),
+            directions_rad=(*self.directions_rad, *new.directions_rad) if self.directions_rad else (),
+            levels={name: _union(own, new.levels.get(name)) or own for name, own in self.levels.items()},
+            slides=dict(Counter(self.slides) + Counter(new.slides)),
         )
 
     def deviation(self, conditions: SlideConditions) -> str:
@@ -141,6 +172,7 @@ class Domain:
             motions=tuple(map(str, card.get('motions', ()))),
             sensors=tuple(map(str, card.get('sensors', ()))),
             directions_rad=tuple(_pair(arc) for arc in card.get('directions_rad', ())),
+            levels={str(name): _pair(interval) for name, interval in card.get('levels', {}).items()},
             slides={str(label): int(count) for label, count in card.get('slides', {}).items()},
             margins=DomainMargins(**{name: float(value) for name, value in card.get('margins', {}).items()}),
             **intervals,
@@ -159,6 +191,10 @@ class Domain:
             yield f"sensor '{sensor}', trained {_listed(self.sensors)}"
         for direction in self._untrained_directions(conditions)[:1]:
             yield f'direction {direction:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
+        for level in conditions.levels:
+            trained = self.levels.get(level.channel)
+            if _beyond(level.rms, trained, self.margins.level):
+                yield f'signal level {level.rms:.3g} of {level.channel}, trained {_range(trained)}'
 
     def _untrained_directions(self, conditions: SlideConditions) -> list[float]:
         """Return the directions of a slide outside the arcs; none where directions are not compared."""
@@ -202,6 +238,23 @@ def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[I
     if any(slide.motion in TURNING_MOTIONS for slide in slides):
         return (FULL_CIRCLE,)
     return covered_arcs((angle for slide in slides for angle in slide.directions_rad), 2.0 * margin_rad)
+
+
+def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
+    """Return the range of the signal level of each channel."""
+    by_channel: defaultdict[str, list[tuple[float, ...]]] = defaultdict(list)
+    for slide in slides:
+        for level in slide.levels:
+            by_channel[level.channel].append((level.rms, level.lowest, level.highest))
+    found = {channel: _interval(means) for channel, means in by_channel.items()}
+    return {channel: interval for channel, interval in found.items() if interval is not None}
+
+
+def _union(trained: Interval | None, added: Interval | None) -> Interval | None:
+    """Return the range of the training with that of added slides; None if the training knew none."""
+    if trained is None or added is None:
+        return trained
+    return min(trained[0], added[0]), max(trained[1], added[1])
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:
