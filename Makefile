@@ -23,7 +23,7 @@ lint: setup
 	@$(RUN) python tools/check_terms.py
 
 test: setup lint
-	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile -m "not realtime"
+	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile -m "not realtime" --doctest-modules
 	@$(RUN) python -m pytest -n $(REALTIME_JOBS) --dist loadfile -m realtime || { \
 	  echo 'Tests against the clock failed beside others; they run again, alone:'; \
 	  $(RUN) python -m pytest -m realtime --last-failed --last-failed-no-failures none; }

@@ -25,13 +25,28 @@ class ArraySpeedEstimator:
     ----------
     offsets_m : (n_pairs,)
         d_ab of each pair of taxels a < b, in the order of itertools.combinations.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> surface = np.cumsum(rng.standard_normal(400))  # met 1 mm later by the second taxel: 10 samples at 0.1 m/s
+    >>> slide = np.column_stack([surface[10:], surface[:-10]])
+    >>> estimator = ArraySpeedEstimator.from_positions(np.array([1e-3, 0.0]))
+    >>> estimator(slide, 1000.0, np.array([0.05, 0.1, 0.2]))
+    0.1
     """
 
     offsets_m: Array
 
     @classmethod
     def from_positions(cls, positions_m: Array) -> ArraySpeedEstimator:
-        """Return the estimator for taxels at these places along the direction of sliding, (n_taxels,) m."""
+        """Return the estimator for taxels at known places.
+
+        Parameters
+        ----------
+        positions_m : (n_taxels,)
+            Place of each taxel along the direction of sliding, m.
+        """
         return cls(np.array([positions_m[a] - positions_m[b] for a, b in combinations(range(len(positions_m)), 2)]))
 
     @classmethod
@@ -48,6 +63,16 @@ class ArraySpeedEstimator:
             No two taxels are further apart along the direction of sliding.
         steps
             Offsets tried, from -reach_m to reach_m.
+
+        Returns
+        -------
+        ArraySpeedEstimator
+            With the offset of each pair that fits all slides best, to reach_m · 2 / (steps - 1).
+
+        Raises
+        ------
+        InvalidData
+            If there are no slides.
         """
         if not slides:
             raise InvalidData('there are no slides to learn the places of the taxels from; give one at a known speed')

@@ -31,6 +31,12 @@ class WindowBatch:
         The same stretches of time of other inputs, for features that join several; of the same leading axes.
     channels
         Name of each channel; () where nothing names them.
+
+    Examples
+    --------
+    >>> batch = WindowBatch(np.arange(6.0).reshape(3, 2), rate_hz=1000.0)
+    >>> batch.rows.tolist(), batch.centred_rows.tolist()
+    ([[0.0, 2.0, 4.0], [1.0, 3.0, 5.0]], [[-2.0, 0.0, 2.0], [-2.0, 0.0, 2.0]])
     """
 
     samples: Samples
@@ -107,6 +113,16 @@ class Feature(Protocol):
     A feature of the signal gives (..., n_channels, n_names); one of the motion, such as the speed, (..., 1, n_names)
     and has `per_channel` False. One that can join several inputs, found in `windows.joined`, says so by a class
     variable `joins` that is True; it has `per_channel` False.
+
+    Examples
+    --------
+    >>> class Range:  # the largest less the smallest sample of each channel
+    ...     per_channel, names = True, ('',)
+    ...
+    ...     def __call__(self, windows: WindowBatch) -> Array:
+    ...         return np.ptp(windows.rows, axis=-1)[..., None]
+    >>> Range()(WindowBatch(np.array([[1.0], [4.0]]), rate_hz=1000.0)).tolist()
+    [[3.0]]
     """
 
     @property
@@ -122,7 +138,17 @@ class Feature(Protocol):
 
 
 def centred(rows: Array) -> Array:
-    """Return rows less their mean, (..., n_samples)."""
+    """Return rows less their mean, (..., n_samples).
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+
+    Returns
+    -------
+    (..., n_samples)
+        In the unit of the rows.
+    """
     # A product with equal shares is the fastest mean, and has the same rounding for one row as for many.
     difference: Array = rows - (rows @ mean_weights(rows.shape[-1]))[..., None]
     return difference
@@ -130,21 +156,47 @@ def centred(rows: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def mean_weights(count: int) -> Array:
-    """Return 1 / count, `count` times: what a mean is a product with."""
+    """Return 1 / count, `count` times: what a mean is a product with.
+
+    Returns
+    -------
+    (count,)
+        Read-only, because it is shared.
+    """
     equal = np.full(count, 1.0 / count)
     equal.flags.writeable = False
     return equal
 
 
 def power(rows: Array) -> Array:
-    """Return the mean square of each row, (...)."""
+    """Return the mean square of each row, (...).
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+
+    Returns
+    -------
+    (...)
+        In the square of the unit of the rows; the mean is not removed.
+    """
     # A product of vectors for each row: no array of squares, and the same rounding for one row as for many.
     squares: Array = (rows[..., None, :] @ rows[..., :, None])[..., 0, 0]
     return squares / rows.shape[-1]
 
 
 def first_difference(rows: Array) -> Array:
-    """Return the steps from sample to sample, (..., max(1, n_samples - 1)); 0 for a single sample."""
+    """Return the steps from sample to sample, (..., max(1, n_samples - 1)); 0 for a single sample.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+
+    Returns
+    -------
+    (..., max(1, n_samples - 1))
+        In the unit of the rows, per sample step.
+    """
     if rows.shape[-1] == 1:
         return np.zeros_like(rows)
     return rows[..., 1:] - rows[..., :-1]

@@ -39,7 +39,14 @@ JOINT = '+'  # between the topics of a joint input
 
 @dataclass(frozen=True)
 class InputFeatures:
-    """The features of one input, or of several joined ('signal+signal_static'): (name, feature) in their order."""
+    """The features of one input, or of several joined ('signal+signal_static'): (name, feature) in their order.
+
+    Examples
+    --------
+    >>> item = InputFeatures('signal+signal_static', (('speed', Speed()),))
+    >>> item.topics, item.as_mapping()
+    (('signal', 'signal_static'), {'features': [{'speed': {}}]})
+    """
 
     topic: str
     features: tuple[tuple[str, Feature], ...]
@@ -58,7 +65,13 @@ class InputFeatures:
 
 @dataclass(frozen=True)
 class InputOptions:
-    """What an input of a recipe may say besides its features."""
+    """What an input of a recipe may say besides its features.
+
+    Examples
+    --------
+    >>> InputOptions().stretch_to_m_s  # windows keep the speed at which they were measured
+    0.0
+    """
 
     stretch_to_m_s: float = param(
         0.0, 'Speed to which windows are resampled before feature extraction; 0: no resampling.', unit='m/s', low=0.0
@@ -71,8 +84,11 @@ class FeatureSet:
 
     Examples
     --------
-    >>> features = FeatureSet.load('default')
-    >>> vectors = [features.describe(event) for event in cut_recording(signals, states, features.windows)]
+    >>> features = FeatureSet.from_mapping({'inputs': {'signal': {'features': ['mean', 'speed']}}})
+    >>> window = Window(np.array([[1.0], [3.0]]), rate_hz=1000.0, channels=('pac',))
+    >>> vector = features.extract(CutWindow(0, 'slide', 0.002, 0.001, {'signal': window}, speed_m_s=0.05))
+    >>> dict(zip(vector.names, vector.values.tolist()))
+    {'signal/mean/pac': 2.0, 'signal/speed': 0.05}
     """
 
     windows: WindowParams
@@ -93,7 +109,20 @@ class FeatureSet:
 
     @classmethod
     def from_mapping(cls, recipe: Mapping[str, Any], where: str = 'recipe') -> FeatureSet:
-        """Build from the keys `windows` and `inputs` of a recipe; other keys are left alone."""
+        """Build from the keys `windows` and `inputs` of a recipe; other keys are left alone.
+
+        Parameters
+        ----------
+        recipe
+            Content of a recipe.
+        where
+            What the mapping is, for the sentence of an error.
+
+        Raises
+        ------
+        InvalidParameter, UnknownName
+            If no input is named, or a feature or parameter is unknown or out of range.
+        """
         windows = from_mapping(WindowParams, recipe.get('windows') or {}, f'{where}, windows')
         inputs = recipe.get('inputs')
         if not isinstance(inputs, Mapping) or not inputs:
@@ -134,7 +163,7 @@ class FeatureSet:
         return self._vector(event, _layout(inputs), values)
 
     def extract_many(self, events: Iterable[WindowEvent]) -> list[FeatureVector]:
-        """Return what `describe` returns for each event, to the last bit, but faster."""
+        """Return what `extract` returns for each event, to the last bit, but faster."""
         vectors: list[FeatureVector] = []
         for kind, group in groupby(events, self._kind):
             alike = list(group)

@@ -49,6 +49,14 @@ class LabelledFeatures:
     ------
     InvalidData
         If the shapes contradict each other.
+
+    Examples
+    --------
+    >>> means = {'a': 1.0, 'b': 2.0}
+    >>> vectors = [FeatureVector(0, slide, 0.5, 0.1, ('mean',), np.array([mean])) for slide, mean in means.items()]
+    >>> features = LabelledFeatures.from_vectors(vectors, {'a': 'oak', 'b': 'felt'})
+    >>> features.X.tolist(), features.of_slides(['b']).y.tolist()
+    ([[1.0], [2.0]], ['felt'])
     """
 
     values: Array
@@ -82,7 +90,13 @@ class LabelledFeatures:
         return self.labels
 
     def take(self, rows: AnyArray) -> LabelledFeatures:
-        """Return the windows of a mask, (n,), or of indices."""
+        """Return the windows of a mask, (n,), or of indices.
+
+        Parameters
+        ----------
+        rows : (n,) bool, or (n_taken,) int
+            Which windows are taken, as a mask or by their indices.
+        """
         return replace(
             self,
             values=self.values[rows],

@@ -17,6 +17,22 @@ T = TypeVar('T')
 def choose(catalogue: Mapping[str, type[T]], entry: Any, kind: str, where: str) -> tuple[str, T]:
     """Return name and object of one entry of a recipe; `kind` is the noun for the error sentence.
 
+    Parameters
+    ----------
+    catalogue
+        What can be chosen, by name.
+    entry
+        'name', or {name: {parameter: value}}.
+    kind
+        Noun for the sentence of an error, such as 'feature'.
+    where
+        Where the entry stands, for the same sentence.
+
+    Returns
+    -------
+    str, object
+        Name of the entry and the object that was built.
+
     Raises
     ------
     InvalidParameter, UnknownName

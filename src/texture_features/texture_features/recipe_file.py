@@ -17,6 +17,20 @@ def read_recipe(
 
     A model's card (JSON) holds its recipe under `recipe`; a model (.skops) has the card beside it.
 
+    Parameters
+    ----------
+    name_or_path
+        Name of a shipped recipe, or path of a recipe (.yaml), a card (.json) or a model (.skops).
+    subfolder
+        Where texture_estimation keeps the shipped ones.
+    kind
+        Noun for the sentence of an error.
+
+    Returns
+    -------
+    str, mapping
+        Name of the file without its ending, and its content.
+
     Raises
     ------
     UnknownName, InvalidParameter

@@ -51,6 +51,12 @@ class SlideConditions:
         Lowest and highest mean over the first windows, however many: at the start of a slide speed and force settle.
     levels
         Of the channels whose moments are among the features.
+
+    Examples
+    --------
+    >>> made = SlideConditions('linear_slide', speed_m_s=0.05)
+    >>> made.speed_m_s, math.isnan(made.force_n)
+    (0.05, True)
     """
 
     motion: str = ''

@@ -15,6 +15,11 @@ class Augmentation:
     example: a gain adds a constant to the logarithm of a power or an amplitude, and slide jitter adds a random multiple
     of the deviation of a training slide from the mean of its class, which is noise with the covariance that slides of
     one class have among themselves.
+
+    Examples
+    --------
+    >>> Augmentation().copies, Augmentation(copies=8).speed_range  # off unless a recipe asks for copies
+    (0, 0.15)
     """
 
     copies: int = param(

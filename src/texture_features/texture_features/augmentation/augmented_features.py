@@ -44,6 +44,12 @@ class FeatureCopies:
         Number of the copy of the slide.
     kinds : (n,) of text
         Kind of disturbance; '' in augmented copies.
+
+    Examples
+    --------
+    >>> copies = FeatureCopies(np.zeros((2, 3), np.float32), np.array(['a', 'b']), np.arange(2), np.array(['', '']))
+    >>> copies.select(copies.groups == 'b').copies.tolist()
+    [1]
     """
 
     values: NDArray[np.float32]
@@ -52,7 +58,13 @@ class FeatureCopies:
     kinds: NDArray[np.str_]
 
     def select(self, rows: NDArray[np.bool_]) -> FeatureCopies:
-        """Return these windows, (n,)."""
+        """Return these windows, (n,).
+
+        Parameters
+        ----------
+        rows : (n,) bool
+            Which windows are kept.
+        """
         return FeatureCopies(self.values[rows], self.groups[rows], self.copies[rows], self.kinds[rows])
 
 
@@ -69,6 +81,13 @@ class AugmentedFeatures:
     gain_response : (n_features,)
         Change of each feature per natural logarithm of the gain of the vibration: 2 for the logarithm of a power, 1 for
         that of an amplitude, 0 for what no gain changes.
+
+    Examples
+    --------
+    >>> nothing = FeatureCopies(np.zeros((0, 1), np.float32), np.array(['']), np.arange(0), np.array(['']))
+    >>> features = AugmentedFeatures(nothing, nothing, gain_response=np.array([2.0]))  # of a logarithm of a power
+    >>> bool(np.isclose(np.log(3.0**2), features.gain_response[0] * math.log(3.0)))
+    True
     """
 
     copies: FeatureCopies
@@ -87,6 +106,13 @@ class Augmenter:
         What is changed, and how much.
     seed
         Of the random changes.
+
+    Examples
+    --------
+    >>> augmenter = Augmenter(FeatureSet.load('fast'), Augmentation(copies=2))
+    >>> augmenter.add('slide', lambda params: [])  # a slide without a window has no copies
+    >>> augmenter.result() is None
+    True
     """
 
     def __init__(self, feature_set: FeatureSet, augmentation: Augmentation, seed: int = 0) -> None:

@@ -30,6 +30,12 @@ class SlideWindows:
         Start of each window after that of the first.
     vibration
         Whether this is the vibration input; gain, loss of samples, clipping and the response of a finger act on it.
+
+    Examples
+    --------
+    >>> windows = SlideWindows(np.ones((4, 100, 2)), 1000.0, 0.1 * np.arange(4), vibration=True)
+    >>> amplify(windows, 3.0, np.random.default_rng(0)).mean().item(), windows.rms.tolist()
+    (3.0, [0.0, 0.0])
     """
 
     samples: Array
@@ -58,6 +64,20 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
     """Return the first `count` samples of each window as they are at a multiple of the speed.
 
     The windows must hold at least speed · count samples.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input.
+    speed
+        Multiple of the speed at which they were recorded, > 0.
+    count
+        Number of samples of each window to return.
+
+    Returns
+    -------
+    (n_windows, count, n_channels)
+        Resampled and band-limited; the sampling rate stays.
     """
     longer = windows.samples
     ratio = Fraction(1.0 / speed).limit_denominator(RATIO_LIMIT)
@@ -68,23 +88,83 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
 
 
 def add_noise(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
-    """Add white noise with a multiple of the root mean square of the slide."""
+    """Add white noise with a multiple of the root mean square of the slide.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input.
+    strength
+        Standard deviation of the noise over the root mean square of each channel.
+    rng
+        Source of the noise.
+
+    Returns
+    -------
+    (n_windows, n_samples, n_channels)
+        In the unit of the signal.
+    """
     return windows.samples + strength * windows.rms * rng.standard_normal(windows.samples.shape)
 
 
 def amplify(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Multiply the vibration."""
+    """Multiply the vibration.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input; slow channels are returned as they are.
+    strength
+        Factor.
+    _rng
+        Not used; every disturbance takes one.
+
+    Returns
+    -------
+    (n_windows, n_samples, n_channels)
+        In the unit of the signal.
+    """
     return strength * windows.samples if windows.vibration else windows.samples
 
 
 def add_drift(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Add an offset that grows by a multiple of the root mean square of the slide per second."""
+    """Add an offset that grows by a multiple of the root mean square of the slide per second.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input.
+    strength
+        Growth of the offset per second over the root mean square of each channel, 1/s.
+    _rng
+        Not used; every disturbance takes one.
+
+    Returns
+    -------
+    (n_windows, n_samples, n_channels)
+        In the unit of the signal; the offset goes on from window to window.
+    """
     times = windows.starts_s[:, None] + np.arange(windows.samples.shape[1]) / windows.rate_hz
     return windows.samples + strength * windows.rms * times[..., None]
 
 
 def hold_lost(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
-    """Replace a fraction of the vibration, by bursts, by the last value before."""
+    """Replace a fraction of the vibration, by bursts, by the last value before.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input; slow channels are returned as they are.
+    strength
+        Fraction of the samples that is lost, 0 to 1, in bursts of 10 ms.
+    rng
+        Source of the places of the bursts.
+
+    Returns
+    -------
+    (n_windows, n_samples, n_channels)
+        In the unit of the signal; the first sample of a window is never lost.
+    """
     n_windows, n_samples, _ = windows.samples.shape
     if not windows.vibration:
         return windows.samples
@@ -97,7 +177,22 @@ def hold_lost(windows: SlideWindows, strength: float, rng: np.random.Generator) 
 
 
 def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Limit the vibration to a multiple of its root mean square about the mean."""
+    """Limit the vibration to a multiple of its root mean square about the mean.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input; slow channels are returned as they are.
+    strength
+        Limit over the root mean square of each channel.
+    _rng
+        Not used; every disturbance takes one.
+
+    Returns
+    -------
+    (n_windows, n_samples, n_channels)
+        In the unit of the signal.
+    """
     if not windows.vibration:
         return windows.samples
     limit = strength * windows.rms
@@ -105,7 +200,22 @@ def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> A
 
 
 def other_finger(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
-    """Filter the vibration by a smooth random response with this standard deviation in dB; shift slow channels."""
+    """Filter the vibration by a smooth random response with this standard deviation in dB; shift slow channels.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input; of slow channels the gains and offsets change.
+    strength
+        Standard deviation of the response over frequency, dB.
+    rng
+        Source of the response.
+
+    Returns
+    -------
+    (n_windows, n_samples, n_channels)
+        In the unit of the signal; the mean over the slide stays for vibration.
+    """
     n_channels = windows.samples.shape[2]
     deviation = windows.samples - windows.mean
     if not windows.vibration:
@@ -117,7 +227,22 @@ def other_finger(windows: SlideWindows, strength: float, rng: np.random.Generato
 
 
 def smooth_response(count: int, strength_db: float, rng: np.random.Generator) -> Array:
-    """Return a smooth random amplitude response over `count` frequencies from 0 to half the rate."""
+    """Return a smooth random amplitude response over `count` frequencies from 0 to half the rate.
+
+    Parameters
+    ----------
+    count
+        Number of frequencies, the first at 0 Hz, the last at half the sampling rate.
+    strength_db
+        Standard deviation of the response, dB.
+    rng
+        Source of the response.
+
+    Returns
+    -------
+    (count,)
+        Factors of the amplitude, 1 for no change.
+    """
     frequencies = np.linspace(0.0, 1.0, count)
     terms = np.cos(np.pi * np.arange(CURVE_TERMS)[:, None] * frequencies)
     curve = rng.standard_normal(CURVE_TERMS) @ terms / math.sqrt(3.0)  # standard deviation about 1

@@ -16,6 +16,12 @@ class ArcLength:
     """Length of the line through the samples, with time in s and the signal in its unit.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", eq. 2.
+
+    Examples
+    --------
+    >>> still = WindowBatch(np.zeros((1001, 1)), rate_hz=1000.0)  # 1 s without any change
+    >>> round(ArcLength()(still).item(), 6)
+    1.0
     """
 
     per_channel: ClassVar[bool] = True

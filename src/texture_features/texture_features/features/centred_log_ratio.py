@@ -17,6 +17,14 @@ class CentredLogRatio:
     """Logarithm of each channel's mean level less the mean of these logarithms; for levels above 0.
 
     A force that presses all taxels harder by the same factor changes nothing; friction and mounting do.
+
+    Examples
+    --------
+    >>> levels = np.array([[1.0, 4.0]])  # the second taxel carries four times the load of the first
+    >>> CentredLogRatio()(WindowBatch(levels, rate_hz=100.0))[:, 0].round(3).tolist()
+    [-0.693, 0.693]
+    >>> CentredLogRatio()(WindowBatch(10 * levels, rate_hz=100.0))[:, 0].round(3).tolist()  # pressed ten times as hard
+    [-0.693, 0.693]
     """
 
     per_channel: ClassVar[bool] = True

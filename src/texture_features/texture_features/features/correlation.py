@@ -26,6 +26,14 @@ class Correlation:
     correlation of its channels with each other, 0 for a single channel.
 
     Source: Kaboli et al. 2015, eq. 4 and 5; eq. 6 has the means over the electrodes alone.
+
+    Examples
+    --------
+    >>> rise = np.arange(10.0)[:, None]
+    >>> joined = WindowBatch(rise, rate_hz=100.0, joined=(WindowBatch(-(rise**3), rate_hz=100.0),))
+    >>> pearson, spearman = Correlation()(joined)[0].round(2).tolist()
+    >>> spearman, -1.0 < pearson < -0.9  # monotonic, but not along a straight line
+    (-1.0, True)
     """
 
     per_channel: ClassVar[bool] = False
@@ -50,7 +58,19 @@ class Correlation:
 
 
 def cell_means(rows: Array, count: int) -> Array:
-    """Return the means of `count` equal cells of rows, (..., count); at most as many as there are samples."""
+    """Return the means of `count` equal cells of rows, (..., count); at most as many as there are samples.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+    count
+        Number of cells, at most n_samples.
+
+    Returns
+    -------
+    (..., count)
+        In the unit of the rows.
+    """
     length = rows.shape[-1]
     if length == count:
         return rows
@@ -65,6 +85,11 @@ def ranks(rows: Array) -> Array:
     Parameters
     ----------
     rows : (..., n_samples)
+
+    Returns
+    -------
+    (..., n_samples)
+        Whole numbers, or halves for equal samples.
     """
     order = np.argsort(rows, axis=-1, kind='stable')
     ordered = np.take_along_axis(rows, order, axis=-1)

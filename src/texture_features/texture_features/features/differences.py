@@ -9,12 +9,24 @@ from texture_features.feature import WindowBatch
 
 
 def signal_differences(windows: WindowBatch) -> Array:
-    """Return the zero-mean signal, its steps from sample to sample, and their steps, ended by zeros: (..., 3, n)."""
+    """Return the zero-mean signal, its steps from sample to sample, and their steps, ended by zeros: (..., 3, n).
+
+    Returns
+    -------
+    (..., n_channels, 3, n_samples)
+        In the unit of the signal; differences are per sample step.
+    """
     return windows.shared('differences', lambda: _differences(windows.centred_rows))
 
 
 def squares(windows: WindowBatch) -> Array:
-    """Return the squares of `signal_differences`."""
+    """Return the squares of `signal_differences`.
+
+    Returns
+    -------
+    (..., n_channels, 3, n_samples)
+        In the square of the unit of the signal.
+    """
     return windows.shared('squares', lambda: np.square(signal_differences(windows)))
 
 

@@ -13,7 +13,13 @@ from texture_features.feature import WindowBatch
 
 @dataclass(frozen=True)
 class Force:
-    """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not say."""
+    """Mean force of the finger normal to the surface in the window, N; NaN if the exploration does not say.
+
+    Examples
+    --------
+    >>> Force()(WindowBatch(np.zeros((5, 1)), rate_hz=100.0, force_n=np.array(1.5))).item()
+    1.5
+    """
 
     per_channel: ClassVar[bool] = False
     names: ClassVar[tuple[str, ...]] = ('',)

@@ -17,7 +17,15 @@ TINY = 1e-150
 
 @dataclass(frozen=True)
 class Hjorth:
-    """Activity (power), mobility (mean frequency) and complexity (bandwidth) of each channel."""
+    """Activity (power), mobility (mean frequency) and complexity (bandwidth) of each channel.
+
+    Examples
+    --------
+    >>> time_s = np.arange(1000) / 1000.0
+    >>> tone = WindowBatch(np.sin(2 * np.pi * 40.0 * time_s)[:, None], rate_hz=1000.0)
+    >>> Hjorth(log_activity=False)(tone)[0, :2].round(2).tolist()  # ½, and 2 sin(π · 40 / 1000)
+    [0.5, 0.25]
+    """
 
     per_channel: ClassVar[bool] = True
 

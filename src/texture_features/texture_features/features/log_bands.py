@@ -16,7 +16,15 @@ from texture_features.spectra.spectrum import densities_of, mean_over_segments
 
 @dataclass(frozen=True)
 class LogBands:
-    """Logarithm of the mean power spectral density in equal bands from 0 Hz to half the sampling rate (Welch)."""
+    """Logarithm of the mean power spectral density in equal bands from 0 Hz to half the sampling rate (Welch).
+
+    Examples
+    --------
+    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(1000) / 1000.0)[:, None]
+    >>> bands = LogBands(bands=10)(WindowBatch(tone, rate_hz=1000.0))  # at 50, 100, … 500 Hz
+    >>> int(bands[0].argmax()) + 1
+    2
+    """
 
     per_channel: ClassVar[bool] = True
 

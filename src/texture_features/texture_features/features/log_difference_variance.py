@@ -14,7 +14,14 @@ from texture_features.feature import WindowBatch, centred, first_difference, pow
 
 @dataclass(frozen=True)
 class LogDifferenceVariance:
-    """Logarithm of the variance of the steps from sample to sample of each channel."""
+    """Logarithm of the variance of the steps from sample to sample of each channel.
+
+    Examples
+    --------
+    >>> zigzag = np.array([[0.0], [2.0], [0.0], [2.0], [0.0]])  # steps of 2 and -2: variance 4
+    >>> np.exp(LogDifferenceVariance()(WindowBatch(zigzag, rate_hz=100.0))).round(6).item()
+    4.0
+    """
 
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)

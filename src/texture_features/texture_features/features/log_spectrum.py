@@ -21,6 +21,13 @@ class LogSpectrum:
     of a longer one the mean over segments of that length, half overlapping, is taken.
 
     Source: Hu et al. 2014, section 4.1 (12 288 points there).
+
+    Examples
+    --------
+    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(1000) / 1000.0)[:, None]
+    >>> spectrum = LogSpectrum(points=500)(WindowBatch(tone, rate_hz=1000.0))  # at 1, 2, … 500 Hz
+    >>> int(spectrum[0].argmax()) + 1
+    100
     """
 
     per_channel: ClassVar[bool] = True

@@ -14,7 +14,13 @@ from texture_features.feature import WindowBatch, power
 
 @dataclass(frozen=True)
 class LogVariance:
-    """Logarithm of the variance of each channel."""
+    """Logarithm of the variance of each channel.
+
+    Examples
+    --------
+    >>> np.exp(LogVariance()(WindowBatch(np.array([[1.0], [5.0]]), rate_hz=100.0))).round(6).item()
+    4.0
+    """
 
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)

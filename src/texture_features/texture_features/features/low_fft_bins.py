@@ -18,6 +18,13 @@ class LowFftBins:
     """Logarithm of the power spectral density at the lowest lines of long segments: where ridges and grids show.
 
     `log_bands` with as many bands would be as fine everywhere, and noisier where fineness does not help.
+
+    Examples
+    --------
+    >>> tone = np.sin(2 * np.pi * 30.0 * np.arange(1000) / 1000.0)[:, None]
+    >>> bins = LowFftBins(bins=10, points=100)(WindowBatch(tone, rate_hz=1000.0))  # at 10, 20, … 100 Hz
+    >>> int(bins[0].argmax()) + 1
+    3
     """
 
     per_channel: ClassVar[bool] = True

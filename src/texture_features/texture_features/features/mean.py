@@ -13,7 +13,13 @@ from texture_features.feature import WindowBatch
 
 @dataclass(frozen=True)
 class ChannelMean:
-    """Mean of each channel. It may depend on how a surface was mounted."""
+    """Mean of each channel. It may depend on how a surface was mounted.
+
+    Examples
+    --------
+    >>> ChannelMean()(WindowBatch(np.array([[1.0, 10.0], [3.0, 30.0]]), rate_hz=100.0))[:, 0].tolist()
+    [2.0, 20.0]
+    """
 
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)

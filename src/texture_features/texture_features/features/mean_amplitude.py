@@ -17,6 +17,11 @@ class MeanAmplitude:
     """Mean of the absolute, zero-mean signal of each channel, in its unit: the plainest measure of how it vibrates.
 
     Source: Jamali & Sammut 2010, section VI (the baseline there).
+
+    Examples
+    --------
+    >>> MeanAmplitude()(WindowBatch(np.array([[1.0], [5.0]]), rate_hz=100.0)).item()  # each is 2 from the mean
+    2.0
     """
 
     per_channel: ClassVar[bool] = True

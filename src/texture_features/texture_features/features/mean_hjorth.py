@@ -18,6 +18,12 @@ class MeanHjorth:
     """Means over the channels of activity (or its logarithm), mobility and complexity: what `hjorth` gives for each.
 
     Source: Kaboli et al. 2015, eq. 6 (with `log_activity` off, and of a BioTac's slow channels the electrodes alone).
+
+    Examples
+    --------
+    >>> samples = np.array([[1.0, 10.0], [-1.0, -10.0]])  # powers of 1 and 100
+    >>> MeanHjorth(log_activity=False)(WindowBatch(samples, rate_hz=100.0))[0, 0].item()
+    50.5
     """
 
     per_channel: ClassVar[bool] = False

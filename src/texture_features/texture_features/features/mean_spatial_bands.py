@@ -14,7 +14,15 @@ from texture_features.features.spatial_bands import SpatialBands
 
 @dataclass(frozen=True)
 class MeanSpatialBands(SpatialBands):
-    """Mean over the channels of `spatial_bands`, independent of the taxel. NaN if the speed is unknown."""
+    """Mean over the channels of `spatial_bands`, independent of the taxel. NaN if the speed is unknown.
+
+    Examples
+    --------
+    >>> samples = np.random.default_rng(0).standard_normal((500, 4))
+    >>> both = [WindowBatch(each, 1000.0, np.array(0.05)) for each in (samples, samples[:, ::-1])]
+    >>> np.allclose(MeanSpatialBands()(both[0]), MeanSpatialBands()(both[1]))  # which taxel measured what is lost
+    True
+    """
 
     per_channel: ClassVar[bool] = False
 

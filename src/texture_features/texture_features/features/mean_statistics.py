@@ -18,6 +18,13 @@ class ChannelMeanStatistics:
 
     Means over the channels of: level; log variance; rise, the last quarter of the window less the first; its absolute
     value; share of the samples above the mean; skewness.
+
+    Examples
+    --------
+    >>> rising = np.linspace(0.0, 1.0, 100)[:, None] * np.ones(2)
+    >>> values = dict(zip(ChannelMeanStatistics.names, ChannelMeanStatistics()(WindowBatch(rising, 100.0))[0]))
+    >>> round(float(values['mean']), 2), round(float(values['rise']), 2), round(float(values['share_above']), 2)
+    (0.5, 0.76, 0.5)
     """
 
     per_channel: ClassVar[bool] = False

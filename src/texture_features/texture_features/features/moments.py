@@ -23,6 +23,14 @@ class Moments:
 
     A spectrum holds the mean squares and nothing of the rest: whether a surface pushes more than it pulls, and whether
     it hits rarely and hard or often and softly.
+
+    Examples
+    --------
+    >>> spikes = np.zeros((100, 1))
+    >>> spikes[::10] = 1.0  # rare and upwards
+    >>> values = dict(zip(Moments().names, Moments()(WindowBatch(spikes, rate_hz=100.0))[0].round(2).tolist()))
+    >>> values['signal_skewness']  # (1 - 2p) / √(p (1 - p)) with p = 0.1
+    2.67
     """
 
     per_channel: ClassVar[bool] = True

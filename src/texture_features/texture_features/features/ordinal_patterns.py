@@ -25,6 +25,13 @@ class OrdinalPatterns:
     too short for one pattern has 0 everywhere.
 
     Source: Bandt & Pompe 2002.
+
+    Examples
+    --------
+    >>> patterns = OrdinalPatterns(length=2, delay=1)
+    >>> window = WindowBatch(np.array([[0.0], [1.0], [2.0], [0.5]]), rate_hz=100.0)  # rises twice, falls once
+    >>> patterns.names, patterns(window)[0].round(2).tolist()
+    (('01', '10'), [0.67, 0.33])
     """
 
     per_channel: ClassVar[bool] = True

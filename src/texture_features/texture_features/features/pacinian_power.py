@@ -24,6 +24,14 @@ class PacinianPower:
 
     Source: Bensmaia & Hollins 2005, "Pacinian representations of fine surface texture"; slope and best frequency
     after Bolanowski et al. 1988. The straight lines are an approximation.
+
+    Examples
+    --------
+    >>> time_s = np.arange(1280) / 1280.0
+    >>> tones = np.sin(2 * np.pi * np.array([60.0, 250.0]) * time_s[:, None])
+    >>> low, best = PacinianPower(rate_of_change=False)(WindowBatch(tones, rate_hz=1280.0))[:, 0].tolist()
+    >>> np.exp(best).round(1).item(), round((best - low) * 10 / np.log(10))  # a²/2, and some 12 dB · log2(250 / 60)
+    (0.5, 24)
     """
 
     per_channel: ClassVar[bool] = True

@@ -20,6 +20,13 @@ class PeakToMedianPower:
 
     A finger that sticks and slips is still and then jumps; over an even texture all events are alike. The weakest event
     tells a single skid: being still for a tenth of the window does not move the middle.
+
+    Examples
+    --------
+    >>> alternating = np.resize([1.0, -1.0], 100)[:, None]
+    >>> jump = alternating * np.where(np.arange(100) < 10, 3.0, 1.0)[:, None]  # 9 times the power in one segment
+    >>> np.exp(PeakToMedianPower()(WindowBatch(jump, rate_hz=100.0))).round(6).item()
+    9.0
     """
 
     per_channel: ClassVar[bool] = True

@@ -25,6 +25,15 @@ class PowerAutocorrelation:
 
     0 where the one says nothing of the other, above where bursts last so long, below where they keep such a distance.
     The gain of the sensor changes nothing.
+
+    Examples
+    --------
+    >>> clicks = np.zeros((400, 1))
+    >>> clicks[::12] = 1.0
+    >>> feature = PowerAutocorrelation()
+    >>> values = dict(zip(feature.names, feature(WindowBatch(clicks, rate_hz=100.0))[0].tolist()))
+    >>> values['signal_12'] > 2.0 > -1.5 > values['signal_8']  # clicks are 12 samples apart, never 8
+    True
     """
 
     per_channel: ClassVar[bool] = True

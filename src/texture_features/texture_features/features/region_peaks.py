@@ -22,6 +22,12 @@ class RegionPeaks:
     gives the amplitudes of the coefficients, too.
 
     Source: Jamali & Sammut 2010, Algorithm 1.
+
+    Examples
+    --------
+    >>> tone = np.sin(2 * np.pi * 125.0 * np.arange(2048) / 1000.0)[:, None]
+    >>> RegionPeaks(peaks=1)(WindowBatch(tone, rate_hz=1000.0)).item()
+    125.0
     """
 
     per_channel: ClassVar[bool] = True
@@ -67,6 +73,8 @@ def region_peaks(spectrum: Array, count: int, regions: int, *, by_frequency: boo
         Number of peaks wanted.
     regions
         Number of equal parts, at most as many as there are bins.
+    by_frequency
+        Whether the peaks are ranked by their frequency, and not by their strongest region.
 
     Returns
     -------

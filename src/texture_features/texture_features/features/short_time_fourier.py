@@ -20,6 +20,15 @@ class ShortTimeFourier:
 
     The short-time Fourier transform, averaged within each part. Where a window has fewer segments than parts,
     neighbouring parts share one.
+
+    Examples
+    --------
+    >>> time_s = np.arange(1000) / 1000.0
+    >>> chirp = np.where(time_s < 0.5, np.sin(2 * np.pi * 100.0 * time_s), np.sin(2 * np.pi * 300.0 * time_s))[:, None]
+    >>> feature = ShortTimeFourier(parts=2, bands=10)  # bands at 50, 100, … 500 Hz
+    >>> values = feature(WindowBatch(chirp, rate_hz=1000.0)).reshape(2, 10)
+    >>> (values.argmax(axis=1) + 1).tolist()
+    [2, 6]
     """
 
     per_channel: ClassVar[bool] = True

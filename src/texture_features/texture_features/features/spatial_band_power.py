@@ -25,6 +25,14 @@ class SpatialBandPower:
     Bands are equally wide in octaves. Choose waves that the sensor reaches at every speed: from v / high_hz to
     v / low_hz. Of a band beyond half the sampling rate the nearest line is taken. NaN if the speed is unknown or not
     above 0.
+
+    Examples
+    --------
+    >>> def slide(speed_m_s: float) -> WindowBatch:  # over a grating with a pitch of 1 mm
+    ...     wave = np.sin(2 * np.pi * speed_m_s / 1e-3 * np.arange(2000) / 2000.0)
+    ...     return WindowBatch(wave[:, None], 2000.0, np.array(speed_m_s))
+    >>> [int(SpatialBandPower(rate_of_change=False)(slide(speed_m_s)).argmax()) + 1 for speed_m_s in (0.1, 0.2, 0.3)]
+    [2, 2, 2]
     """
 
     per_channel: ClassVar[bool] = True

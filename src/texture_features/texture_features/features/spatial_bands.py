@@ -22,6 +22,16 @@ class SpatialBands:
     the speed. Choose waves that the sensor reaches at every speed v: none shorter than 2 v / rate. Which channel
     measures what may betray how a surface was mounted; `mean_spatial_bands` does not know it. NaN if the speed is
     unknown or 0.
+
+    Examples
+    --------
+    >>> def slide(speed_m_s: float) -> WindowBatch:  # over a grating with a pitch of 2 mm
+    ...     wave = np.sin(2 * np.pi * speed_m_s / 2e-3 * np.arange(1000) / 1000.0)
+    ...     return WindowBatch(wave[:, None], 1000.0, np.array(speed_m_s))
+    >>> feature = SpatialBands(bands=8)
+    >>> strongest = [int(feature(slide(speed_m_s)).argmax()) for speed_m_s in (0.05, 0.1)]
+    >>> [bool(feature.edges_per_m[band] < 500.0 < feature.edges_per_m[band + 1]) for band in strongest]
+    [True, True]
     """
 
     per_channel: ClassVar[bool] = True

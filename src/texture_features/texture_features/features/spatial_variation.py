@@ -22,6 +22,14 @@ class SpatialVariation:
     has to be a whole number of samples. NaN if the speed is unknown or not above 0.
 
     Source: Lieber & Bensmaia 2019; Connor & Johnson 1992.
+
+    Examples
+    --------
+    >>> wave = np.sin(2 * np.pi * 100.0 * np.arange(1280) / 1280.0)[:, None]  # at 0.1 m/s: waves of 1 mm
+    >>> window = WindowBatch(wave, 1280.0, np.array(0.1))
+    >>> half, whole = (SpatialVariation(lag_m=lag_m, rate_of_change=False)(window).item() for lag_m in (5e-4, 1e-3))
+    >>> np.exp(half).round(1).item(), whole < half - 3  # (2 · amplitude)² / 2; places a wave apart are alike
+    (2.0, True)
     """
 
     per_channel: ClassVar[bool] = True

@@ -23,6 +23,12 @@ class SpectralExponent:
     of the surface must be looked at: `at_speed_m_s` moves the band with the speed. 0 if fewer than two lines lie in it.
 
     Source: Toscani & Metzger 2022.
+
+    Examples
+    --------
+    >>> walk = np.cumsum(np.random.default_rng(0).standard_normal((100_000, 1)), axis=0)  # its density falls as 1/f²
+    >>> round(SpectralExponent(low_hz=20.0, high_hz=100.0)(WindowBatch(walk, rate_hz=1000.0)).item(), 1)
+    2.0
     """
 
     per_channel: ClassVar[bool] = True

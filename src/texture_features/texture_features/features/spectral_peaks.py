@@ -21,6 +21,13 @@ class SpectralPeaks:
     that the spectrum lacks come last in either order; of equally high ones the lowest comes first.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.B.
+
+    Examples
+    --------
+    >>> time_s = np.arange(2048) / 1024.0
+    >>> tones = (np.sin(2 * np.pi * 50.0 * time_s) + 3 * np.sin(2 * np.pi * 200.0 * time_s))[:, None]
+    >>> SpectralPeaks(peaks=2)(WindowBatch(tones, rate_hz=1024.0))[0].round(3).tolist()
+    [200.0, 3.0, 50.0, 1.0]
     """
 
     per_channel: ClassVar[bool] = True
@@ -54,7 +61,18 @@ class SpectralPeaks:
 
 
 def by_frequency(peaks: Array) -> Array:
-    """Return peaks, (..., n_peaks, 2) of frequency and amplitude, the lowest first and those that are lacking last."""
+    """Return peaks, the one of the lowest frequency first and those that are lacking last.
+
+    Parameters
+    ----------
+    peaks : (..., n_peaks, 2)
+        Frequency (Hz) and amplitude of each; amplitude 0 for a peak that is lacking.
+
+    Returns
+    -------
+    (..., n_peaks, 2)
+        The same in another order.
+    """
     found = np.where(peaks[..., 1:] > 0, peaks[..., :1], np.inf)
     ordered: Array = np.take_along_axis(peaks, np.argsort(found, axis=-2, kind='stable'), axis=-2)
     return ordered

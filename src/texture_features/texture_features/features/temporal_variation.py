@@ -20,6 +20,12 @@ class TemporalVariation:
     of a fibre.
 
     Source: Lieber & Bensmaia 2019; Lieber, Xia, Weber & Bensmaia 2017.
+
+    Examples
+    --------
+    >>> ramp = WindowBatch(0.5 * np.arange(100.0)[:, None], rate_hz=1000.0)  # 0.5 a sample; 2 ms are two samples
+    >>> round(TemporalVariation()(ramp).item(), 6)
+    0.0
     """
 
     per_channel: ClassVar[bool] = True

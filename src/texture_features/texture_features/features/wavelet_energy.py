@@ -26,6 +26,12 @@ class WaveletEnergy:
 
     Octave k reaches about from rate / 2^(k+1) to rate / 2^k. A window is continued periodically, after its last sample
     is repeated where their number is odd. Octaves that a window is too short for hold no power.
+
+    Examples
+    --------
+    >>> tone = np.sin(2 * np.pi * 350.0 * np.arange(1024) / 1000.0)[:, None]  # in the first octave, 250 to 500 Hz
+    >>> int(WaveletEnergy()(WindowBatch(tone, rate_hz=1000.0)).argmax()) + 1
+    1
     """
 
     per_channel: ClassVar[bool] = True

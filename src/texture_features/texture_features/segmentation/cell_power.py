@@ -25,6 +25,24 @@ def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = S
 
     What changes over longer than `smooth_s` is no vibration, what is not finite has none, and a cell in which a channel
     stands at the end of its range is NaN.
+
+    Parameters
+    ----------
+    fast : (n_samples, n_channels)
+        Vibration.
+    rate_hz
+        Its sampling rate.
+    cell_s
+        Wanted length of a cell, s; it is rounded to whole samples.
+    smooth_s
+        Time over which a change counts as vibration, s.
+
+    Returns
+    -------
+    float
+        Length of a cell, s.
+    (n_cells, n_channels)
+        Mean square of the vibration, in the square of its unit; no cell for a very short recording.
     """
     width = max(1, round(cell_s * rate_hz))
     count = len(fast) // width
@@ -40,7 +58,22 @@ def cell_power(fast: Samples, rate_hz: float, cell_s: float, smooth_s: float = S
 
 
 def highpass(fast: Samples, rate_hz: float, smooth_s: float = SMOOTH_S) -> Samples:
-    """Return the samples without what changes over longer than `smooth_s`; 0 for what is not finite."""
+    """Return the samples without what changes over longer than `smooth_s`; 0 for what is not finite.
+
+    Parameters
+    ----------
+    fast : (n_samples, n_channels)
+        Vibration.
+    rate_hz
+        Its sampling rate.
+    smooth_s
+        Time over which a change counts as vibration, s.
+
+    Returns
+    -------
+    (n_samples, n_channels)
+        In the unit of the samples.
+    """
     vibration = median_centred(fast)
     smoothed = _smoothed(rate_hz, smooth_s)
     if len(fast) > smoothed:
@@ -50,7 +83,18 @@ def highpass(fast: Samples, rate_hz: float, smooth_s: float = SMOOTH_S) -> Sampl
 
 
 def baseline_power(powers: Array) -> Array:
-    """Return the power of each channel at rest, (n_channels,), above 0, from the quietest tenth of the recording."""
+    """Return the power of each channel at rest, (n_channels,), above 0, from the quietest tenth of the recording.
+
+    Parameters
+    ----------
+    powers : (n_cells, n_channels)
+        Power of the vibration in each cell; NaN where it is unknown.
+
+    Returns
+    -------
+    (n_channels,)
+        In the unit of `powers`.
+    """
     known = np.isfinite(powers)
     share = uniform_filter1d(known.astype(float), SMOOTHED_CELLS, axis=0)
     smooth = uniform_filter1d(np.where(known, powers, 0.0), SMOOTHED_CELLS, axis=0) / np.maximum(share, 1e-3)
@@ -67,7 +111,17 @@ def _smoothed(rate_hz: float, smooth_s: float) -> int:
 
 
 def median_centred(fast: Samples) -> Samples:
-    """Return the samples about the median of each channel; 0 for what is not finite."""
+    """Return the samples about the median of each channel; 0 for what is not finite.
+
+    Parameters
+    ----------
+    fast : (n_samples, n_channels)
+
+    Returns
+    -------
+    (n_samples, n_channels)
+        In the unit of the samples.
+    """
     known = np.where(np.isfinite(fast), fast, np.nan)
     some = np.isfinite(known).any(axis=0)
     middle = np.nanmedian(np.where(some, known, 0.0), axis=0)
@@ -76,7 +130,22 @@ def median_centred(fast: Samples) -> Samples:
 
 
 def highpass_gain(frequency_hz: AnyArray, rate_hz: float, smooth_s: float) -> Array:
-    """Return the share of power at frequencies that is not taken for the smooth part."""
+    """Return the share of power at frequencies that is not taken for the smooth part.
+
+    Parameters
+    ----------
+    frequency_hz : (n,)
+        Frequencies from 0 to half the sampling rate.
+    rate_hz
+        Sampling rate.
+    smooth_s
+        Time over which a change counts as vibration, s.
+
+    Returns
+    -------
+    (n,)
+        Power behind the high-pass filter over that before it.
+    """
     grid_hz, passed = _highpass_response(rate_hz, smooth_s)
     share: Array = np.interp(frequency_hz, grid_hz, passed)
     return share

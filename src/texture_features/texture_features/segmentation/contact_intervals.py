@@ -25,6 +25,11 @@ class ContactInterval:
     """One contact, s from the first sample: begins to be pressed, is pressed, is let go, is free.
 
     Times before the first and after the last sample are -inf and inf.
+
+    Examples
+    --------
+    >>> ContactInterval(1.0, 1.1, 3.0, 3.1).shifted(0.5)
+    ContactInterval(press_start_s=1.5, press_end_s=1.6, release_start_s=3.5, release_end_s=3.6)
     """
 
     press_start_s: float
@@ -50,6 +55,11 @@ def find_contacts(levels: Samples, rate_hz: float, vibration: Array) -> list[Con
         Their sampling rate.
     vibration : (n_samples,)
         How much the finger vibrates at the same times: it tells which of the two levels is contact.
+
+    Returns
+    -------
+    list of ContactInterval
+        Times in s from the first sample.
     """
     if len(levels) < 3:
         return []

@@ -65,6 +65,13 @@ class OnsetModel:
         One of `MEASURED_QUANTITIES`.
     smooth_s
         What changes over longer is no vibration.
+
+    Examples
+    --------
+    >>> model = OnsetModel(2000.0, np.ones(1), ramp_s=0.2, quantity='force', smooth_s=0.05)
+    >>> steady = np.random.default_rng(0).standard_normal((1000, 1))
+    >>> model.find(steady, np.zeros(1000, dtype=bool), steady, (0.0, 0.4))  # nothing is known: the middle of the range
+    0.2
     """
 
     rate_hz: float
@@ -89,6 +96,11 @@ class OnsetModel:
             Vibration at steady speed.
         between_s
             Range in which the onset is sought; it may begin before the first sample.
+
+        Returns
+        -------
+        float
+            Time of the onset, s from the first sample of `around`.
         """
         length = HOPS_PER_WINDOW * max(1, round(WINDOW_S * self.rate_hz / HOPS_PER_WINDOW))
         hop = length // HOPS_PER_WINDOW

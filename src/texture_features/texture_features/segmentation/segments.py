@@ -37,7 +37,14 @@ NO_CONTACT = ContactInterval(-math.inf, -math.inf, math.inf, math.inf)
 
 @dataclass(frozen=True)
 class SegmentationParams:
-    """How sliding is found. None of it is fitted to recordings: the power of 50 ms of rest scatters by a fifth."""
+    """How sliding is found. None of it is fitted to recordings: the power of 50 ms of rest scatters by a fifth.
+
+    Examples
+    --------
+    >>> params = SegmentationParams()
+    >>> params.on > params.off  # hysteresis: sliding needs more power to begin than to go on
+    True
+    """
 
     cell_s: float = param(
         0.005, 'Length of the frames in which the signal power is computed.', unit='s', low=0.001, high=0.1
@@ -85,7 +92,17 @@ class SegmentationParams:
 
 @dataclass(frozen=True)
 class SlidingInterval:
-    """One stretch of sliding, s from the first sample: when the finger sets off, and where its speed is steady."""
+    """One stretch of sliding, s from the first sample: when the finger sets off, and where its speed is steady.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> signal = 0.01 * rng.standard_normal((3000, 1))  # 3 s of noise at 1 kHz, and vibration from 1 s to 2 s
+    >>> signal[1000:2000] += rng.standard_normal((1000, 1))
+    >>> [interval] = find_sliding(signal, 1000.0, SegmentationParams(ramp_s=0.01, quantity='force'))
+    >>> abs(interval.start_s - 1.0) < 0.03, abs(interval.end_s - 2.0) < 0.03
+    (True, True)
+    """
 
     motion_start_s: float
     start_s: float
@@ -118,6 +135,13 @@ def find_sliding(
         Its sampling rate, and when its first sample was taken after the first of `fast`.
     rest : (n_channels,), optional
         Power of each channel at rest, if it is known; see `baseline_power`.
+    params
+        How sliding is found.
+
+    Returns
+    -------
+    list of SlidingInterval
+        Times in s from the first sample of `fast`.
 
     Raises
     ------
@@ -169,7 +193,24 @@ def _mean(ratios: Array) -> Array:
 
 
 def channel_means(fast: Samples, rate_hz: float) -> tuple[Samples, float, float]:
-    """Return the means of 10 ms of vibration channels, their rate, and the time of the first."""
+    """Return the means of 10 ms of vibration channels, their rate, and the time of the first.
+
+    Parameters
+    ----------
+    fast : (n_samples, n_channels)
+        Vibration; what is not finite is left out of the means.
+    rate_hz
+        Its sampling rate.
+
+    Returns
+    -------
+    (n_means, n_channels)
+        In the unit of the samples.
+    float
+        Rate of the means, Hz.
+    float
+        Time of the first mean after the first sample, s.
+    """
     width = max(1, round(LEVEL_S * rate_hz))
     count = len(fast) // width
     known = np.isfinite(fast[: count * width])
@@ -184,6 +225,22 @@ def active_runs(
     """Return the stretches of cells, first and one past the last, in which the power stays above that of rest, 1.
 
     NaN for a cell in which a changing load knocks.
+
+    Parameters
+    ----------
+    power : (n_cells,)
+        Power of each cell over that at rest.
+    cell_s
+        Length of a cell, s.
+    contacts
+        When the finger is pressed on; there less power is enough.
+    params
+        Thresholds and durations.
+
+    Returns
+    -------
+    list of (int, int)
+        In order; none is shorter than `params.min_duration_s`.
     """
     known = np.isfinite(power)
     filled = np.where(known, power, 0.0)

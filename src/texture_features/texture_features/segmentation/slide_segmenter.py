@@ -37,6 +37,16 @@ class SlideSegmenter:
         What the ids of the slides begin with.
     keep_s
         How much signal is looked at.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> samples = 0.01 * rng.standard_normal((3000, 1)).astype(np.float32)
+    >>> samples[1000:2000] += rng.standard_normal((1000, 1))  # vibration from 1 s to 2 s
+    >>> segmenter = SlideSegmenter(SegmentationParams(ramp_s=0.01, quantity='force'))
+    >>> states = segmenter.add_signal('signal', TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, samples))
+    >>> [state.phase.value for state in states + segmenter.finish()]
+    ['slide', 'lift']
     """
 
     def __init__(
@@ -147,6 +157,11 @@ def segment_recording(
         How sliding is found.
     exploration_id
         What the ids of the slides begin with.
+
+    Returns
+    -------
+    list of ExplorationState
+        In the order of time.
     """
     segmenter = SlideSegmenter(params, exploration_id=exploration_id, keep_s=WHOLE_S)
     tracks = [[(batch.stamp_ns, topic, batch) for batch in batches] for topic, batches in signals.items()]

@@ -46,7 +46,17 @@ def spatial_log_bands(windows: WindowBatch, edges_per_m: Array, floor: float) ->
 
 
 def mean_subtracted(log_bands: Array) -> Array:
-    """Return log bands less their mean over the bands: how hard and how fast the finger presses is mostly level."""
+    """Return log bands less their mean over the bands: how hard and how fast the finger presses is mostly level.
+
+    Parameters
+    ----------
+    log_bands : (..., n_bands)
+
+    Returns
+    -------
+    (..., n_bands)
+        Of zero mean.
+    """
     shape: Array = log_bands - np.add.reduce(log_bands, axis=-1, keepdims=True) / log_bands.shape[-1]
     return shape
 

@@ -40,7 +40,23 @@ def segment_densities(rows: Array, rate_hz: float, segment: int, step: int, bins
 
 
 def mean_densities(rows: Array, rate_hz: float, segment: int, step: int, bins: int) -> Array:
-    """Return the mean of `segment_densities` over the segments, (..., bins); it costs less than all of them."""
+    """Return the mean of `segment_densities` over the segments, (..., bins); it costs less than all of them.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+    rate_hz
+        Sampling rate.
+    segment, step
+        Length of a segment, even, and distance between two of them, in samples.
+    bins
+        Number of bins, at most segment / 2.
+
+    Returns
+    -------
+    (..., bins)
+        At the frequencies k · rate_hz / segment, k = 1 to `bins`, unit²/Hz.
+    """
     squares = _squares(rows, rate_hz, segment, step, bins)
     means = squares @ mean_weights(squares.shape[-1])
     densities: Array = means[..., :bins] + means[..., bins:]
@@ -59,14 +75,38 @@ def _squares(rows: Array, rate_hz: float, segment: int, step: int, bins: int) ->
 
 
 def segments(rows: Array, length: int, step: int) -> Array:
-    """Return the segments of rows (..., n_samples), (..., n_segments, length); a shorter row is its only segment."""
+    """Return the segments of rows; a row shorter than a segment is its only segment.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+    length, step
+        Length of a segment and distance between two of them, in samples.
+
+    Returns
+    -------
+    (..., n_segments, min(length, n_samples))
+        A copy.
+    """
     if rows.shape[-1] <= length:
         return rows[..., None, :]
     return overlapping(rows, length, step).copy()  # a product of the view itself would crawl
 
 
 def overlapping(rows: Array, length: int, step: int) -> Array:
-    """Return the segments of rows at least one segment long, (..., n_segments, length), as a view not to be changed."""
+    """Return the segments of rows as a view that must not be changed.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+        At least `length` samples long.
+    length, step
+        Length of a segment and distance between two of them, in samples.
+
+    Returns
+    -------
+    (..., n_segments, length)
+    """
     rows = np.ascontiguousarray(rows)
     count = (rows.shape[-1] - length) // step + 1
     # The bare constructor: numpy's as_strided takes longer than a copy of all segments.
@@ -80,7 +120,22 @@ def overlapping(rows: Array, length: int, step: int) -> Array:
 
 
 def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Array:
-    """Return the densities of the segments of windows; features that ask for the same share them."""
+    """Return the densities of the segments of windows; features that ask for the same share them.
+
+    Parameters
+    ----------
+    windows
+        What is described.
+    segment, step
+        Length of a segment, even, and distance between two of them, in samples.
+    bins
+        Number of bins, at most segment / 2.
+
+    Returns
+    -------
+    (..., n_channels, n_segments, bins)
+        As `segment_densities` gives them, unit²/Hz.
+    """
     return windows.shared(
         ('densities', segment, step, bins),
         lambda: segment_densities(windows.centred_rows, windows.rate_hz, segment, step, bins),
@@ -88,7 +143,17 @@ def densities_of(windows: WindowBatch, segment: int, step: int, bins: int) -> Ar
 
 
 def mean_over_segments(densities: Array) -> Array:
-    """Return the mean over the segments, (..., n_bins)."""
+    """Return the mean over the segments, (..., n_bins).
+
+    Parameters
+    ----------
+    densities : (..., n_segments, n_bins)
+
+    Returns
+    -------
+    (..., n_bins)
+        In the unit of the densities.
+    """
     mean: Array = mean_weights(densities.shape[-2]) @ densities
     return mean
 
@@ -146,7 +211,13 @@ def amplitudes_of(windows: WindowBatch, points: int) -> tuple[Array, float]:
 
 @lru_cache(maxsize=64)
 def hann(length: int) -> Array:
-    """Return a Hann window that is nowhere 0: taken in the middle of each sample."""
+    """Return a Hann window that is nowhere 0: taken in the middle of each sample.
+
+    Returns
+    -------
+    (length,)
+        Read-only, because it is shared.
+    """
     window: Array = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
     window.flags.writeable = False
     return window

@@ -23,6 +23,13 @@ def welch_spectrum(windows: WindowBatch, points: int, rate_of_change: bool) -> t
     rate_of_change
         The signal is the rate of change of what touches, as a dynamic capacitive channel gives it: the density of the
         integral is returned, by split by (2πf)².
+
+    Returns
+    -------
+    (..., n_channels, n_lines)
+        Density, unit²/Hz; for a rate of change that of its integral.
+    (n_lines,)
+        Frequencies, Hz.
     """
     segment = 2 * (points // 2)
     hertz, integration = _lines(segment, windows.rate_hz)
@@ -40,6 +47,20 @@ def at_reference_speed(hertz: Array, windows: WindowBatch, speed_m_s: float) -> 
     """Return at which frequencies the lines would stand at another speed, (..., 1, n_lines); 0 m/s: where they stand.
 
     A wave of the surface met at f is met at f · speed_m_s / v at that speed; NaN if that is unknown or not above 0.
+
+    Parameters
+    ----------
+    hertz : (n_lines,)
+        Frequencies at the speed of each window, Hz.
+    windows
+        What is described; their speeds are used.
+    speed_m_s
+        The other speed; 0 returns the frequencies unchanged.
+
+    Returns
+    -------
+    (..., 1, n_lines), or (n_lines,) for 0 m/s
+        Hz.
     """
     if not speed_m_s:
         return hertz
@@ -53,6 +74,19 @@ def force_normalised(log_power: Array, windows: WindowBatch, exponent: float) ->
     """Return a log power, (..., n_channels, n_values), less what it owes to the force, exponent · log(force).
 
     On a soft round finger (Hertz) the stiffness grows with the cube root of the force, so the power with force^(2/3).
+
+    Parameters
+    ----------
+    log_power : (..., n_channels, n_values)
+    windows
+        What is described; their forces are used.
+    exponent
+        Power of the force with which the power of the vibration grows; 0 returns `log_power` unchanged.
+
+    Returns
+    -------
+    (..., n_channels, n_values)
+        NaN where the force is unknown.
     """
     if not exponent:
         return log_power

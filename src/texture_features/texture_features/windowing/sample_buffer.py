@@ -25,6 +25,14 @@ class SampleBuffer:
         The first batch.
     keep_s
         A sample is kept until a batch arrives that begins so much later.
+
+    Examples
+    --------
+    >>> batch = TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, np.array([[1.0], [2.0]], dtype=np.float32))
+    >>> buffer = SampleBuffer(batch, keep_s=1.0)
+    >>> later = TactileSignal(3_000_000, 'finger', ('pac',), (), 1000.0, 3, np.array([[4.0]], dtype=np.float32))
+    >>> buffer.append(later), buffer.take(0, 4)[:, 0].tolist()  # the third sample is missing
+    (1, [1.0, 2.0, nan, 4.0])
     """
 
     def __init__(self, signal: TactileSignal, keep_s: float) -> None:
@@ -82,7 +90,20 @@ class SampleBuffer:
         return stamp + round((index - first) / self.rate_hz * NANOSECONDS)
 
     def take(self, first_sample: int, count: int) -> Samples:
-        """Return a copy of samples that are kept, (count, n_channels) float64."""
+        """Return a copy of samples that are kept, (count, n_channels) float64.
+
+        Parameters
+        ----------
+        first_sample
+            Running index of the first one.
+        count
+            How many.
+
+        Returns
+        -------
+        (count, n_channels)
+            Lost samples are NaN.
+        """
         row = first_sample - self._origin
         return self._rows[row : row + count].astype(np.float64)
 
@@ -109,6 +130,13 @@ class BufferedStream:
     """The runs of one topic: a new one begins when the numbering restarts or the rate or channels change.
 
     One that ended is kept as long as a sample, and no more than `MAX_BUFFERS` are.
+
+    Examples
+    --------
+    >>> stream = BufferedStream(keep_s=1.0)
+    >>> batch = TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, np.zeros((10, 1), dtype=np.float32))
+    >>> stream.add(batch), stream.add(batch), stream.restarts  # index 0 again: the sensor was started again
+    (True, True, 1)
     """
 
     MAX_BUFFERS = 4

@@ -20,7 +20,14 @@ LOST_SHARE = 0.5  # of the mean force; below, a state without promise is one in 
 
 @dataclass(frozen=True)
 class CoveredSpan:
-    """A covered stretch of time with the mean speed and force in it."""
+    """A covered stretch of time with the mean speed and force in it.
+
+    Examples
+    --------
+    >>> span = CoveredSpan(0, NANOSECONDS // 2, speed_m_s=0.05, force_n=1.0, direction_rad=0.0)
+    >>> round(span.speed_m_s * (span.end_ns - span.start_ns) / NANOSECONDS, 6)  # m travelled in it
+    0.025
+    """
 
     start_ns: int
     end_ns: int
@@ -45,6 +52,18 @@ class SlideCoverage:
         The first slide state.
     length_ns, hop_ns, skip_ns
         Of the windows; `skip_ns` is left out at the start.
+
+    Examples
+    --------
+    >>> from texture_core.exploration import Phase
+    >>> state = ExplorationState(0, 'a', 'linear_slide', Phase.SLIDE, steady_s=1.0, speed_m_s=0.05)
+    >>> coverage = SlideCoverage(state, length_ns=NANOSECONDS // 2, hop_ns=NANOSECONDS // 2, skip_ns=0)
+    >>> starts = []
+    >>> while span := coverage.window():
+    ...     starts.append(span.start_ns / NANOSECONDS)
+    ...     coverage.advance()
+    >>> starts  # of 1 s, two windows of 0.5 s
+    [0.0, 0.5]
     """
 
     def __init__(self, state: ExplorationState, length_ns: int, hop_ns: int, skip_ns: int) -> None:

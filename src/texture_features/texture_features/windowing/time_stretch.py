@@ -24,6 +24,14 @@ class Stretched:
     ten times as long or as short.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.D.4.
+
+    Examples
+    --------
+    >>> from texture_features.features.region_peaks import RegionPeaks
+    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(2048) / 1000.0)[:, None]  # at 0.1 m/s
+    >>> window = WindowBatch(tone, 1000.0, np.array(0.1))
+    >>> round(Stretched(RegionPeaks(peaks=1), to_m_s=0.05)(window).item())  # at half the speed
+    50
     """
 
     feature: Feature
@@ -72,7 +80,22 @@ class Stretched:
 
 
 def stretched_lengths(speed_m_s: Array, n_samples: int, to_m_s: float) -> AnyArray:
-    """Return how many samples windows have after stretching, (...)."""
+    """Return how many samples windows have after stretching, (...).
+
+    Parameters
+    ----------
+    speed_m_s : (...)
+        Speed of each window; NaN if unknown.
+    n_samples
+        Samples of a window before stretching.
+    to_m_s
+        Speed to which windows are brought.
+
+    Returns
+    -------
+    (...)
+        Whole numbers, at least 1.
+    """
     speed = np.asarray(speed_m_s, dtype=np.float64)
     moving = speed > 0  # False for NaN
     factor = np.clip(np.where(moving, speed, to_m_s) / to_m_s, 1.0 / LARGEST_FACTOR, LARGEST_FACTOR)

@@ -26,7 +26,14 @@ TIMEOUT_S = 0.3
 
 @dataclass(frozen=True)
 class WindowParams:
-    """How the sliding part of a signal is cut."""
+    """How the sliding part of a signal is cut.
+
+    Examples
+    --------
+    >>> params = WindowParams(length_s=0.5, hop_s=0.1)
+    >>> 1 + round((2.0 - params.length_s) / params.hop_s)  # windows in 2 s of sliding
+    16
+    """
 
     length_s: float = param(
         0.5,
@@ -112,6 +119,25 @@ class WindowCutter:
         Topics of which every window needs all samples; batches of other topics are ignored.
     keep_s
         How long samples are kept at least, s.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> cutter = WindowCutter(WindowParams(length_s=0.5, hop_s=0.25), ['signal'])
+    >>> cutter.add_state(ExplorationState(0, 'a', 'linear_slide', Phase.SLIDE, steady_s=1.0))
+    >>> samples = np.zeros((1000, 1), dtype=np.float32)
+    >>> cutter.add_signal('signal', TactileSignal(0, 'finger', ('pac',), (), 1000.0, 0, samples))
+    >>> cutter.add_state(ExplorationState(NANOSECONDS, 'a', 'linear_slide', Phase.LIFT))
+    >>> for event in cutter.take():
+    ...     match event:
+    ...         case CutWindow():
+    ...             print('window at', event.start_ns / NANOSECONDS, 's,', event.windows['signal'].duration_s, 's long')
+    ...         case SlideEnd():
+    ...             print('end at', event.end_ns / NANOSECONDS, 's')
+    window at 0.0 s, 0.5 s long
+    window at 0.25 s, 0.5 s long
+    window at 0.5 s, 0.5 s long
+    end at 1.0 s
     """
 
     def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:
@@ -288,6 +314,13 @@ def cut_recording(
         The batches of each topic, in their order.
     states
         The exploration states, in their order.
+    params
+        Length and hop of the windows.
+
+    Yields
+    ------
+    CutWindow or SlideEnd
+        In the order of time; the end of each slide comes after its windows.
     """
     cutter = WindowCutter(params, tuple(signals))
     tracks = [_calls(cutter.add_state, states)]
