@@ -12,6 +12,7 @@ from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet
 from texture_features.features.correlation import Correlation, cell_means, ranks
 from texture_features.features.log_spectrum import LogSpectrum
+from texture_features.features.mean_amplitude import MeanAmplitude
 from texture_features.features.mean_hjorth import MeanHjorth
 from texture_features.features.ordinal_patterns import OrdinalPatterns
 from texture_features.features.region_peaks import RegionPeaks, region_peaks
@@ -118,6 +119,20 @@ def test_spectral_peaks_that_are_lacking_come_last(order):
 
 def test_mean_amplitude_of_a_tone_is_two_over_pi():
     assert FEATURES['mean_amplitude']()(windows(tone(51.0) + 7.0))[0, 0] == pytest.approx(2 / np.pi, rel=1e-3)
+
+
+def test_the_amplitude_is_averaged_in_the_reading_asked_for():
+    samples = tone(51.0) + 0.25  # |s| of a tone around 0.25: between 2 / pi and 2 / pi + 0.25
+    means = {of: MeanAmplitude(of=of)(windows(samples))[0, 0] for of in ('deviation', 'magnitude', 'signal')}
+    assert means['signal'] == pytest.approx(0.25, abs=1e-3)
+    assert means['deviation'] == pytest.approx(2 / np.pi, rel=1e-3)
+    # The integral of |sin + a|: (2 / pi) · (sqrt(1 - a²) + a · asin(a)).
+    assert means['magnitude'] == pytest.approx(2 / np.pi * (np.sqrt(1 - 0.25**2) + 0.25 * np.arcsin(0.25)), rel=2e-3)
+
+
+def test_the_logarithm_of_a_negative_mean_is_finite():
+    values = MeanAmplitude(of='signal', logarithm=True)(windows(np.full((10, 1), -2.0)))
+    assert values[0, 0] == pytest.approx(np.log(2.0))
 
 
 def test_mean_hjorth_is_the_mean_of_hjorth():

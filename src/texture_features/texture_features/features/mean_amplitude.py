@@ -1,20 +1,31 @@
-"""Mean distance of the signal from its mean."""
+"""Mean amplitude of the signal, in each reading of that word."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from texture_core.arrays import Array
+from texture_core.catalogue import find
 from texture_core.parameters import param
 from texture_features.feature import WindowBatch
+
+AVERAGED: Mapping[str, Callable[[WindowBatch], Array]] = {
+    'deviation': lambda windows: np.abs(windows.centred_rows),
+    'magnitude': lambda windows: np.abs(windows.rows),
+    'signal': lambda windows: windows.rows,
+}
 
 
 @dataclass(frozen=True)
 class MeanAmplitude:
-    """Mean of the absolute, zero-mean signal of each channel, in its unit: the plainest measure of how it vibrates.
+    """Mean amplitude of each channel, in its unit: the plainest measure of how it vibrates.
+
+    The source says "average amplitude of the signal over a fixed window" and "averaging the signals of each sensor",
+    which can be read as the mean of |s - mean(s)|, of |s| or of s itself.
 
     Source: Jamali & Sammut 2010, section VI (the baseline there).
 
@@ -27,7 +38,12 @@ class MeanAmplitude:
     per_channel: ClassVar[bool] = True
     names: ClassVar[tuple[str, ...]] = ('',)
 
-    logarithm: bool = param(False, 'Returns the logarithm instead of the amplitude itself.')
+    of: str = param(
+        'deviation',
+        "Sets what is averaged: 'deviation' takes |s - mean(s)|, 'magnitude' takes |s|, 'signal' takes s itself.",
+        choices=tuple(AVERAGED),
+    )
+    logarithm: bool = param(False, 'Returns the logarithm of the absolute amplitude instead of the amplitude itself.')
     floor: float = param(
         1e-10,
         'Amplitude added before the logarithm, so that silence gives a finite value, unit.',
@@ -36,7 +52,7 @@ class MeanAmplitude:
     )
 
     def __call__(self, windows: WindowBatch) -> Array:
-        """Return mean |s - mean(s)|, or its logarithm."""
-        rows = np.abs(windows.centred_rows)
+        """Return the mean, or the logarithm of its absolute value."""
+        rows = find(AVERAGED, self.of, 'reading of the amplitude')(windows)
         amplitudes: Array = np.add.reduce(rows, axis=-1, keepdims=True) / rows.shape[-1]
-        return np.log(amplitudes + self.floor) if self.logarithm else amplitudes
+        return np.log(np.abs(amplitudes) + self.floor) if self.logarithm else amplitudes
