@@ -275,9 +275,10 @@ def test_votes_are_counted_and_a_tie_of_three_is_undecided():
     assert votes.won_clearly(np.array([3.0, -1.0, 1.0])).argmax() == 0
 
 
-def test_a_step_is_the_same_by_weights_and_by_examples():
+@pytest.mark.parametrize('transfer', ['sigmoid', 'linear'])
+def test_a_step_is_the_same_by_weights_and_by_examples(transfer):
     rng = np.random.default_rng(2)
-    network = Network.random(7, 3, rng)
+    network = Network.random(7, 3, rng, transfer)
     values, residual = rng.normal(size=(20, 3)), rng.normal(size=20)
     by_weights, by_examples = _by_weights(network, values), _by_examples(network, values)
     steps = [
@@ -288,13 +289,25 @@ def test_a_step_is_the_same_by_weights_and_by_examples():
     np.testing.assert_allclose(*steps, atol=1e-10)
 
 
-def test_the_jacobian_of_a_network_is_its_slope():
+@pytest.mark.parametrize('transfer', ['sigmoid', 'linear'])
+def test_the_jacobian_of_a_network_is_its_slope(transfer):
     rng = np.random.default_rng(0)
-    network = Network.random(4, 3, rng)
+    network = Network.random(4, 3, rng, transfer)
     values = rng.normal(size=(5, 3))
     output, jacobian = network.jacobian(values)
     step = 1e-6 * rng.normal(size=jacobian.shape[1])
     np.testing.assert_allclose(network.moved(step)(values) - output, jacobian @ step, atol=1e-10)
+
+
+@pytest.mark.parametrize('n_hidden', [1, 5])
+def test_a_network_with_a_linear_hidden_layer_is_the_plane_of_least_squares(n_hidden):
+    rng = np.random.default_rng(4)
+    values, targets = rng.normal(size=(60, 3)), rng.normal(size=60)
+    start = Network.random(n_hidden, 3, rng, 'linear')
+    network = fit_network(start, values, targets, np.zeros(60, dtype=bool), 500)
+    extended = np.column_stack((values, np.ones(60)))
+    plane = np.linalg.lstsq(extended, targets, rcond=None)[0]
+    np.testing.assert_allclose(network(values), extended @ plane, atol=1e-3)
 
 
 def test_a_network_learns_exclusive_or():

@@ -38,7 +38,14 @@ def test_a_grade_off_costs_a_quarter_and_none_all() -> None:
 
 
 @pytest.mark.parametrize(
-    ('regressor', 'quick', 'apart'), [(Ann1(hidden=5), ann1, 0.4), (Ann5(hidden=5), ann5, 0.4), (Svm5(), svm5, 0.03)]
+    ('regressor', 'quick', 'apart'),
+    [
+        (Ann1(hidden=5), ann1, 0.4),
+        (Ann5(hidden=5), ann5, 0.4),
+        (Ann1(hidden=5, transfer='linear'), ann1, 0.4),
+        (Ann5(hidden=5, transfer='linear'), ann5, 0.4),
+        (Svm5(), svm5, 0.03),
+    ],
 )
 def test_a_quick_predictor_grades_as_the_regressor_does(regressor, quick, apart) -> None:
     rng = np.random.default_rng(0)

@@ -42,7 +42,7 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
             'difficulty': _difficulty(protocol, found),
             'tasks': {task.name: {m.name: _figures(m, found[task.name, m.name]) for m in task.methods}
                       for task in protocol.tasks},
-            'findings': [_as_json(finding) for finding in checked],
+            'findings': [finding_as_json(finding) for finding in checked],
             'tuning': {f'{recipe}, {task}': one.figures() for (task, recipe), one in tuned.items()},
         },
         charts=_charts(protocol, found, name, experiment.out),
@@ -80,7 +80,8 @@ def _figures(method: Method, outcome: MethodResult) -> dict[str, Any]:
     }
 
 
-def _as_json(finding: Finding) -> dict[str, Any]:
+def finding_as_json(finding: Finding) -> dict[str, Any]:
+    """Return a finding as an experiment's JSON holds it."""
     return {
         'claim': finding.claim,
         'here': finding.here,

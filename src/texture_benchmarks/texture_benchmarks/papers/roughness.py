@@ -10,6 +10,9 @@ import numpy as np
 from scipy.stats import norm
 
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
+from texture_benchmarks.papers.interval import mean
+from texture_benchmarks.papers.protocol import Finding
+from texture_benchmarks.papers.report import finding_as_json
 from texture_benchmarks.papers.roughness_answers import Answers
 from texture_benchmarks.papers.roughness_charts import Series, coverage_chart, grades_chart
 from texture_benchmarks.papers.roughness_report import lines
@@ -30,7 +33,14 @@ OTHER_SCANS, QUICK_OTHER_SCANS = 50, 4
 SPLITS, QUICK_SPLITS = 20, 2
 QUICK_STEP = 8  # between the textures that the paper's regressors have left out
 OURS = 'roughness'
-RECIPES = {'ANN1': 'ets-roughness-ann1', 'ANN5': 'ets-roughness-ann5', 'SVM5': 'ets-roughness-svm5', 'ours': OURS}
+RECIPES = {
+    'ANN1': 'ets-roughness-ann1',
+    'ANN5': 'ets-roughness-ann5',
+    'SVM5': 'ets-roughness-svm5',
+    'ANN1, sigmoid': 'ets-roughness-ann1-sigmoid',
+    'ANN5, sigmoid': 'ets-roughness-ann5-sigmoid',
+    'ours': OURS,
+}
 # The paper's Table II: mean absolute error of training and test textures, and standard deviation within a texture.
 PAPER = {'ANN1': (0.65, 1.13, 0.59, 0.59), 'ANN5': (0.24, 1.02, 0.60, 0.55), 'SVM5': (0.25, 1.30, 0.64, 0.77)}
 COLUMNS = ('seen', 'unseen', 'std_seen', 'std_unseen')
@@ -79,6 +89,7 @@ def run(experiment: Experiment) -> ExperimentResult:
         'ours_other_splits': _other_splits(setup, recipes['ours']),
         'window_to_grade_us': _latency(setup, models['ours'], test[0], QUICK_TIMED if experiment.quick else TIMED),
         'tuning': {name: one.figures() for name, one in tuned.items()},
+        'findings': [finding_as_json(finding) for finding in findings(answers)],
         'by_texture': {name: _by_texture(parts) for name, parts in answers.items()},
         'ours_left_out_by_texture': answers['ours']['left_out'].by_texture(),
     }
@@ -97,6 +108,30 @@ def run(experiment: Experiment) -> ExperimentResult:
         charts=_charts(setup, answers, numbers['ours_other_splits'], experiment),
         lines=tuple(lines(numbers, setup.grades)),
     )
+
+
+def findings(answers: Mapping[str, Mapping[str, Answers]]) -> list[Finding]:
+    """Check what Table II tells, with a hidden layer as in the text and with a sigmoid one."""
+    return [
+        finding
+        for suffix in ('', ', sigmoid')
+        for ann1, ann5 in [(answers[f'ANN1{suffix}'], answers[f'ANN5{suffix}'])]
+        for claim, rival, part in (
+            ('five networks know trained textures better than one (0.24 to 0.65)', ann1, 'seen'),
+            ('five networks grade unseen textures better than one (1.02 to 1.13)', ann1, 'unseen'),
+            ('five networks grade unseen textures better than machines (1.02 to 1.30)', answers['SVM5'], 'unseen'),
+        )
+        for finding in [_better(f'{claim}{suffix}', ann5, rival, part)]
+    ]
+
+
+def _better(claim: str, first: Mapping[str, Answers], second: Mapping[str, Answers], part: str) -> Finding:
+    """Check that the error of one is smaller, texture by texture: windows of one texture are one opinion."""
+    errors = [one[part].error_by_texture() for one in (first, second)]
+    both = [name for name in errors[0] if name in errors[1]]
+    gain = mean(np.array([errors[1][name] - errors[0][name] for name in both]))
+    here = ' against '.join(f'{one[part].figures()["error"]:.2f}' for one in (first, second))
+    return Finding(claim, f'{here} grades, {len(both)} textures', gain, gain.above())
 
 
 def _by_texture(parts: Mapping[str, Answers]) -> dict[str, dict[str, float]]:

@@ -42,7 +42,7 @@ def lines(numbers: Mapping[str, Any], grades: Grades) -> Iterator[str]:
 def _errors(numbers: Mapping[str, Any]) -> Iterator[str]:
     yield 'mean absolute error (standard deviation within a texture), in grades:'
     yield (
-        f'  {"":8}{"paper: training":>16}{"unseen":>14}'
+        f'  {"":14}{"paper: training":>16}{"unseen":>14}'
         f'{"here: training":>18}{"unseen":>14}{"no grade":>10}{"left out":>10}'
         '   90 % intervals hold: unseen, left out'
     )
@@ -52,15 +52,19 @@ def _errors(numbers: Mapping[str, Any]) -> Iterator[str]:
         said = [pair(paper.get(part), paper.get(f'std_{part}')) for part, _ in PARTS]
         found = [pair(parts[part]['error'], parts[part]['std']) for part, _ in PARTS]
         yield (
-            f'  {name:8}{said[0]:>16}{said[1]:>14}{found[0]:>18}{found[1]:>14}'
+            f'  {name:14}{said[0]:>16}{said[1]:>14}{found[0]:>18}{found[1]:>14}'
             f'{100 * unseen["without_grade"]:8.0f} %{number(left["error"]):>10}'
             f'   {number(unseen["coverage_90"])}, {number(left["coverage_90"])}'
         )
     middle = numbers['always_the_middle']
-    yield f'  always 3{"":30}{middle["seen"]:11.2f}{middle["unseen"]:14.2f}{"":17}{middle["left_out"]:10.2f}'
+    yield f'  always 3{"":36}{middle["seen"]:11.2f}{middle["unseen"]:14.2f}{"":17}{middle["left_out"]:10.2f}'
     yield f'  one person against the others, in another study: {numbers["one_person"]}'
     errors = {name: parts['unseen']['error_of_the_mean'] for name, parts in numbers['regressors'].items()}
     reported = ', '.join(f'{name} {number(error)}' for name, error in errors.items())
+    for finding in numbers['findings']:
+        value, low, high = finding['interval']
+        yield f'  {finding["verdict"]:14} {finding["claim"]}'
+        yield f'  {"":14} here {finding["here"]}; decided by {value:+.2f} ({low:+.2f} to {high:+.2f})'
     yield f'  standard error of the unseen mean, ten textures being ten opinions: {reported}'
 
 

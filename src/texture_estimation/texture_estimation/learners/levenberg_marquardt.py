@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,39 +14,57 @@ from texture_core.arrays import Array
 FIRST_DAMPING, MORE, LESS, MAX_DAMPING = 1e-3, 10.0, 0.1, 1e10
 PATIENCE = 6
 SOLVED = 1e-7  # mean square error of targets of 0 and 1
+SIGMOID, LINEAR = 'sigmoid', 'linear'
+TRANSFERS: Mapping[str, Callable[[Array], Array]] = {SIGMOID: np.tanh, LINEAR: lambda given: given}
+SLOPES: Mapping[str, Callable[[Array], Array]] = {
+    SIGMOID: lambda active: 1.0 - active * active,
+    LINEAR: np.ones_like,
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """One layer of sigmoid neurons and one linear output: out · tanh(hidden · x + hidden_bias) + out_bias.
+    """One hidden layer and one linear output: out · f(hidden · x + hidden_bias) + out_bias.
 
     Parameters
     ----------
     hidden : (n_hidden, n_features)
     hidden_bias, out : (n_hidden,)
     out_bias
+    transfer
+        Transfer function f of the hidden layer, one of TRANSFERS: 'sigmoid' is tanh, 'linear' leaves its input.
     """
 
     hidden: Array
     hidden_bias: Array
     out: Array
     out_bias: float
+    transfer: str = SIGMOID
 
     @classmethod
-    def random(cls, n_hidden: int, n_features: int, rng: np.random.Generator) -> Network:
+    def random(cls, n_hidden: int, n_features: int, rng: np.random.Generator, transfer: str = SIGMOID) -> Network:
         """Return a network before its training, for inputs of unit variance."""
         hidden = rng.normal(size=(n_hidden, n_features)) / np.sqrt(n_features)
-        return cls(hidden, rng.uniform(-1.0, 1.0, n_hidden), rng.normal(size=n_hidden) / np.sqrt(n_hidden), 0.5)
+        bias = rng.uniform(-1.0, 1.0, n_hidden)
+        return cls(hidden, bias, rng.normal(size=n_hidden) / np.sqrt(n_hidden), 0.5, transfer)
+
+    def active(self, values: Array) -> Array:
+        """Return what the hidden layer gives, (n, n_hidden) of (n, n_features)."""
+        return TRANSFERS[self.transfer](values @ self.hidden.T + self.hidden_bias)
+
+    def slope(self, active: Array) -> Array:
+        """Return the derivative of the transfer function where it gives `active`, (n, n_hidden)."""
+        return SLOPES[self.transfer](active)
 
     def __call__(self, values: Array) -> Array:
         """Return the output, (n,) of (n, n_features)."""
-        output: Array = np.tanh(values @ self.hidden.T + self.hidden_bias) @ self.out + self.out_bias
+        output: Array = self.active(values) @ self.out + self.out_bias
         return output
 
     def jacobian(self, values: Array) -> tuple[Array, Array]:
         """Return the output, (n,), and its derivative by each weight, (n, n_weights), in the order of `moved`."""
-        active = np.tanh(values @ self.hidden.T + self.hidden_bias)
-        by_bias = (1.0 - active * active) * self.out
+        active = self.active(values)
+        by_bias = self.slope(active) * self.out
         by_hidden = by_bias[:, :, None] * values[:, None, :]
         columns = (by_hidden.reshape(len(values), -1), by_bias, active, np.ones((len(values), 1)))
         return active @ self.out + self.out_bias, np.concatenate(columns, axis=1)
@@ -60,6 +78,7 @@ class Network:
             self.hidden_bias + bias,
             self.out + out,
             self.out_bias + float(out_bias[0]),
+            self.transfer,
         )
 
 
@@ -136,8 +155,8 @@ def _by_weights(network: Network, values: Array) -> _Linear:
 
 def _by_examples(network: Network, values: Array) -> _Linear:
     """Return the second form, for fewer examples than weights; JJᵀ is made of its factors, without J."""
-    active = np.tanh(values @ network.hidden.T + network.hidden_bias)
-    by_bias = (1.0 - active * active) * network.out
+    active = network.active(values)
+    by_bias = network.slope(active) * network.out
     curvature = (by_bias @ by_bias.T) * (values @ values.T + 1.0) + active @ active.T + 1.0
 
     def step(solved: Array) -> Array:

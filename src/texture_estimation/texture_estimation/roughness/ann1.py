@@ -11,6 +11,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_estimation.learners.learner import Codes
+from texture_estimation.learners.levenberg_marquardt import TRANSFERS
 from texture_estimation.roughness.networks import RegressionNetworks, fit_networks
 from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 
@@ -19,8 +20,8 @@ from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 class Ann1:
     """A network with a hidden layer and one linear output, the grade.
 
-    The hidden layer is sigmoid: the paper's text calls it linear, which would leave a linear model whatever the number
-    of neurons it varies.
+    The paper's text says that the hidden layer is linear, which leaves a linear model whatever its number of neurons;
+    `transfer` gives either.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
     """
@@ -35,6 +36,11 @@ class Ann1:
         50, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
     )
     seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
+    transfer: str = param(
+        'sigmoid',
+        "Sets the transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
+        choices=tuple(TRANSFERS),
+    )
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
         """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,)."""

@@ -11,6 +11,7 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_estimation.learners.learner import Codes
+from texture_estimation.learners.levenberg_marquardt import TRANSFERS
 from texture_estimation.roughness.grade_votes import grade_membership, mean_of_votes
 from texture_estimation.roughness.networks import RegressionNetworks, fit_networks
 
@@ -35,6 +36,11 @@ class Ann5:
         30, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
     )
     seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
+    transfer: str = param(
+        'sigmoid',
+        "Sets the transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
+        choices=tuple(TRANSFERS),
+    )
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
         """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,)."""

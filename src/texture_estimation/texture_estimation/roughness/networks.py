@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from texture_core.arrays import Array
 from texture_estimation.learners.learner import Codes
-from texture_estimation.learners.levenberg_marquardt import Network, fit_network
+from texture_estimation.learners.levenberg_marquardt import LINEAR, SIGMOID, TRANSFERS, Network, fit_network
 from texture_estimation.learners.standardisation import standardisation
 
 # One of so many windows of each texture tells when to stop: MATLAB holds out 15 %.
@@ -19,7 +19,7 @@ HELD_OUT = 7
 
 @dataclass(frozen=True, eq=False)
 class RegressionNetworks:
-    """Sigmoid hidden layers with one linear output each, over the same standardised features.
+    """Hidden layers with one linear output each, over the same standardised features.
 
     Parameters
     ----------
@@ -28,6 +28,8 @@ class RegressionNetworks:
     hidden_bias : (n_networks · n_hidden,)
     out : (n_networks, n_hidden)
     out_bias : (n_networks,)
+    linear : ()
+        Whether the hidden layers are linear, not sigmoid.
     """
 
     mean: Array
@@ -36,17 +38,20 @@ class RegressionNetworks:
     hidden_bias: Array
     out: Array
     out_bias: Array
+    linear: Array = field(default_factory=lambda: np.array(False))
 
     def __call__(self, values: Array) -> Array:
         """Return the outputs, (..., n_networks) of (..., n_features)."""
-        active = np.tanh((values - self.mean) / self.scale @ self.hidden.T + self.hidden_bias)
+        active = TRANSFERS[LINEAR if self.linear else SIGMOID](
+            (values - self.mean) / self.scale @ self.hidden.T + self.hidden_bias
+        )
         by_network = active.reshape(*active.shape[:-1], *self.out.shape)
         outputs: Array = (by_network * self.out).sum(axis=-1) + self.out_bias
         return outputs
 
 
 def fit_networks(
-    values: Array, targets: Sequence[Array], textures: Codes, *, hidden: int, iterations: int, seed: int
+    values: Array, targets: Sequence[Array], textures: Codes, *, hidden: int, iterations: int, seed: int, transfer: str
 ) -> Mapping[str, Any]:
     """Return the fields of `RegressionNetworks`, one network for each target, (n,), of values (n, n_features)."""
     mean, scale = standardisation(values)
@@ -54,7 +59,7 @@ def fit_networks(
     rng = np.random.default_rng(seed)
     held = _held_out(textures)
     fitted = [
-        fit_network(Network.random(hidden, values.shape[1], rng), standard, target, held, iterations)
+        fit_network(Network.random(hidden, values.shape[1], rng, transfer), standard, target, held, iterations)
         for target in targets
     ]
     return {
@@ -64,6 +69,7 @@ def fit_networks(
         'hidden_bias': np.concatenate([network.hidden_bias for network in fitted]),
         'out': np.stack([network.out for network in fitted]),
         'out_bias': np.array([network.out_bias for network in fitted]),
+        'linear': np.array(transfer == LINEAR),
     }
 
 

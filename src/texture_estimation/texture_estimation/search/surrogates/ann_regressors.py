@@ -41,7 +41,9 @@ def _surrogate(
     def graded(training: Mask) -> Array:
         rng = np.random.default_rng(regressor.seed)
         rows = sample_rows(textures, training, EXAMPLES, rng).ravel()
-        networks = SurrogateNetworks.fitted(standard[None, rows], targets[:, rows], regressor.hidden, rng)
+        networks = SurrogateNetworks.fitted(
+            standard[None, rows], targets[:, rows], regressor.hidden, rng, regressor.transfer
+        )
         return grade(networks.outputs(standard))
 
     return graded

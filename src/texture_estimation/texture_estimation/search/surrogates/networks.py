@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from texture_core.arrays import Array
 from texture_estimation.learners.learner import Codes
+from texture_estimation.learners.levenberg_marquardt import SIGMOID, SLOPES, TRANSFERS
 from texture_estimation.search.halves import Mask
 
 STEPS = 10
@@ -17,22 +18,27 @@ FIRST_DAMPING, MORE, LESS = 1e-2, 10.0, 0.2
 
 @dataclass(eq=False)
 class SurrogateNetworks:
-    """Networks of one hidden layer and one output each, over the same features: out · tanh(hidden x + bias) + out_bias.
+    """Networks of one hidden layer and one output each, over the same features: out · f(hidden x + bias) + out_bias.
 
     Parameters
     ----------
     hidden : (n_networks, n_features, n_hidden)
     bias, out : (n_networks, 1, n_hidden)
     out_bias : (n_networks, 1)
+    transfer
+        Transfer function f of the hidden layer, one of TRANSFERS.
     """
 
     hidden: Array
     bias: Array
     out: Array
     out_bias: Array
+    transfer: str = SIGMOID
 
     @classmethod
-    def fitted(cls, values: Array, targets: Array, n_hidden: int, rng: np.random.Generator) -> SurrogateNetworks:
+    def fitted(
+        cls, values: Array, targets: Array, n_hidden: int, rng: np.random.Generator, transfer: str = SIGMOID
+    ) -> SurrogateNetworks:
         """Return networks after their training.
 
         Parameters
@@ -43,8 +49,11 @@ class SurrogateNetworks:
             Neurons of the hidden layer.
         rng
             Draws the first weights.
+        transfer
+            Of the hidden layer.
         """
         networks = cls.random(len(targets), values.shape[-1], n_hidden, rng)
+        networks.transfer = transfer
         networks.train(values, targets, STEPS)
         return networks
 
@@ -62,7 +71,7 @@ class SurrogateNetworks:
         n_networks, n_features, n_hidden = self.hidden.shape
         active = standard @ self.hidden.transpose(1, 0, 2).reshape(n_features, -1)
         active += self.bias.reshape(-1)
-        np.tanh(active, out=active)
+        active = TRANSFERS[self.transfer](active)
         active *= self.out.reshape(-1)
         outputs: Array = np.add.reduce(active.reshape(len(standard), n_networks, n_hidden), axis=-1)
         outputs += self.out_bias[:, 0]
@@ -81,7 +90,7 @@ class SurrogateNetworks:
         error = (residual * residual).sum(axis=1)
         diagonal = np.arange(n)
         for _ in range(steps):
-            slopes = (1.0 - active * active) * self.out
+            slopes = SLOPES[self.transfer](active) * self.out
             gram = slopes @ slopes.swapaxes(-1, -2)
             gram *= products
             gram += active @ active.swapaxes(-1, -2)
@@ -94,6 +103,7 @@ class SurrogateNetworks:
                 self.bias + weighted.sum(axis=1, keepdims=True),
                 self.out + dual.swapaxes(-1, -2) @ active,
                 self.out_bias + dual.sum(axis=1),
+                self.transfer,
             )
             new_active, new_residual = moved._forward(values, targets)
             new_error = (new_residual * new_residual).sum(axis=1)
@@ -105,7 +115,7 @@ class SurrogateNetworks:
             error = np.where(better, new_error, error)
 
     def _forward(self, values: Array, targets: Array) -> tuple[Array, Array]:
-        active = np.tanh(values @ self.hidden + self.bias)
+        active = TRANSFERS[self.transfer](values @ self.hidden + self.bias)
         return active, targets - (active * self.out).sum(axis=-1) - self.out_bias
 
     def _take(self, other: SurrogateNetworks, which: Mask) -> None:
