@@ -222,6 +222,22 @@ def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, awake_ns: int = 
     """Return in words why the arm would not follow a command, '' if it would.
 
     Silence of the arm counts from `awake_ns` on at the earliest: before, nobody listened.
+
+    Parameters
+    ----------
+    arm
+        Newest state of the arm.
+    now_ns
+        Time of the same clock, ns.
+    limits
+        Longest allowed silence of the arm.
+    awake_ns
+        When the caller began to listen, ns.
+
+    Returns
+    -------
+    str
+        A sentence without a full stop, or ''.
     """
     age_s = (now_ns - max(arm.time_ns, awake_ns)) * 1e-9
     if arm.fault:

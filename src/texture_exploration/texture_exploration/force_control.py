@@ -101,7 +101,22 @@ class ForceLoopParams:
     )
 
     def loop(self, stiffness_n_m: float, period_s: float, gain_m_s_n: float = 0.0) -> LoopModel:
-        """Return the closed loop on a contact."""
+        """Return the closed loop on a contact.
+
+        Parameters
+        ----------
+        stiffness_n_m
+            Stiffness of the contact, N/m.
+        period_s
+            Time between two commands.
+        gain_m_s_n
+            Gain of the controller, m/s per N.
+
+        Returns
+        -------
+        LoopModel
+            With the delay and the integral time of these parameters.
+        """
         return LoopModel(stiffness_n_m, gain_m_s_n, self.loop_delay_s, period_s, self.integral_s)
 
     def default_gain(self, stiffness_n_m: float, period_s: float) -> float:
@@ -156,6 +171,22 @@ class ForceController:
         """Return the normal velocity, positive away from the surface, for a force error, wanted less measured.
 
         Towards the surface it is at most `down_m_s`.
+
+        Parameters
+        ----------
+        error_n
+            Wanted less measured force, N; positive: press harder.
+        dt_s
+            Time since the last call.
+        feed_forward_m_s
+            Velocity with which the surface rises, m/s.
+        down_m_s
+            Largest speed towards the surface, m/s.
+
+        Returns
+        -------
+        float
+            Normal velocity, m/s, positive away from the surface.
         """
         added = self._sum_ns + error_n * dt_s
         wanted = feed_forward_m_s - self.gain_m_s_n * (error_n + added / self._integral_s)
@@ -221,13 +252,40 @@ class ForceLoop:
         self._choose_gain()
 
     def asked(self, height_m: float, asked_m_s: float, dt_s: float) -> None:
-        """Take note of the velocity that was asked for in the end: it tells how late the arm follows."""
+        """Take note of the velocity that was asked for in the end: it tells how late the arm follows.
+
+        Parameters
+        ----------
+        height_m
+            Height of the finger when the velocity was asked for, m.
+        asked_m_s
+            Normal velocity, m/s, positive away from the surface.
+        dt_s
+            Time since the last call.
+        """
         self.lag.update(height_m, asked_m_s, dt_s)
         if self.stiffness.empty:  # a gain is not changed in contact
             self._adapt_to_lag()
 
     def velocity_m_s(self, wanted_n: float, contact: ContactState, speed_m_s: float, dt_s: float) -> float:
-        """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface."""
+        """Return the normal velocity that leads to a wanted force, at a commanded speed along the surface.
+
+        Parameters
+        ----------
+        wanted_n
+            Wanted force, N, above 0.
+        contact
+            Height, force and travelled distance, as measured.
+        speed_m_s
+            Commanded speed along the surface, m/s.
+        dt_s
+            Time since the last call.
+
+        Returns
+        -------
+        float
+            Normal velocity, m/s, positive away from the surface.
+        """
         height_m, force_n = contact.height_m, contact.force_n
         if force_n < TOUCHING_N:
             self.restart()

@@ -73,7 +73,17 @@ class ForceWatch:
         )
 
     def note(self, phase: Phase, arm: ArmState, command: ArmCommand) -> None:
-        """Take note of the force in free air, before the contact and after it."""
+        """Take note of the force in free air, before the contact and after it.
+
+        Parameters
+        ----------
+        phase
+            Phase of the exploration; only approach and lift are of use.
+        arm
+            Newest state of the arm.
+        command
+            Last command of the arm.
+        """
         if phase is Phase.APPROACH:
             self._note_free(arm, command)
         elif phase is Phase.LIFT:

@@ -50,6 +50,11 @@ class FreeAir:
             m, z away from the surface.
         force_n
             Along the normal, N.
+
+        Returns
+        -------
+        bool
+            Whether free air is proven.
         """
         self._smooth(time_ns, force_n)
         start = self._start

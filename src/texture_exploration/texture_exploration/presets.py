@@ -67,7 +67,20 @@ def load_preset(name_or_path: str) -> Preset:
 
 
 def read_preset(content: Mapping[str, Any], name: str) -> Preset:
-    """Return the preset in what a preset file holds; raises as `load_preset`."""
+    """Return the preset in what a preset file holds; raises as `load_preset`.
+
+    Parameters
+    ----------
+    content
+        Content of the file.
+    name
+        Name of the preset, for the sentences of errors.
+
+    Raises
+    ------
+    InvalidParameter, UnknownName
+        If a key, the motion, or a number is not one that a preset may have.
+    """
     where = f"preset '{name}'"
     vary = content.get('vary', {})
     if not isinstance(vary, Mapping):

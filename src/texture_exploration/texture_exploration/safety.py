@@ -206,7 +206,13 @@ class SafetyLimits:
 
     @staticmethod
     def refuse_unused(request: ExplorationRequest, names: Iterable[str]) -> None:
-        """Refuse a request that gives a number which the motion does not know: it means another motion."""
+        """Refuse a request that gives a number which the motion does not know: it means another motion.
+
+        Raises
+        ------
+        MotionRefused
+            If such a number is not 0.
+        """
         given = sorted(name for name in names if getattr(request, name) != 0.0)
         if given:
             raise MotionRefused(f'{request.motion} knows no {" and no ".join(given)}; leave it at 0')

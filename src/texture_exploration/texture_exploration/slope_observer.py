@@ -51,6 +51,11 @@ class SlopeObserver:
             Along the surface, as commanded.
         noise_m
             Of the height.
+
+        Returns
+        -------
+        float
+            Positive if the surface rises ahead, m/s.
         """
         self._points.append((travelled_m, surface_m))
         if len(self._points) < MIN_POINTS:

@@ -121,6 +121,19 @@ def stability_chart(
 ) -> dict[str, Array]:
     """Return the data of a chart: the stability limit of the gain over stiffness and delay, predicted and simulated.
 
+    Parameters
+    ----------
+    stiffness_n_m
+        Stiffnesses of the contact, N/m, s of them.
+    delay_s
+        Delays of the loop, d of them.
+    controller
+        Makes the controller of a loop.
+    period_s
+        Time between two commands.
+    integral_s
+        Integral time of the controller.
+
     Returns
     -------
     dict

@@ -101,7 +101,13 @@ class InHandArm:
         self._emulator.close()
 
     def state(self) -> ArmState:
-        """Return the mean of the sliding fingers."""
+        """Return the mean of the sliding fingers.
+
+        Raises
+        ------
+        DeviceError
+            If the hand is not connected or does not answer.
+        """
         if not self._connected:
             raise DeviceError('the hand is not connected; connect it first')
         hand = self.hand.state()
@@ -118,7 +124,15 @@ class InHandArm:
         return state
 
     def command(self, command: ArmCommand) -> None:
-        """Let the sliding fingers follow."""
+        """Let the sliding fingers follow.
+
+        Raises
+        ------
+        DeviceError
+            If the hand is not connected.
+        CommandRefused
+            If the command is out of the limits of the arm; the fingers stop.
+        """
         if not self._connected:
             raise DeviceError('the hand is not connected; connect it first')
         self._params.check(command, self.stop)
@@ -133,7 +147,13 @@ class InHandArm:
         return self.hand.warning()
 
     def reboot(self) -> str:
-        """Let go and reboot the motors that report an error; the arm is not connected any more."""
+        """Let go and reboot the motors that report an error; the arm is not connected any more.
+
+        Raises
+        ------
+        DeviceError
+            If the hand has no motors that can be rebooted.
+        """
         if not isinstance(self.hand, RebootableHand):
             raise DeviceError(f"the hand '{self._params.hand}' has no motors that could be rebooted")
         self.close()

@@ -84,7 +84,13 @@ class RailsArm:
         self._refused = 0
 
     def connect(self) -> None:
-        """Open the line, clear faults and wait for the first state."""
+        """Open the line, clear faults and wait for the first state.
+
+        Raises
+        ------
+        DeviceError
+            If the device cannot be opened, or sends no state within 2 s.
+        """
         self.close()
         self._closing.clear()
         self._fresh.clear()
@@ -125,7 +131,13 @@ class RailsArm:
         self._failure = self._failure or 'the rails are not connected; connect them first'
 
     def state(self) -> ArmState:
-        """Return the newest state."""
+        """Return the newest state.
+
+        Raises
+        ------
+        DeviceError
+            If the rails are not connected or have stopped sending.
+        """
         if self._failure or self._state is None:
             raise DeviceError(self._failure)
         return self._state

@@ -157,7 +157,13 @@ class SimulatedArm:
         return self._state
 
     def command(self, command: ArmCommand) -> None:
-        """Follow a command from the next step on."""
+        """Follow a command from the next step on.
+
+        Raises
+        ------
+        DeviceError
+            If the arm is not connected.
+        """
         if self._closing.is_set():
             raise DeviceError('the simulated arm is not connected; connect it first')
         self._params.check(command, self.stop)

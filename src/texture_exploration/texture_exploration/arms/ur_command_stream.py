@@ -78,7 +78,17 @@ class UrCommandStream:
         self._next_is_speed = False
 
     def observe(self, time_ns: int, position_m: Vector, force_n: Vector) -> None:
-        """Take over what the controller measured last, in the base frame."""
+        """Take over what the controller measured last, in the base frame.
+
+        Parameters
+        ----------
+        time_ns
+            When it was measured, ns.
+        position_m : (3,)
+            Place of the tool, m, in the base frame.
+        force_n : (3,)
+            Force on the tool, N, in the base frame.
+        """
         place = self._frame.place(position_m)
         self._height_m, self._measured_ns = place[2], time_ns
         self._air.update(time_ns, place, self._frame.direction(force_n)[2])

@@ -68,7 +68,13 @@ class TcpConnection:
             raise self._silent() from error
 
     def read(self, size: int) -> bytes:
-        """Return exactly so many bytes."""
+        """Return exactly so many bytes.
+
+        Raises
+        ------
+        DeviceError
+            If the other side is silent for too long or ends the connection.
+        """
         data = b''
         while len(data) < size:
             try:
@@ -135,6 +141,20 @@ def runtime_state(ip: str, timeout_s: float) -> int:
 def claims_register(ip: str, name: str, timeout_s: float) -> bool:
     """Return whether an input register is free, by claiming it for a moment.
 
+    Parameters
+    ----------
+    ip
+        Address of the controller.
+    name
+        Name of the input register, such as 'input_double_register_24'.
+    timeout_s
+        Longest time to wait for the answers.
+
+    Returns
+    -------
+    bool
+        False if another program writes the register.
+
     Raises
     ------
     DeviceError
@@ -181,6 +201,20 @@ class DashboardClient(TcpConnection):
 
 def check_ready(ip: str, timeout_s: float, unlock: bool) -> tuple[int, int]:
     """Return the version of a controller whose arm can move; release a protective stop if `unlock` says so.
+
+    Parameters
+    ----------
+    ip
+        Address of the controller.
+    timeout_s
+        Longest time for all questions and answers.
+    unlock
+        Whether a protective stop is released.
+
+    Returns
+    -------
+    (int, int)
+        Version of the controller, such as (5, 12).
 
     Raises
     ------

@@ -27,6 +27,21 @@ def check_program(
     ours whose process was killed is ended by its watchdog within `patience_s`; one that has none yet is known by its
     name and by nobody writing the register that it obeys.
 
+    Parameters
+    ----------
+    ip
+        Address of the controller.
+    version
+        Version of the controller, as `check_ready` gives it.
+    timeout_s
+        Longest time to wait for one answer.
+    take_over
+        Whether a program of others is stopped.
+    pause_is_ours
+        Whether a paused program is one that this connection started before.
+    patience_s
+        How long a running program may take to end by itself.
+
     Raises
     ------
     DeviceError

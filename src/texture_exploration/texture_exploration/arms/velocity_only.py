@@ -38,7 +38,17 @@ class VelocityForceControl:
         return moved
 
     def ask(self, command: ArmCommand, state: ArmState, dt_s: float) -> None:
-        """Ask for the velocity that a command needs, `dt_s` after the last time."""
+        """Ask for the velocity that a command needs, `dt_s` after the last time.
+
+        Parameters
+        ----------
+        command
+            What the arm is to do.
+        state
+            What the arm measured last.
+        dt_s
+            Time since the last call.
+        """
         held_s = min(dt_s, HOLDS_S)
         normal = self._normal_m_s(command, state, held_s)
         self._loop.asked(state.position[2], normal, held_s)

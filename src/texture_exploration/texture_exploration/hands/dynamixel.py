@@ -75,7 +75,13 @@ class DynamixelHand:
         self._thread: threading.Thread | None = None
 
     def connect(self) -> None:
-        """Open the bus and find the motors; the pose now is where the fingers begin."""
+        """Open the bus and find the motors; the pose now is where the fingers begin.
+
+        Raises
+        ------
+        DeviceError
+            If the bus cannot be opened, or motors are missing, of another model or silent.
+        """
         self.close()
         self._closing.clear()
         self._fresh.clear()
@@ -97,7 +103,13 @@ class DynamixelHand:
         self._failure = self._failure or NOT_CONNECTED
 
     def state(self) -> HandState:
-        """Return the newest state."""
+        """Return the newest state.
+
+        Raises
+        ------
+        DeviceError
+            If the hand is not connected, or the bus has failed.
+        """
         if self._failure or self._state is None:
             raise DeviceError(self._failure)
         return self._state
@@ -113,7 +125,15 @@ class DynamixelHand:
         self._grip = dict(forces_n)
 
     def command(self, fingers: Sequence[str], command: ArmCommand) -> None:
-        """Follow from the next cycle on; what is refused makes these fingers stand still."""
+        """Follow from the next cycle on; what is refused makes these fingers stand still.
+
+        Raises
+        ------
+        DeviceError
+            If the bus has failed.
+        CommandRefused
+            If the command is out of the limits of a finger.
+        """
         if self._failure:
             raise DeviceError(self._failure)
         for name in fingers:

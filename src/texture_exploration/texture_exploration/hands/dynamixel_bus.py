@@ -311,7 +311,24 @@ class DynamixelBus:
         return round(min(limit_a, max(-limit_a, current_a)) / self._profile.current_a)
 
     def write(self, motor: int, register: str, value: int) -> None:
-        """Write one register, and see that it was taken."""
+        """Write one register, and see that it was taken.
+
+        Parameters
+        ----------
+        motor
+            Id of the motor on the bus.
+        register
+            Name of the register in the table of the profile.
+        value
+            Signed number in the unit of the register.
+
+        Raises
+        ------
+        NoAnswer
+            If the motor does not answer after some tries.
+        DeviceError
+            If the motor refuses the value.
+        """
         address, size = self._profile.table[register]
         send = {1: 'write1ByteTxRx', 2: 'write2ByteTxRx', 4: 'write4ByteTxRx'}[size]
         for _ in range(TRIES):

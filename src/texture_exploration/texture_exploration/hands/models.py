@@ -50,7 +50,22 @@ def describe(model: int) -> str:
 
 
 def differs(model: int, current_a: float, torque_nm_a: float) -> str:
-    """Return how a model's torque per count departs from that of given scales, '' if it does not, or is unknown."""
+    """Return how a model's torque per count departs from that of given scales, '' if it does not, or is unknown.
+
+    Parameters
+    ----------
+    model
+        Model number that the motor reports.
+    current_a
+        Current per count in the profile, A.
+    torque_nm_a
+        Torque per current in the profile, N·m/A.
+
+    Returns
+    -------
+    str
+        A sentence without a full stop, or ''.
+    """
     if model not in MODELS:
         return ''
     own = MODELS[model]

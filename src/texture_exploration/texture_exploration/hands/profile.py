@@ -108,7 +108,20 @@ def load_profile(name_or_path: str) -> Profile:
 
 
 def read_profile(content: Mapping[str, Any], name: str) -> Profile:
-    """Return the profile in what a file holds; raises as `load_profile`."""
+    """Return the profile in what a file holds; raises as `load_profile`.
+
+    Parameters
+    ----------
+    content
+        Content of the file.
+    name
+        Name of the profile, for the sentences of errors.
+
+    Raises
+    ------
+    InvalidParameter
+        If a register is missing, or a finger, role or number does not fit.
+    """
     where = f"hand profile '{name}'"
     missing = [register for register in REGISTERS if register not in content['table']]
     if missing:

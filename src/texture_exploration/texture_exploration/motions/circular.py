@@ -50,6 +50,22 @@ def circular(request: ExplorationRequest, home: Vector, touch: TouchParams, limi
 
     The finger comes down before that angle, and gains its speed on the circle.
 
+    Parameters
+    ----------
+    request
+        What the operator asks for; 0 takes the default of a number.
+    home
+        Centre of the circle, m, in the frame of the surface.
+    touch
+        How the finger approaches, presses and lifts.
+    limits
+        Allowed speeds, forces and workspace.
+
+    Returns
+    -------
+    Motion
+        Ready for its first step.
+
     Raises
     ------
     MotionRefused

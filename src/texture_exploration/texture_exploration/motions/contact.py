@@ -62,7 +62,13 @@ class ContactWatch:
             self.refuse(lost_s)
 
     def refuse(self, lost_s: float = 0.0) -> None:
-        """Raise ContactLost in a sentence."""
+        """Raise ContactLost in a sentence.
+
+        Raises
+        ------
+        ContactLost
+            Always.
+        """
         since = f' for {lost_s * 1e3:.0f} ms' if lost_s else ''
         raise ContactLost(
             f'the contact with the surface was lost{since}: the force is {self._force_now_n:.2f} N of '

@@ -100,6 +100,22 @@ def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParam
 
     Which fingers slide and which hold is the hand's business (`texture_exploration.arms.in_hand`).
 
+    Parameters
+    ----------
+    request
+        What the operator asks for; 0 takes the default of a number.
+    home
+        Place where the strokes begin, m, in the frame of the surface.
+    touch
+        How the finger approaches, presses and lifts.
+    limits
+        Allowed speeds, forces and workspace.
+
+    Returns
+    -------
+    Motion
+        Ready for its first step.
+
     Raises
     ------
     MotionRefused

@@ -32,7 +32,13 @@ class Rise(Stage):
         self._start_m = arm.position[2]
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Go up, but no further than a finger may come down to look for the surface."""
+        """Go up, but no further than a finger may come down to look for the surface.
+
+        Raises
+        ------
+        MotionAborted
+            If the force is not steady within the allowed rise.
+        """
         if self._air.update(arm.time_ns, arm.position, arm.force_n):
             return None
         risen_m = arm.position[2] - self._start_m

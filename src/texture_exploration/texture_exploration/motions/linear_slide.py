@@ -36,6 +36,22 @@ class StraightPath:
 def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
     """Plan a slide of `distance_m` at constant speed, with a ramp before and after it.
 
+    Parameters
+    ----------
+    request
+        What the operator asks for; 0 takes the default of a number.
+    home
+        Place where the slide begins, m, in the frame of the surface.
+    touch
+        How the finger approaches, presses and lifts.
+    limits
+        Allowed speeds, forces and workspace.
+
+    Returns
+    -------
+    Motion
+        Ready for its first step.
+
     Raises
     ------
     MotionRefused

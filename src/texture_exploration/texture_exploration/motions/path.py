@@ -116,6 +116,20 @@ def ramp_s(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float = math.i
     """Return how long `smooth` takes to a speed v within the limits.
 
     Over a time T its acceleration is highest in the middle, π·v / (2·T), its jerk at both ends, π²·v / (2·T²).
+
+    Parameters
+    ----------
+    speed_m_s
+        Speed to be reached from standstill.
+    acceleration_m_s2
+        Largest acceleration.
+    jerk_m_s3
+        Largest jerk.
+
+    Returns
+    -------
+    float
+        s, never below MIN_RAMP_S.
     """
     by_acceleration = 0.5 * math.pi * speed_m_s / acceleration_m_s2
     by_jerk = math.pi * math.sqrt(0.5 * speed_m_s / jerk_m_s3)

@@ -47,7 +47,13 @@ class Stage:
         return (time_ns - self._begin_ns) * 1e-9
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Return what to do now, None when the stage is over; MotionAborted if its goal cannot be reached."""
+        """Return what to do now, None when the stage is over; MotionAborted if its goal cannot be reached.
+
+        Raises
+        ------
+        NotImplementedError
+            Always; each stage has its own.
+        """
         raise NotImplementedError
 
 
@@ -61,7 +67,13 @@ class GoHomeStage(Stage):
         self._free_n = math.inf
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Rise first; then speed up and slow down at half the allowed acceleration."""
+        """Rise first; then speed up and slow down at half the allowed acceleration.
+
+        Raises
+        ------
+        MotionAborted
+            If the finger meets something on its way.
+        """
         x, y, z = (goal - at for goal, at in zip(self._home, arm.position, strict=True))
         if z > NEAR_M:
             return ArmCommand(normal_m_s=self._touch.lift_speed_m_s)
@@ -94,7 +106,13 @@ class ApproachStage(Stage):
         self._start_m = arm.position[2]
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Go down, but no further than allowed."""
+        """Go down, but no further than allowed.
+
+        Raises
+        ------
+        MotionAborted
+            If there is no surface within the allowed travel.
+        """
         if arm.force_n > self._touch.contact_force_n:
             return None
         if self._start_m - arm.position[2] > self._touch.approach_travel_m:

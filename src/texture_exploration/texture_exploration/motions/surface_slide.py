@@ -25,7 +25,26 @@ from texture_exploration.safety import SafetyLimits
 def plan_surface_slide(
     follower: Follower, request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits
 ) -> StagedMotion:
-    """Return the motion along a path, for a request whose speed and force are filled in and checked."""
+    """Return the motion along a path, for a request whose speed and force are filled in and checked.
+
+    Parameters
+    ----------
+    follower
+        Path along the surface, as a function of the travelled distance.
+    request
+        With speed and force filled in and checked.
+    home
+        Place above which the finger comes down, m, in the frame of the surface.
+    touch
+        How the finger approaches, presses and lifts.
+    limits
+        Allowed speeds, forces and workspace.
+
+    Returns
+    -------
+    StagedMotion
+        Go there, touch, press, speed up, slide, brake and lift.
+    """
     speed, force = request.speed_m_s, request.force_n
     contact = ContactWatch(force, touch)
     slide = SlideStage(follower, speed, force, touch, limits, contact=contact)
