@@ -6,9 +6,8 @@ import pytest
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_simulation.stick_slip.bristle import AT_REST, Tip, energy_j, jacobian, rate
 from texture_simulation.stick_slip.friction import PASSIVE, StickSlip
-from texture_simulation.stick_slip.limit_cycle import slow_drag
+from texture_simulation.stick_slip.limit_cycle import nudged, slow_drag
 from texture_simulation.stick_slip.simulate import drag, pull_n
-from texture_simulation.stick_slip.simulated_limit import nudged
 from texture_simulation.stick_slip.stribeck import coefficient, critical_speed_m_s, slope_s_m, steady_force_n
 
 STEP_S = 5e-5

@@ -12,14 +12,16 @@ import numpy as np
 
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.stick_slip.chart import Borders, Costs, Vibration, border_chart, cost_chart, vibration_chart
+from texture_benchmarks.stick_slip.integrators import INTEGRATORS
+from texture_benchmarks.stick_slip.simulated_limit import ContactRegime, simulated_max_stable_step_s
 from texture_core.arrays import Array
 from texture_simulation.stick_slip.friction import StickSlip
-from texture_simulation.stick_slip.integrators import INTEGRATORS
-from texture_simulation.stick_slip.limit_cycle import slow_drag
+from texture_simulation.stick_slip.integrator import Integrator
+from texture_simulation.stick_slip.limit_cycle import nudged, slow_drag
 from texture_simulation.stick_slip.reference import SOLVERS, solve
-from texture_simulation.stick_slip.simulate import DEFAULT, drag, drag_unchecked, pull_n
-from texture_simulation.stick_slip.simulated_limit import nudged, simulated_max_stable_step_s
-from texture_simulation.stick_slip.stability_limit import MARGIN, STEP_LIMITS, ContactRegime, max_stable_step_s
+from texture_simulation.stick_slip.semi_implicit import SEMI_IMPLICIT
+from texture_simulation.stick_slip.simulate import drag, drag_unchecked, pull_n
+from texture_simulation.stick_slip.stability_limit import MARGIN, max_stable_step_s
 from texture_simulation.stick_slip.stribeck import critical_speed_m_s
 from texture_simulation.stick_slip.tip_drag import TipDrag
 from texture_simulation.trajectory import Trajectory
@@ -62,7 +64,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         split='none: nothing is trained',
         numbers={
             'target_ms': TARGET_MS,
-            'default': {'method': DEFAULT, 'step_us': 1e6 * FRICTION.step_s, **_margins()},
+            'default': {'method': SEMI_IMPLICIT.name, 'step_us': 1e6 * FRICTION.step_s, **_margins()},
             'scan_ms': _scan_ms(3 if options.quick else 31),
             'integrators': {name: [dict(row) for row in rows] for name, rows in costs.rows.items()},
             'border_us': _border_numbers(borders),
@@ -81,8 +83,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 
 def _margins() -> dict[str, float]:
     return {
-        'border_us': 1e6 * max_stable_step_s(DEFAULT, FRICTION, SPEED_M_S, FORCE_N),
-        'allowed_us': 1e6 * MARGIN * max_stable_step_s(DEFAULT, FRICTION, SPEED_M_S, FORCE_N),
+        'border_us': 1e6 * max_stable_step_s(SEMI_IMPLICIT, FRICTION, SPEED_M_S, FORCE_N),
+        'allowed_us': 1e6 * MARGIN * max_stable_step_s(SEMI_IMPLICIT, FRICTION, SPEED_M_S, FORCE_N),
         'provably_passive_up_to_us': 1e6 * FRICTION.passive_step_s,
     }
 
@@ -121,10 +123,10 @@ def _costs(compared_s: float, thin: int) -> Costs:
     """Return cost and error of every method over its steps or tolerances."""
     measure = _Measure(compared_s, 1 if thin > 1 else REPEATS)
     rows = {}
-    for method in INTEGRATORS:
-        border = max_stable_step_s(method, FRICTION, SPEED_M_S, FORCE_N)
-        steps_s = STEPS_S if method == DEFAULT else [share * border for share in SHARES]
-        rows[method] = [measure.fixed_step(method, step_s) for step_s in steps_s[::thin]]
+    for name, integrator in INTEGRATORS.items():
+        border = max_stable_step_s(integrator, FRICTION, SPEED_M_S, FORCE_N)
+        steps_s = STEPS_S if integrator is SEMI_IMPLICIT else [share * border for share in SHARES]
+        rows[name] = [measure.fixed_step(integrator, step_s) for step_s in steps_s[::thin]]
     for method in SOLVERS:
         rows[method] = [measure.own_step(method, tolerance) for tolerance in TOLERANCES[::thin]]
     return Costs(rows, TARGET_MS, 1e6 * FRICTION.step_s)
@@ -140,14 +142,14 @@ class _Measure:
         self._exact_n = self._solved_n('radau', REFERENCE)
         self._spread_n = float(self._exact_n.std())
 
-    def fixed_step(self, method: str, longest_s: float) -> dict[str, float]:
+    def fixed_step(self, integrator: Integrator, longest_s: float) -> dict[str, float]:
         """Return the row of an integrator, with the longest step up to one that divides a ms."""
         per_ms = max(1, math.ceil(MS / longest_s - 1e-9))
         speed = np.full(per_ms * len(self._times_s), SPEED_M_S)
         force = np.full_like(speed, FORCE_N)
 
         def pulled_n() -> Array:
-            tip = drag_unchecked(FRICTION, speed, force, MS / per_ms, method=method, force_before_n=FORCE_N)
+            tip = drag_unchecked(FRICTION, speed, force, MS / per_ms, integrator=integrator, force_before_n=FORCE_N)
             return pull_n(FRICTION, tip, speed)[per_ms - 1 :: per_ms]
 
         return {'step_us': 1e6 * MS / per_ms, **self._row(pulled_n)}
@@ -171,17 +173,17 @@ def _borders(stiffnesses_1_m: tuple[float, ...]) -> Borders:
     predicted, found = {}, {}
     for phase in ContactRegime:
         slip_m_s = 0.0 if phase is ContactRegime.STICK else SLIDE_M_S
-        for method, border in STEP_LIMITS.items():
+        for method, integrator in INTEGRATORS.items():
             pairs = []
             for stiffness in stiffnesses_1_m:
                 friction = replace(FRICTION, bristle_1_m=stiffness)
-                expected_s = border(friction, slip_m_s, FORCE_N)
+                expected_s = integrator.limit_s(friction, slip_m_s, FORCE_N)
                 between_s = (expected_s / 3, expected_s * 3) if math.isfinite(expected_s) else (1e-5, 0.1)
                 pairs.append(
                     (
                         expected_s,
                         simulated_max_stable_step_s(
-                            method, friction, phase, FORCE_N, slip_m_s=SLIDE_M_S, between_s=between_s
+                            integrator, friction, phase, FORCE_N, slip_m_s=SLIDE_M_S, between_s=between_s
                         ),
                     )
                 )

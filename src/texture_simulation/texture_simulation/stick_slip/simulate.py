@@ -7,14 +7,13 @@ import math
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_core.catalogue import find
 from texture_core.errors import InvalidData
 from texture_simulation.stick_slip.bristle import AT_REST, Tip, Value
 from texture_simulation.stick_slip.friction import StickSlip
-from texture_simulation.stick_slip.integrators import INTEGRATORS, State, Step
+from texture_simulation.stick_slip.integrator import Integrator, State, Step
+from texture_simulation.stick_slip.semi_implicit import SEMI_IMPLICIT
 from texture_simulation.stick_slip.stability_limit import check_step
 
-DEFAULT = 'semi_implicit'
 FEW = 40  # scans; up to so many are faster one after another in floats than together in arrays
 
 
@@ -24,7 +23,7 @@ def drag(
     force_n: Array,
     step_s: float,
     *,
-    method: str = DEFAULT,
+    integrator: Integrator = SEMI_IMPLICIT,
     start: Tip = AT_REST,
     force_before_n: Value = 0.0,
 ) -> Tip:
@@ -36,8 +35,8 @@ def drag(
         Speed of the base along the path and normal force, at the end of each of n steps. Leading axes are scans.
     step_s
         Length of a step.
-    method
-        One of `INTEGRATORS`.
+    integrator
+        What integrates.
     start, force_before_n
         State of the tip and force before the first step, (...).
 
@@ -48,16 +47,16 @@ def drag(
     Raises
     ------
     InvalidParameter
-        If the step is beyond the border of the method.
+        If the step is beyond the border of the integrator.
     InvalidData
         If a speed or force is not finite, or a force is below 0.
     """
     check_drive(speed_m_s, force_n)
     if not speed_m_s.size:
         return Tip(*(np.zeros_like(speed_m_s) for _ in range(3)))
-    check_step(method, friction, step_s, float(np.abs(speed_m_s).max()), float(force_n.max()))
+    check_step(integrator, friction, step_s, float(np.abs(speed_m_s).max()), float(force_n.max()))
     return drag_unchecked(
-        friction, speed_m_s, force_n, step_s, method=method, start=start, force_before_n=force_before_n
+        friction, speed_m_s, force_n, step_s, integrator=integrator, start=start, force_before_n=force_before_n
     )
 
 
@@ -67,7 +66,7 @@ def drag_unchecked(
     force_n: Array,
     step_s: float,
     *,
-    method: str,
+    integrator: Integrator,
     start: Tip = AT_REST,
     force_before_n: Value = 0.0,
 ) -> Tip:
@@ -83,8 +82,8 @@ def drag_unchecked(
         Normal force at the end of each step.
     step_s
         Length of an integration step.
-    method
-        One of `INTEGRATORS`.
+    integrator
+        What integrates.
     start
         State of the tip before the first step.
     force_before_n : (...)
@@ -98,7 +97,7 @@ def drag_unchecked(
     kept = np.divide(
         before, force_n, out=np.ones_like(before), where=force_n > before
     )  # of the bending, see bristle.py
-    prepare = find(INTEGRATORS, method, 'integrator')
+    prepare = integrator.prepare
     if math.prod(speed_m_s.shape[:-1]) <= FEW:
         return _few(prepare(friction, step_s, math.exp), start, speed_m_s, force_n, kept)
     return _many(prepare(friction, step_s, np.exp), start, speed_m_s, force_n, kept)

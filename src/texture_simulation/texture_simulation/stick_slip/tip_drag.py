@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 from texture_simulation.stick_slip.bristle import AT_REST, Tip
 from texture_simulation.stick_slip.friction import StickSlip
-from texture_simulation.stick_slip.simulate import DEFAULT, drag, pull_n
+from texture_simulation.stick_slip.semi_implicit import SEMI_IMPLICIT
+from texture_simulation.stick_slip.simulate import drag, pull_n
 from texture_simulation.stick_slip.stability_limit import check_step
 from texture_simulation.trajectory import Trajectory
 
@@ -39,7 +40,7 @@ class TipDrag:
     def __init__(self, friction: StickSlip, rate_hz: float, stretched: float | Array = 0.0) -> None:
         self.friction = friction
         self._rate_hz = rate_hz
-        check_step(DEFAULT, friction, friction.step_s, 0.0, 0.0)
+        check_step(SEMI_IMPLICIT, friction, friction.step_s, 0.0, 0.0)
         self._substeps = max(1, math.ceil(1 / (rate_hz * friction.step_s) - 1e-9))
         self._step_s = 1 / (rate_hz * self._substeps)
         self._stretched = np.asarray(stretched, dtype=np.float64)
