@@ -8,23 +8,15 @@ import pytest
 
 from texture_benchmarks.catalogue import BENCHMARKS
 from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION
-from texture_benchmarks.recipes.trial import (
-    at_rate,
-    chronological_split,
-    comparable,
-    evaluate_extracted,
-    every,
-    extract_all,
-    random_splits,
-    splits_by,
-    try_recipe,
-)
+from texture_benchmarks.recipes.trial import at_rate, comparable, figures_of, in_random_folds, trained_every
 from texture_benchmarks.result import BenchmarkOptions
 from texture_core.errors import ModelMismatch
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import pareto_front
+from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
+from texture_evaluation.cross_validation.cross_validate import cross_validate, split_slides
 from texture_recordings.slide_dataset import SlideDataset, cut_slide
 from texture_recordings.slides import LabelledSlide, find_slides
 
@@ -33,22 +25,20 @@ SLIDES = [LabelledSlide(Path('bag'), f'{s}/{k}', s, k, k, None) for s in ('cork'
 
 
 def test_in_random_folds_every_slide_is_tested_once_and_every_surface_alike() -> None:
-    splits = random_splits(SLIDES, 5, np.random.default_rng(0))
-    assert sorted(name for _, tested in splits for name in tested) == sorted(slide.name for slide in SLIDES)
-    for training, tested in splits:
-        assert not training & tested
-        assert sorted(name.split('/')[0] for name in tested) == ['cork', 'cork', 'felt', 'felt']
+    dataset = SlideDataset(tuple(SLIDES))
+    split = in_random_folds('random', dataset, 5, seed=0)
+    folds = split_slides(dataset, split.splitter, split.groups)
+    assert sorted(row for _, tested in folds for row in tested) == list(range(len(SLIDES)))
+    for training, tested in folds:
+        assert not set(training) & set(tested)
+        assert dataset.labels[tested].tolist() == ['cork', 'cork', 'felt', 'felt']
+    assert in_random_folds('random', dataset, 5, seed=1).groups.tolist() != split.groups.tolist()
 
 
-def test_a_division_by_time_learns_from_the_first_slides() -> None:
-    [(training, tested)] = chronological_split(SLIDES, 8)
-    assert len(training) == 16
-    assert tested == {'cork/9', 'cork/10', 'felt/9', 'felt/10'}
-
-
-def test_one_value_after_the_other_is_left_out() -> None:
-    splits = splits_by({'a': 0.1, 'b': 0.2, 'c': 0.1})
-    assert splits == [({'b'}, {'a', 'c'}), ({'a', 'c'}, {'b'})]
+def test_training_windows_begin_at_a_multiple_of_a_short_hop() -> None:
+    parts = comparable(load_recipe('ets-circular-svm'), 1000.0, of_motion=False)
+    assert parts.training.hop_s == pytest.approx(0.56)  # eight parts of 0.07 s: the first multiple over 0.5 s
+    assert comparable(load_recipe('hu-pca-svm'), 1000.0, of_motion=False).training.hop_s == 0.5
 
 
 def slide_signals(gap: int = 0) -> LabelledSlide:
@@ -90,26 +80,26 @@ def test_a_missing_input_is_named() -> None:
 
 
 def test_a_recipe_is_tested_on_slides_outside_its_training(simulated: Path) -> None:
-    slides = SlideDataset.from_bags([simulated]).slides
+    dataset = SlideDataset.from_bags([simulated])
     recipe = comparable(load_recipe('default'), 1000.0, of_motion=False)
-    outcome = try_recipe(recipe, slides, chronological_split(slides, 4))
-    assert len(outcome.results) == 6
-    figures = outcome.numbers()
+    result = cross_validate(recipe, dataset, ChronologicalSplit(4 / 6))
+    assert len(result.pooled) == 6
+    figures = figures_of(result)
     assert figures['window_accuracy'] > 0.8
     assert figures['unclassified_windows'] == 0.0
-    assert len(find_slides([simulated])) == len(slides)
+    assert len(find_slides([simulated])) == len(dataset)
 
 
 def test_training_windows_may_overlap_where_test_windows_do_not(simulated: Path) -> None:
-    slides = SlideDataset.from_bags([simulated]).slides
+    dataset = SlideDataset.from_bags([simulated])
     recipe = comparable(load_recipe('jamali-naive-bayes-5'), 1000.0, of_motion=False)
-    splits = chronological_split(slides, 4)
-    apart = extract_all(recipe, slides)
-    plain = evaluate_extracted(recipe, apart, splits)
-    more = evaluate_extracted(recipe, apart, splits, extract_all(every(0.25, recipe), slides), 0.25)
+    [plain], [more] = (
+        cross_validate(one, dataset, ChronologicalSplit(4 / 6)).folds for one in (recipe, trained_every(0.25, recipe))
+    )
     # twelve slides of 1 s, windows of 0.5 s
     assert (plain.model.training['windows'], more.model.training['windows']) == (24, 36)
-    assert [len(found.estimates) for found in more.results] == [len(found.estimates) for found in plain.results]
+    windows = [[len(found.estimates) for found in fold.results.values()] for fold in (plain, more)]
+    assert windows[0] == windows[1]
 
 
 def test_the_front_holds_what_is_neither_dearer_nor_worse_than_another() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import BENCHMARKS
-from texture_benchmarks.recipes.trial import comparable, extract_features
+from texture_benchmarks.recipes.trial import comparable
 from texture_benchmarks.result import BenchmarkOptions
 from texture_benchmarks.robustness.chart import Curve, Panel, robustness_chart, robustness_tables
 from texture_benchmarks.robustness.degradations import DEGRADATIONS, Degradation, breakdown, rms
@@ -19,6 +19,7 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.train import with_channels
+from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 from texture_simulation.scene import load_scene
 
@@ -134,7 +135,7 @@ def test_simulated_slides_have_windows_and_differ_from_those_trained(name: str) 
         how = dataclasses.replace(how, scene=scene, sliding=dataclasses.replace(how.sliding, duration_s=0.5))
         slides = simulate_slide_signals(how, len(how.fingers), np.random.default_rng(0))
         recipe = load_recipe('fast')
-        return [vector.values for item in slides for vector in extract_features(recipe, item)]
+        return [vector.values for _, own in SlideDataset(tuple(slides)).vectors(recipe.feature_set) for vector in own]
 
     otherwise = condition.touch_conditions(condition.strengths[-1])
     usual, worst = touch_conditions(condition.trained()), touch_conditions(otherwise)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.exploration import ExplorationState, Phase
+from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_features.labelled_features import LabelledFeatures
 from texture_features.windowing.windows import WindowEvent, WindowParams, cut_recording
@@ -260,6 +261,18 @@ class SlideDataset:
         for slide in self.slides:
             yield slide, cut_slide(slide, feature_set)
 
+    def vectors(self, feature_set: FeatureSet) -> Iterator[tuple[LabelledSlide, list[FeatureVector]]]:
+        """Yield each slide with the feature vectors of its windows, (n_windows,), which bear the name of the slide.
+
+        Raises
+        ------
+        ModelMismatch
+            If a slide has nothing of an input.
+        """
+        for slide, events in self.windows(feature_set):
+            vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
+            yield slide, [replace(vector, exploration_id=slide.name) for vector in vectors]
+
     def features(self, feature_set: FeatureSet, augmentation: Augmentation | None = None) -> LabelledFeatures:
         """Return features `X`, labels `y` and slides `groups` of all windows, with their times.
 
@@ -277,12 +290,7 @@ class SlideDataset:
         ModelMismatch
             If a slide lacks an input, or the slides differ in rates or channels.
         """
-        vectors = [
-            replace(vector, exploration_id=slide.name)
-            for slide, events in self.windows(feature_set)
-            for vector in feature_set.extract_many(events)
-            if not vector.last
-        ]
+        vectors = [vector for _, own in self.vectors(feature_set) for vector in own]
         if not vectors:
             raise no_window(self, feature_set)
         features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})

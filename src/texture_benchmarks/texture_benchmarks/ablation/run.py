@@ -18,7 +18,7 @@ from texture_benchmarks.recipes.run import (
     VIBRATION,
     biotac20_settings,
 )
-from texture_benchmarks.recipes.trial import at_rate, comparable, examples_of, extract_all, latency_us
+from texture_benchmarks.recipes.trial import all_at_rate, comparable, latency_us
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData
 from texture_estimation.classification.training import DEFAULT_TEMPERING_EXPONENT
@@ -27,6 +27,7 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import COLOURS, chart
 from texture_evaluation.train import with_channels
 from texture_features.labelled_features import LabelledFeatures
+from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 
 Changes = Mapping[str, Mapping[str, Any] | None]  # feature or learner → parameters that differ; None leaves it out
@@ -80,7 +81,7 @@ class _Case:
     """One way to recognise."""
 
     recipe: Recipe
-    slide_signals: Sequence[LabelledSlide]
+    dataset: SlideDataset
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +102,7 @@ class _AblationResult:
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Leave out one thing after the other; evaluate by slides held out, look at the later ones once."""
     settings = biotac20_settings(options)
-    vibration, everything = settings[VIBRATION].slide_signals, settings[ALL_CHANNELS].slide_signals
+    vibration, everything = settings[VIBRATION].dataset, settings[ALL_CHANNELS].dataset
     numbers = {
         VIBRATION: _figures(_vibration_cases(vibration), options),
         ALL_CHANNELS: _figures(_channel_cases(everything), options),
@@ -119,24 +120,25 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def _vibration_cases(slide_signals: Sequence[LabelledSlide]) -> dict[str, _Case]:
+def _vibration_cases(dataset: SlideDataset) -> dict[str, _Case]:
     recipe = with_channels(load_recipe('default'), 'fast')
-    cases = {name: _case(recipe, changes, RATE_HZ, slide_signals) for name, changes in VARIANTS.items()}
-    slower = [at_rate(item, 'signal', RATE_HZ / 2) for item in slide_signals]
+    cases = {name: _case(recipe, changes, RATE_HZ, dataset) for name, changes in VARIANTS.items()}
+    slower = all_at_rate(dataset, 'signal', RATE_HZ / 2)
     return {**cases, HALVED: _case(recipe, {}, RATE_HZ / 2, slower)}
 
 
-def _channel_cases(slide_signals: Sequence[LabelledSlide]) -> dict[str, _Case]:
+def _channel_cases(dataset: SlideDataset) -> dict[str, _Case]:
     recipe = load_recipe('vibration-and-taxels')
-    rate_hz = slide_signals[0].signals['signal'][0].sampling_rate_hz
-    cases = {name: _case(recipe, changes, rate_hz, slide_signals) for name, changes in SLOW_VARIANTS.items()}
+    rate_hz = dataset[0].signals['signal'][0].sampling_rate_hz
+    cases = {name: _case(recipe, changes, rate_hz, dataset) for name, changes in SLOW_VARIANTS.items()}
     for name, channels in KEPT_CHANNELS.items():
-        cases[name] = _case(recipe, {}, rate_hz, [_with_slow_channels(item, channels) for item in slide_signals])
+        kept = SlideDataset(tuple(_with_slow_channels(slide, channels) for slide in dataset))
+        cases[name] = _case(recipe, {}, rate_hz, kept)
     return cases
 
 
-def _case(recipe: Recipe, changes: Changes, rate_hz: float, slide_signals: Sequence[LabelledSlide]) -> _Case:
-    return _Case(comparable(changed(recipe, changes), rate_hz, of_motion=False), slide_signals)
+def _case(recipe: Recipe, changes: Changes, rate_hz: float, dataset: SlideDataset) -> _Case:
+    return _Case(comparable(changed(recipe, changes), rate_hz, of_motion=False), dataset)
 
 
 def changed(recipe: Recipe, changes: Changes) -> Recipe:
@@ -206,9 +208,10 @@ def _figures(cases: Mapping[str, _Case], options: BenchmarkOptions) -> dict[str,
 
 def _try(case: _Case, quick: bool) -> _AblationResult:
     last = QUICK_LAST_TRAINED if quick else LAST_TRAINED
-    extracted = extract_all(case.recipe, case.slide_signals)
-    training_features = examples_of({slide: own for slide, own in extracted.items() if slide.number <= last})
-    later = examples_of({slide: own for slide, own in extracted.items() if slide.number > last})
+    features = case.dataset.features(case.recipe.feature_set)
+    first = [slide.name for slide in case.dataset if slide.number <= last]
+    training_features = features.of_slides(first)
+    later = features.take(~np.isin(features.groups, first))
     labels, codes = np.unique(training_features.labels, return_inverse=True)
     groups = np.unique(training_features.groups, return_inverse=True)[1]
     learner = replace(case.recipe.learner, folds=QUICK_FOLDS if quick else FOLDS)
@@ -228,7 +231,7 @@ def _try(case: _Case, quick: bool) -> _AblationResult:
 
 
 def _median_us(item: _AblationResult) -> float:
-    return latency_us(item.case.recipe, item.model, item.case.slide_signals)['median']
+    return latency_us(item.case.recipe, item.model, item.case.dataset)['median']
 
 
 def _chart(numbers: Mapping[str, Any], path: Path) -> Path:

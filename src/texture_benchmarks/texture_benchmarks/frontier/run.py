@@ -14,24 +14,8 @@ from texture_benchmarks.frontier.chart import early_chart, size_chart
 from texture_benchmarks.frontier.training_costs import Cost, TrainingSize, costs
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.recipes import minirocket
-from texture_benchmarks.recipes.run import (
-    DATA,
-    LAST_TRAINED,
-    QUICK_LAST_TRAINED,
-    QUICK_MATERIALS,
-    QUICK_SLIDES,
-    RATE_HZ,
-)
-from texture_benchmarks.recipes.trial import (
-    LENGTH_S,
-    Split,
-    at_rate,
-    chronological_split,
-    comparable,
-    every,
-    latency_us,
-    try_recipe,
-)
+from texture_benchmarks.recipes.run import DATA, FIRST, LATER, QUICK_FIRST, QUICK_MATERIALS, QUICK_SLIDES, RATE_HZ
+from texture_benchmarks.recipes.trial import LENGTH_S, all_at_rate, comparable, every, figures_of, latency_us
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
 from texture_estimation.model import TextureModel
@@ -39,9 +23,11 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.search.parallel import single_blas_thread
 from texture_evaluation import metrics
 from texture_evaluation.charts import evidence_chart, line_chart
+from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
+from texture_evaluation.cross_validation.cross_validate import cross_validate
+from texture_evaluation.cross_validation.splits import Split
 from texture_evaluation.train import with_channels
 from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.slides import LabelledSlide
 
 # Ours with windows of all lengths, and of each paper the recipe that recognises most, of those that train in seconds.
 LENGTHS_S, FEW_LENGTHS_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0), (0.1, 0.5, 2.0)
@@ -97,19 +83,16 @@ _Points = Mapping[str, Mapping[float, _Point]]  # by recipe and length (s) of it
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Try recipes with windows of many lengths on recorded slides, and learners with trainings of many sizes."""
-    slide_signals = _recorded(options)
-    slides = slide_signals
-    splits = chronological_split(slides, QUICK_LAST_TRAINED if options.quick else LAST_TRAINED)
+    dataset = _recorded(options)
+    split = Split(LATER, ChronologicalSplit(QUICK_FIRST if options.quick else FIRST))
     recipes = QUICK_RECIPES if options.quick else RECIPES
     name = SHOWN if SHOWN in recipes else next(iter(recipes))
     overlap = _FrontierJob(name, LENGTH_S, overlap=True)
-    tried = _try_all(
-        [overlap, *(_FrontierJob(each, s) for each in recipes for s in recipes[each])], slide_signals, splits
-    )
+    tried = _try_all([overlap, *(_FrontierJob(each, s) for each in recipes for s in recipes[each])], dataset, split)
     points = {each: {s: tried[_FrontierJob(each, s)] for s in recipes[each]} for each in recipes}
     shown, overlapping = points[name], tried[overlap]
     with single_blas_thread():
-        rocket = _rocket(slide_signals, splits, options)
+        rocket = _rocket(dataset, split, options)
     sizes = _sizes(options)
     return BenchmarkResult(
         name='frontier',
@@ -173,39 +156,35 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def _recorded(options: BenchmarkOptions) -> list[LabelledSlide]:
+def _recorded(options: BenchmarkOptions) -> SlideDataset:
     slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ('', ())
     with imported(options, 'biotac20', slides, materials) as bags:
-        slide_signals = SlideDataset.from_bags(bags, topics=('signal',)).slides
-    return [at_rate(item, 'signal', RATE_HZ) for item in slide_signals]
+        return all_at_rate(SlideDataset.from_bags(bags, topics=('signal',)), 'signal', RATE_HZ)
 
 
-def _try(slide_signals: Sequence[LabelledSlide], splits: Sequence[Split], job: _FrontierJob) -> _Point:
-    outcome = try_recipe(job.recipe(), slide_signals, splits)
-    results = outcome.results
+def _try(dataset: SlideDataset, split: Split, job: _FrontierJob) -> _Point:
+    result = cross_validate(job.recipe(), dataset, split.splitter)
+    results = result.pooled
     early = metrics.decided_at(results, CONFIDENCES)
-    return _Point(outcome.model, outcome.numbers(), metrics.curve(results), early, metrics.early_decision(results))
+    rule = metrics.early_decision(results)
+    return _Point(result.folds[-1].model, figures_of(result), metrics.curve(results), early, rule)
 
 
-def _try_all(
-    jobs: Sequence[_FrontierJob], slide_signals: Sequence[LabelledSlide], splits: Sequence[Split]
-) -> dict[_FrontierJob, _Point]:
+def _try_all(jobs: Sequence[_FrontierJob], dataset: SlideDataset, split: Split) -> dict[_FrontierJob, _Point]:
     """Return what comes of each job, one on each core; the computing time of windows is taken alone, at the end."""
-    tried = dict(zip(jobs, map_forked(partial(_try, slide_signals, splits), jobs), strict=True))
+    tried = dict(zip(jobs, map_forked(partial(_try, dataset, split), jobs), strict=True))
     with single_blas_thread():
         for job, point in tried.items():
-            point.figures['latency_us'] = latency_us(job.recipe(), point.model, slide_signals)
+            point.figures['latency_us'] = latency_us(job.recipe(), point.model, dataset)
     return tried
 
 
-def _rocket(
-    slide_signals: Sequence[LabelledSlide], splits: Sequence[Split], options: BenchmarkOptions
-) -> dict[float, dict[str, Any]]:
+def _rocket(dataset: SlideDataset, split: Split, options: BenchmarkOptions) -> dict[float, dict[str, Any]]:
     """Return the figures of MiniRocket by the length of the window; none where it is not installed."""
     if options.quick or not minirocket.installed():
         return {}
     return {
-        length_s: minirocket.try_minirocket(slide_signals, splits, options.seed, length_s, ROCKET_EVERY)
+        length_s: minirocket.try_minirocket(dataset, split, options.seed, length_s, ROCKET_EVERY)
         for length_s in FEW_LENGTHS_S
     }
 

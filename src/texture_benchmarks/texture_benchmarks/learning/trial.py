@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
-from texture_core.features import FeatureVector
-from texture_core.signal import NANOSECONDS
 from texture_estimation.classification.training import train
 from texture_estimation.incremental.incremental_classifier import IncrementalClassifier
 from texture_estimation.model import TextureModel
@@ -71,26 +69,26 @@ def run_incremental(
     numbers = np.array([int(group.rsplit('/', 1)[1].removeprefix('slide')) for group in examples.groups])
     is_new = np.isin(examples.labels, list(new))
     test, training = numbers > last_training, numbers <= last_training
-    base = train(recipe, _some(examples, training & ~is_new))
+    base = train(recipe, examples.take(training & ~is_new))
     base.save(path)
     incremental_classifier, add_s = IncrementalClassifier(base, path), []
     incremental_run = IncrementalRun(
-        {}, {}, {}, {}, _score(base, _some(examples, test & ~is_new)), np.empty(0), (0.0, 0.0)
+        {}, {}, {}, {}, _score(base, examples.take(test & ~is_new)), np.empty(0), (0.0, 0.0)
     )
     for stage, before in zip(stages, (0, *stages), strict=False):
         for number in range(before + 1, stage + 1):
             for label in new:
-                rows = np.flatnonzero((numbers == number) & (examples.labels == label))
-                add_s.append(_add_examples(incremental_classifier, examples, rows))
-        retrained = train(recipe, _some(examples, training & (~is_new | (numbers <= stage))))
+                [slide] = set(examples.groups[(numbers == number) & (examples.labels == label)].tolist())
+                add_s.append(_add_examples(incremental_classifier, examples, slide))
+        retrained = train(recipe, examples.take(training & (~is_new | (numbers <= stage))))
         for scores, model, which in (
             (incremental_run.incremental, incremental_classifier.model, test),
             (incremental_run.retrained, retrained, test),
             (incremental_run.new, incremental_classifier.model, test & is_new),
             (incremental_run.old, incremental_classifier.model, test & ~is_new),
         ):
-            scores[stage] = _score(model, _some(examples, which))
-    window = examples.values[0]
+            scores[stage] = _score(model, examples.take(which))
+    window = examples.X[0]
     return replace(
         incremental_run,
         add_s=np.array(add_s),
@@ -98,26 +96,12 @@ def run_incremental(
     )
 
 
-def _some(examples: LabelledFeatures, rows: Mask) -> LabelledFeatures:
-    return replace(examples, values=examples.values[rows], labels=examples.labels[rows], groups=examples.groups[rows])
-
-
-def _add_examples(
-    incremental_classifier: IncrementalClassifier, examples: LabelledFeatures, rows: NDArray[np.intp]
-) -> float:
+def _add_examples(incremental_classifier: IncrementalClassifier, examples: LabelledFeatures, slide: str) -> float:
     """Add one slide, and return the processor time that it took, s."""
-    name = str(examples.groups[rows[0]])
-    for place, row in enumerate(rows):
-        start_ns = round(place * examples.hop_s * NANOSECONDS)
-        values = examples.values[row]
-        incremental_classifier.observe(
-            FeatureVector(
-                start_ns, name, examples.window_s, examples.hop_s, examples.names, values,
-                feature_set=examples.feature_set,
-            )
-        )  # fmt: skip
+    for vector in examples.vectors(slide)[:-1]:  # the last one is the end
+        incremental_classifier.observe(vector)
     began = time.process_time()
-    incremental_classifier.add(str(examples.labels[rows[0]]), name)
+    incremental_classifier.add(str(examples.labels[examples.groups == slide][0]), slide)
     return time.process_time() - began
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
@@ -17,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from texture_benchmarks.recipes.trial import LENGTH_S, Split
+from texture_benchmarks.recipes.trial import LENGTH_S
 from texture_core.arrays import AnyArray, Array
+from texture_evaluation.cross_validation.cross_validate import split_slides
+from texture_evaluation.cross_validation.splits import Split
 from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
-from texture_recordings.slides import LabelledSlide
+from texture_recordings.slide_dataset import SlideDataset
 
 ABSENT = 'not measured: aeon is not installed (pip install aeon)'
 # Of the ridge, tried on a fifth of the slides for training; the transform's values have unit variance.
@@ -35,8 +36,8 @@ def installed() -> bool:
 
 
 def try_minirocket(
-    slide_signals: Sequence[LabelledSlide],
-    folds: Sequence[Split],
+    dataset: SlideDataset,
+    split: Split,
     seed: int,
     length_s: float = LENGTH_S,
     every: int = 1,
@@ -45,7 +46,7 @@ def try_minirocket(
 
     Parameters
     ----------
-    slide_signals, folds
+    dataset, split
         Slides, and which of them are used for training and tested on.
     seed
         Of its kernels.
@@ -56,12 +57,12 @@ def try_minirocket(
         square.
     """
     transform = import_module('aeon.transformations.collection.convolution_based').MiniRocket
-    windows = _cut(slide_signals, length_s)
+    windows = _cut(dataset, length_s)
     right, voted, taken = [], [], []
-    for training, tested in folds:
+    for training, tested in split_slides(dataset, split.splitter, split.groups):
         start = time.process_time()
-        rows = np.flatnonzero(np.isin(windows.slides, list(training)))[::every]
-        held = np.isin(windows.slides, list(tested))
+        rows = np.flatnonzero(np.isin(windows.slides, dataset.names[training]))[::every]
+        held = np.isin(windows.slides, dataset.names[tested])
         rocket = transform(random_state=seed).fit(windows.samples[rows])
         ridge = _Ridge.fit(rocket.transform(windows.samples[rows]), windows.labels[rows], windows.slides[rows])
         taken.append(time.process_time() - start)
@@ -85,11 +86,11 @@ class _Windows:
     slides: AnyArray
 
 
-def _cut(slide_signals: Sequence[LabelledSlide], length_s: float) -> _Windows:
+def _cut(dataset: SlideDataset, length_s: float) -> _Windows:
     params = WindowParams(length_s=length_s, hop_s=LENGTH_S)
     found = [
         (event.windows['signal'].samples[:, 0], item.surface, item.name)
-        for item in slide_signals
+        for item in dataset
         for event in cut_recording({'signal': item.signals['signal']}, item.states, params)
         if isinstance(event, CutWindow)
     ]

@@ -10,7 +10,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
+from sklearn.model_selection import LeaveOneGroupOut
 
 from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.imported_data import imported
@@ -18,16 +18,12 @@ from texture_benchmarks.recipes import minirocket
 from texture_benchmarks.recipes.table import recipe_table
 from texture_benchmarks.recipes.trial import (
     LENGTH_S,
-    Split,
-    at_rate,
-    chronological_split,
+    all_at_rate,
     comparable,
-    evaluate_extracted,
-    every,
-    extract_all,
+    figures_of,
+    in_random_folds,
     latency_us,
-    random_splits,
-    splits_by,
+    trained_every,
 )
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData
@@ -35,10 +31,12 @@ from texture_core.resources import folder
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.charts import front_chart
+from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
+from texture_evaluation.cross_validation.cross_validate import FoldFeatures, cross_validate, split_slides
+from texture_evaluation.cross_validation.splits import Split
 from texture_evaluation.train import with_channels
 from texture_features.feature_set import FeatureSet
 from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.slides import LabelledSlide
 
 VIBRATION, ALL_CHANNELS, ARRAY = 'biotac20, PAC at 1 kHz', 'biotac20, all channels', 'ntp21'
 DATA = {
@@ -47,6 +45,7 @@ DATA = {
 }
 RATE_HZ, FOLDS, LAST_TRAINED = 1000.0, 5, 30
 QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_TRAINED = ('material01', 'material02', 'material03'), '1-6', 2, 4
+FIRST, QUICK_FIRST = LAST_TRAINED / 40, QUICK_LAST_TRAINED / 6  # fraction of the slides of each material
 QUICK_FASTER_M_S = 0.05
 QUICK_RECIPES = ('default', 'ets-linear-svm-vote', 'kaboli-pa', 'jamali-naive-bayes-5, overlapping')
 NEAREST = {'ties': 'nearest'}
@@ -113,22 +112,22 @@ PLACES: Mapping[str, str] = {
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Slides of one data set as all recipes get them, and how they are divided into those trained on and tested.
+    """Slides of one data set as all recipes get them, and how they are split.
 
     Parameters
     ----------
-    slide_signals
+    dataset
         All slides.
     splits
-        Divisions by the name of the split.
+        Splitters of the slides.
     rate_hz
         Of the vibration.
     of_motion
         Whether recipes may use speed and force.
     """
 
-    slide_signals: Sequence[LabelledSlide]
-    splits: Mapping[str, Sequence[Split]]
+    dataset: SlideDataset
+    splits: Sequence[Split]
     rate_hz: float
     of_motion: bool
 
@@ -137,8 +136,9 @@ class Setting:
         recipe = load_recipe(name.partition(', ')[0])
         learner: Any = recipe.learner
         recipe = replace(recipe, learner=replace(learner, **VARIANTS.get(name, SHIPPED).learner))
-        whole = set(recipe.feature_set.topics) <= set(self.slide_signals[0].signals)
-        return comparable(with_channels(recipe, 'all' if whole else 'fast'), self.rate_hz, of_motion=self.of_motion)
+        whole = set(recipe.feature_set.topics) <= set(self.dataset[0].signals)
+        recipe = comparable(with_channels(recipe, 'all' if whole else 'fast'), self.rate_hz, of_motion=self.of_motion)
+        return trained_every(VARIANTS.get(name, SHIPPED).apart_s, recipe)
 
 
 class _RecipeJob(NamedTuple):
@@ -164,7 +164,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
 def run_later(options: BenchmarkOptions) -> BenchmarkResult:
     """Try the shipped ones on the vibration of later slides alone, in a sixth of the time."""
     setting = biotac20_settings(options)[VIBRATION]
-    later = replace(setting, splits={LATER: setting.splits[LATER]})
+    later = replace(setting, splits=[split for split in setting.splits if split.name == LATER])
     return result_of('recipes_later', _numbers({VIBRATION: later}, _shipped(options), options), options)
 
 
@@ -175,7 +175,7 @@ def _shipped(options: BenchmarkOptions) -> Sequence[str]:
 
 
 def _numbers(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> dict[str, Any]:
-    numbers: dict[str, Any] = {name: {split: {} for split in setting.splits} for name, setting in settings.items()}
+    numbers: dict[str, Any] = {name: {split.name: {} for split in setting.splits} for name, setting in settings.items()}
     jobs = _jobs(settings, names, options)
     for job, tried in zip(jobs, map_forked(partial(_try, settings, options.seed), jobs), strict=True):
         for name, (of_splits, model) in tried.items():
@@ -183,7 +183,7 @@ def _numbers(settings: Mapping[str, Setting], names: Sequence[str], options: Ben
                 numbers[job.setting][split][name] = figures
             if model:
                 setting = settings[job.setting]
-                latency = latency_us(setting.recipe(name), model, setting.slide_signals)
+                latency = latency_us(setting.recipe(name), model, setting.dataset)
                 for figures in of_splits.values():
                     figures['latency_us'] = latency
     return numbers
@@ -230,32 +230,24 @@ def biotac20_settings(options: BenchmarkOptions) -> dict[str, Setting]:
     """Return the vibration alone and all channels of the BioTac's slides."""
     some = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ()
     with imported(options, 'biotac20', *some) as bags:
-        slide_signals = SlideDataset.from_bags(bags).slides
-    slides = slide_signals
-    by_time = {LATER: chronological_split(slides, QUICK_LAST_TRAINED if options.quick else LAST_TRAINED)}
-    rng = np.random.default_rng(options.seed)
-    at_random = {'random': random_splits(slides, QUICK_FOLDS if options.quick else FOLDS, rng)}
-    vibration = [at_rate(item, 'signal', RATE_HZ) for item in slide_signals]
+        dataset = SlideDataset.from_bags(bags)
+    by_time = Split(LATER, ChronologicalSplit(QUICK_FIRST if options.quick else FIRST))
+    at_random = in_random_folds('random', dataset, QUICK_FOLDS if options.quick else FOLDS, options.seed)
+    vibration = all_at_rate(dataset, 'signal', RATE_HZ)
     return {
-        VIBRATION: Setting(vibration, {**at_random, **by_time}, RATE_HZ, of_motion=False),
-        ALL_CHANNELS: Setting(slide_signals, by_time, 2200.0, of_motion=False),
+        VIBRATION: Setting(vibration, [at_random, by_time], RATE_HZ, of_motion=False),
+        ALL_CHANNELS: Setting(dataset, [by_time], 2200.0, of_motion=False),
     }
 
 
 def _ntp21(options: BenchmarkOptions) -> dict[str, Setting]:
     with imported(options, 'ntp21') as bags:
-        slide_signals: Sequence[LabelledSlide] = SlideDataset.from_bags(bags[:3] if options.quick else bags).slides
+        dataset = SlideDataset.from_bags(bags[:3] if options.quick else bags)
     if options.quick:  # fast slides are the short ones
-        slide_signals = [item for item in slide_signals if item.states[0].speed_m_s > QUICK_FASTER_M_S]
-    first = {item.name: item.states[0] for item in slide_signals}
-    splits = {
-        'one force out': splits_by({name: state.force_n for name, state in first.items()}),
-        'one speed out': splits_by({name: round(state.speed_m_s, 3) for name, state in first.items()}),
-    }
-    if options.quick:
-        splits = {name: folds[:1] for name, folds in splits.items()}
-    rate_hz = slide_signals[0].signals['signal'][0].sampling_rate_hz
-    return {ARRAY: Setting(slide_signals, splits, rate_hz, of_motion=True)}
+        dataset = dataset.select(where=lambda slide: slide.speed_m_s > QUICK_FASTER_M_S)
+    splits = [Split(f'one {condition} out', LeaveOneGroupOut(), condition) for condition in ('force', 'speed')]
+    rate_hz = dataset[0].signals['signal'][0].sampling_rate_hz
+    return {ARRAY: Setting(dataset, splits, rate_hz, of_motion=True)}
 
 
 def _jobs(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> list[_RecipeJob]:
@@ -263,37 +255,36 @@ def _jobs(settings: Mapping[str, Setting], names: Sequence[str], options: Benchm
     groups: dict[tuple[str, FeatureSet, float], list[str]] = {}
     for setting, name in product(settings, names):
         if PLACES.get(name, setting) == setting:
-            apart_s = VARIANTS.get(name, SHIPPED).apart_s
-            groups.setdefault((setting, settings[setting].recipe(name).feature_set, apart_s), []).append(name)
+            recipe = settings[setting].recipe(name)
+            groups.setdefault((setting, recipe.feature_set, recipe.training.hop_s), []).append(name)
     jobs = [_RecipeJob(setting, tuple(group)) for (setting, *_), group in groups.items()]
     if not options.quick and minirocket.installed() and VIBRATION in settings:
         jobs.append(_RecipeJob(VIBRATION, (MINIROCKET,)))
     # What takes long first, so that no core waits at the end.
-    trainings = {name: sum(map(len, setting.splits.values())) for name, setting in settings.items()}
+    trainings = {name: sum(_count(setting, split) for split in setting.splits) for name, setting in settings.items()}
     return sorted(jobs, key=lambda job: (not any(map(SLOW.search, job.recipes)), -trainings[job.setting]))
+
+
+def _count(setting: Setting, split: Split) -> int:
+    return len(split_slides(setting.dataset, split.splitter, split.groups))
 
 
 def _try(settings: Mapping[str, Setting], seed: int, job: _RecipeJob) -> dict[str, _RecipeFigures]:
     setting = settings[job.setting]
     if job.recipes == (MINIROCKET,):
-        figures = {
-            name: minirocket.try_minirocket(setting.slide_signals, folds, seed)
-            for name, folds in setting.splits.items()
-        }
+        figures = {split.name: minirocket.try_minirocket(setting.dataset, split, seed) for split in setting.splits}
         return {MINIROCKET: _RecipeFigures(figures, None)}
     recipes = {name: setting.recipe(name) for name in job.recipes}
-    first = recipes[job.recipes[0]]
-    apart_s = VARIANTS.get(job.recipes[0], SHIPPED).apart_s
-    added_slides = extract_all(every(apart_s, first), setting.slide_signals) if apart_s < LENGTH_S else None
-    extracted = extract_all(first, setting.slide_signals)
+    features = FoldFeatures.of(recipes[job.recipes[0]], setting.dataset)
     tried = {}
     for name, recipe in recipes.items():
-        outcomes = {
-            split: evaluate_extracted(recipe, extracted, folds, added_slides, apart_s)
-            for split, folds in setting.splits.items()
+        results = {
+            split.name: cross_validate(recipe, setting.dataset, split.splitter, groups=split.groups, features=features)
+            for split in setting.splits
         }
-        *_, last = outcomes.values()
-        tried[name] = _RecipeFigures({split: outcome.numbers() for split, outcome in outcomes.items()}, last.model)
+        *_, last = results.values()
+        figures = {split: figures_of(result) for split, result in results.items()}
+        tried[name] = _RecipeFigures(figures, last.folds[-1].model)
     return tried
 
 

@@ -10,14 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from texture_benchmarks.recipes.trial import at_rate, examples_of, extract_all, extract_features
+from texture_benchmarks.recipes.trial import at_rate
 from texture_benchmarks.robustness.degradations import Degradation
 from texture_core.arrays import Array
 from texture_core.signal import TactileSignal
 from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
+from texture_evaluation.train import training_examples
 from texture_features.feature_set import FeatureSet
+from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 
 TOPIC = 'signal'
@@ -42,8 +44,8 @@ class TrainedModels:
         """Train each recipe on all slides."""
         models = []
         for group in _sharing({recipe.name: recipe for recipe in recipes}):
-            extracted = extract_all(group[0], slides)
-            models += [train(recipe, examples_of(extracted)) for recipe in group]
+            examples = training_examples(group[0], SlideDataset(tuple(slides)))
+            models += [train(recipe, examples) for recipe in group]
         return cls(models)
 
     def counts(self, slides: Sequence[LabelledSlide], length: float = 1.0) -> dict[str, Count]:
@@ -51,9 +53,8 @@ class TrainedModels:
         models = {model.recipe.name: model for model in self.models}
         found: dict[str, Count] = {}
         for group in _sharing({name: with_windows(model.recipe, length) for name, model in models.items()}):
-            extracted = [
-                (item.surface, vector.values) for item in slides for vector in extract_features(group[0], item)
-            ]
+            vectors = SlideDataset(tuple(slides)).vectors(group[0].feature_set)
+            extracted = [(slide.surface, vector.values) for slide, own in vectors for vector in own]
             found |= {recipe.name: _count(models[recipe.name], extracted) for recipe in group}
         return found
 

@@ -7,8 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
-from texture_benchmarks.speed_force.conditions import Conditions, extracted
+import numpy as np
+
+from texture_benchmarks.speed_force.conditions import extracted, slide_trial, speed_mm_s
 from texture_benchmarks.speed_force.held_out import (
     EvaluateSplit,
     HeldOutResult,
@@ -25,6 +28,8 @@ from texture_estimation.learners.svm_rbf import SvmRbf
 from texture_features.feature import Feature, WindowBatch
 from texture_features.features.centred_log_ratio import CentredLogRatio
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
+from texture_recordings.slide_dataset import SlideDataset
+from texture_recordings.slide_samples import SlideSamples
 
 COMPLETE = ('BeigeCotton', 'BrownCotton', 'Canvas', 'Linen')  # of all forces, speeds and directions
 START_ROWS = 3  # of the touch before the finger moves: 84 ms
@@ -39,7 +44,7 @@ class Fabricslide:
 
     Parameters
     ----------
-    conditions
+    dataset
         The slides, with their touch before they begin.
     learner
         What learns the loads; they are of one kind, and what a turn has left of a taxel is not to be blown up.
@@ -47,16 +52,21 @@ class Fabricslide:
         How much of the turn is taken out, of which the training chooses.
     """
 
-    conditions: Conditions
+    dataset: SlideDataset
     learner: Learner = field(default_factory=lambda: SvmRbf(common_scale=True))
     energies: Sequence[float] = ENERGIES
+
+    @cached_property
+    def samples(self) -> list[SlideSamples]:
+        """Samples of each slide."""
+        return self.dataset.samples('signal_static')
 
     def splits(self) -> dict[str, dict[str, tuple[Mask, Mask]]]:
         """Return train and test slides by protocol and by what is left out."""
         return {
-            'one force out': one_out(self.conditions.force_n),
-            'one speed out': one_out(self.conditions.speed_mm_s),
-            'one direction out': one_out(self.conditions.upwards),
+            'one force out': one_out(self.dataset.condition('force')),
+            'one speed out': one_out(speed_mm_s(self.dataset)),
+            'one direction out': one_out(np.copysign(1.0, np.sin(self.dataset.condition('direction')))),
         }
 
     def loads(self) -> dict[str, HeldOutResult]:
@@ -69,7 +79,7 @@ class Fabricslide:
         starts, steady = self._shares()
         slides = {f'{energy:.0%}': self._load_trial(starts, steady, energy) for energy in self.energies}
         touches = {f'{energy:.0%}': self._load_trial(starts, steady, energy, starts) for energy in self.energies}
-        force, speed = self.conditions.force_n, self.conditions.speed_mm_s
+        force, speed = self.dataset.condition('force'), speed_mm_s(self.dataset)
         inner = {
             'one force out': (slides, [force]),
             'one speed out': (slides, [speed]),
@@ -86,19 +96,19 @@ class Fabricslide:
 
     def bands(self) -> dict[str, HeldOutResult]:
         """Return how slides are recognised without the pattern: from mean bands of waves per metre."""
-        windows = [slide.windows() for slide in self.conditions.slides]
-        trial = self.conditions.trial(extracted([BANDS], windows), SvmRbf())
+        windows = [slide.windows() for slide in self.samples]
+        trial = slide_trial(self.dataset, SvmRbf(), extracted([BANDS], windows))
         return {name: run(trial, parts) for name, parts in self.splits().items()}
 
     def _shares(self) -> tuple[Array, Array]:
         """Return the load when each finger is about to slide and while it slides, (n, n_taxels)."""
-        slides = self.conditions.slides
+        slides = self.samples
         share: Sequence[Feature] = [CentredLogRatio()]
         starts = extracted(share, [WindowBatch(slide.before[:START_ROWS], slide.rate_hz) for slide in slides])
         return starts, extracted(share, [slide.windows() for slide in slides])
 
     def _load_trial(self, starts: Array, steady: Array, energy: float, tested: Array | None = None) -> EvaluateSplit:
-        surfaces, names = self.conditions.surfaces, self.conditions.names
+        surfaces, names = self.dataset.labels, self.dataset.names
         asked: AnyArray = steady if tested is None else tested
 
         def trial(train: Mask, test: Mask) -> Mask:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from texture_benchmarks.speed_force.conditions import Conditions, extracted
+from texture_benchmarks.speed_force.conditions import extracted, slide_trial, speed_mm_s
 from texture_benchmarks.speed_force.held_out import (
     EvaluateSplit,
     HeldOutResult,
@@ -33,6 +33,7 @@ from texture_features.feature import Feature, WindowBatch
 from texture_features.features.centred_log_ratio import CentredLogRatio
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
 from texture_features.features.spatial_bands import SpatialBands
+from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slide_samples import SlideSamples
 
 SLOW_MM_S = 60.0  # "slow" is trained, faster is tested
@@ -53,7 +54,7 @@ class Ntp21:
 
     Parameters
     ----------
-    conditions
+    dataset
         The slides.
     learner
         What learns.
@@ -61,13 +62,18 @@ class Ntp21:
         Number of bands and floor, of which the training chooses; without floors for windows.
     """
 
-    conditions: Conditions
+    dataset: SlideDataset
     learner: Learner = field(default_factory=SvmRbf)
     candidates: Sequence[tuple[int, float]] = CANDIDATES
 
+    @cached_property
+    def samples(self) -> list[SlideSamples]:
+        """Samples of each slide."""
+        return self.dataset.samples('signal')
+
     def splits(self) -> dict[str, dict[str, tuple[Mask, Mask]]]:
         """Return train and test slides by protocol and by what is left out."""
-        speed, force = self.conditions.speed_mm_s, self.conditions.force_n
+        speed, force = speed_mm_s(self.dataset), self.dataset.condition('force')
         slow = speed <= SLOW_MM_S
         return {
             'one speed out': one_out(speed),
@@ -77,20 +83,20 @@ class Ntp21:
 
     def whole(self) -> dict[str, HeldOutResult]:
         """Return how whole slides are recognised from the mean over the taxels, with the bands chosen in training."""
-        windows = [slide.windows() for slide in self.conditions.slides]
+        windows = [slide.windows() for slide in self.samples]
         trials = {
             f'{bands} bands, floor {floor:g}': self._trial([MeanSpatialBands(bands=bands, floor=floor)], windows)
             for bands, floor in self.candidates
         }
-        inner = {'one force out': [self.conditions.force_n]}
+        inner = {'one force out': [self.dataset.condition('force')]}
         return {
-            name: run_chosen(trials, parts, inner.get(name, [self.conditions.speed_mm_s]))
+            name: run_chosen(trials, parts, inner.get(name, [speed_mm_s(self.dataset)]))
             for name, parts in self.splits().items()
         }
 
     def whole_with(self, features: Sequence[Feature]) -> dict[str, HeldOutResult]:
         """Return how whole slides are recognised by features as they are."""
-        trial = self._trial(features, [slide.windows() for slide in self.conditions.slides])
+        trial = self._trial(features, [slide.windows() for slide in self.samples])
         return {name: run(trial, parts) for name, parts in self.splits().items()}
 
     def whole_with_pattern(self) -> dict[str, HeldOutResult]:
@@ -99,7 +105,7 @@ class Ntp21:
 
     def whole_over_time(self) -> dict[str, HeldOutResult]:
         """Return the same by bands of frequency instead of waves per metre: all slides as if at one speed."""
-        slides = self.conditions.slides
+        slides = self.samples
         middle_m_s = float(np.sqrt(SPEEDS_M_S[0] * SPEEDS_M_S[-1]))
         trial = self._trial([MeanSpatialBands()], [slide.windows(speed_m_s=middle_m_s) for slide in slides])
         return {name: run(trial, parts) for name, parts in self.splits().items()}
@@ -113,19 +119,19 @@ class Ntp21:
         errors: list[Array] = []
 
         def trial(train: Mask, test: Mask) -> Mask:
-            known = np.array([slide.speed_m_s for slide in self.conditions.slides])
+            known = np.array([slide.speed_m_s for slide in self.samples])
             array = self._array(train)
-            slides = self.conditions.slides
+            slides = self.samples
             estimated = np.array([array(slide.samples, slide.rate_hz, SPEEDS_M_S) for slide in slides])
             wrong = np.abs(np.log(estimated / known))
             errors.append(np.expm1(wrong[test]))
             most = float(np.quantile(wrong[train], SPANNED))
             trained = [self._extracted_at(known * factor) for factor in np.exp(np.linspace(-most, most, MISTAKES))]
-            names, surfaces = (np.tile(of[train], MISTAKES) for of in (self.conditions.names, self.conditions.surfaces))
+            names, surfaces = (np.tile(of[train], MISTAKES) for of in (self.dataset.names, self.dataset.labels))
             return recognised(
                 self.learner,
                 (np.concatenate([values[train] for values in trained]), surfaces, names),
-                (self._extracted_at(estimated)[test], self.conditions.surfaces[test]),
+                (self._extracted_at(estimated)[test], self.dataset.labels[test]),
             )
 
         outcomes = {name: run(trial, parts) for name, parts in self.splits().items()}
@@ -146,7 +152,7 @@ class Ntp21:
             'same distance': a model for the tested speed, trained windows of the distance that is slid at it in 0.59 s;
             'all distances': one model, trained windows of the distances of all speeds; 'same time': windows of 0.59 s.
         """
-        speed = self.conditions.speed_mm_s
+        speed = speed_mm_s(self.dataset)
         trials = {
             f'{bands} bands': self._window_trial(recipe_features(bands), trained)
             for bands in sorted({bands for bands, _ in self.candidates})
@@ -159,8 +165,8 @@ class Ntp21:
         One model, trained windows of the distances of all speeds as if the array had mistaken them, by up to the error
         that 95 % of the training slides stay below in the window in their middle.
         """
-        speed, surfaces, names = self.conditions.speed_mm_s, self.conditions.surfaces, self.conditions.names
-        features, slides, errors = recipe_features(TRAINED_BANDS), self.conditions.slides, {}
+        speed, surfaces, names = speed_mm_s(self.dataset), self.dataset.labels, self.dataset.names
+        features, slides, errors = recipe_features(TRAINED_BANDS), self.samples, {}
         distances = TRAINED['all distances'](np.unique(speed), 0.0)
 
         def trial(train: Mask, test: Mask) -> Mask:
@@ -183,21 +189,21 @@ class Ntp21:
         return run(trial, one_out(speed)), errors
 
     def _trial(self, features: Sequence[Feature], windows: Sequence[WindowBatch]) -> EvaluateSplit:
-        return self.conditions.trial(extracted(features, windows), self.learner)
+        return slide_trial(self.dataset, self.learner, extracted(features, windows))
 
     def _extracted_at(self, speeds_m_s: Array) -> Array:
         """Return mean spatial bands of all slides as if at these speeds, (n, n_bands)."""
-        pairs = zip(self.conditions.slides, speeds_m_s, strict=True)
+        pairs = zip(self.samples, speeds_m_s, strict=True)
         return extracted([MeanSpatialBands()], [slide.windows(speed_m_s=float(speed)) for slide, speed in pairs])
 
     def _array(self, train: Mask) -> ArraySpeedEstimator:
         """Return the array with the positions of its taxels estimated in training."""
-        slides = [slide for slide, use in zip(self.conditions.slides, train, strict=True) if use]
+        slides = [slide for slide, use in zip(self.samples, train, strict=True) if use]
         return ArraySpeedEstimator.fit([(slide.samples, slide.rate_hz, slide.speed_m_s) for slide in slides])
 
     def _window_trial(self, features: Sequence[Feature], trained: str) -> EvaluateSplit:
         """Return what trains windows of some distances and tests windows of 0.59 s."""
-        speed, surfaces, names = self.conditions.speed_mm_s, self.conditions.surfaces, self.conditions.names
+        speed, surfaces, names = speed_mm_s(self.dataset), self.dataset.labels, self.dataset.names
 
         @cache
         def cut(distance_m: float | None) -> tuple[Array, AnyArray]:
@@ -216,7 +222,7 @@ class Ntp21:
 
     def _cut(self, features: Sequence[Feature], distance_m: float | None) -> tuple[Array, AnyArray]:
         """Return windows of all slides, described, (n, n_features), and the number of the slide of each, (n,)."""
-        windows = [_cut(slide, distance_m) for slide in self.conditions.slides]
+        windows = [_cut(slide, distance_m) for slide in self.samples]
         owners = np.repeat(np.arange(len(windows)), [len(window.samples) for window in windows])
         return extracted(features, windows), owners
 

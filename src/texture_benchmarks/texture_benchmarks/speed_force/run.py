@@ -8,7 +8,6 @@ from typing import Any
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.speed_force.chart import held_out_chart, spectra_chart, window_chart
-from texture_benchmarks.speed_force.conditions import Conditions
 from texture_benchmarks.speed_force.fabricslide import COMPLETE, Fabricslide
 from texture_benchmarks.speed_force.held_out import HeldOutResult
 from texture_benchmarks.speed_force.ntp21 import TRAINED, Ntp21
@@ -36,12 +35,12 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     slides, surfaces = (QUICK_SLIDES, QUICK_TEXTURES) if options.quick else ('', ())
     with imported(options, 'ntp21', slides, surfaces) as textures:
         ntp21 = Ntp21(
-            Conditions(SlideDataset.from_bags(textures, topics=['signal']).samples('signal')),
+            SlideDataset.from_bags(textures, topics=['signal']),
             **(QUICK_NTP21 if options.quick else {}),
         )
     with imported(options, 'fabricslide', QUICK_RUNS if options.quick else '', COMPLETE) as fabrics:
         fabricslide = Fabricslide(
-            Conditions(SlideDataset.from_bags(fabrics).samples('signal_static')),
+            SlideDataset.from_bags(fabrics),
             **(QUICK_FABRICSLIDE if options.quick else {}),
         )
     estimated, speed_errors = ntp21.whole_without_speed()
@@ -59,13 +58,13 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         'taxel average, waves per metre': fabricslide.bands(),
     }
     panels = {
-        f'{_count(ntp21.conditions)} textures, 9 taxels (ntp21)': (textures_known, GOALS['ntp21']),
-        f'{_count(fabricslide.conditions)} fabrics, 16 slow taxels (fabricslide)': (
+        f'{_count(ntp21.dataset)} textures, 9 taxels (ntp21)': (textures_known, GOALS['ntp21']),
+        f'{_count(fabricslide.dataset)} fabrics, 16 slow taxels (fabricslide)': (
             fabrics_known,
             GOALS['fabricslide'],
         ),
     }
-    shown = [slide for slide in ntp21.conditions.slides if slide.surface == SHOWN]
+    shown = [slide for slide in ntp21.samples if slide.surface == SHOWN]
     return BenchmarkResult(
         name='speed_force',
         measured='share recognised; mean over what is left out in turn',
@@ -87,8 +86,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def _count(conditions: Conditions) -> int:
-    return len(set(conditions.surfaces))
+def _count(dataset: SlideDataset) -> int:
+    return len(set(dataset.labels))
 
 
 def _numbers(methods: Mapping[str, Mapping[str, HeldOutResult]]) -> Mapping[str, Any]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from texture_benchmarks.recipes.trial import at_rate, extract_features
+from texture_benchmarks.recipes.trial import at_rate
 from texture_benchmarks.robustness.degradations import DEGRADATIONS
 from texture_core.arrays import Array
 from texture_core.features import FeatureVector
@@ -18,6 +18,7 @@ from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import TextureModel
 from texture_evaluation.metrics import SlideResult
 from texture_features.augmentation.disturbances import smooth_response
+from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 
 VIBRATION = 'signal'
@@ -157,7 +158,8 @@ def disturbed(item: LabelledSlide, row: Row, strength: float, rng: np.random.Gen
 
 def evaluate_slides(model: TextureModel, slides: Sequence[LabelledSlide]) -> list[SlideResult]:
     """Return what a model says of slides, window by window."""
-    return [evaluate_vectors(model, item.surface, extract_features(model.recipe, item)) for item in slides]
+    extracted = SlideDataset(tuple(slides)).vectors(model.recipe.feature_set)
+    return [evaluate_vectors(model, slide.surface, vectors) for slide, vectors in extracted]
 
 
 def evaluate_vectors(model: TextureModel, surface: str, vectors: Sequence[FeatureVector]) -> SlideResult:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from texture_estimation.recipe import Recipe
 from texture_evaluation import metrics
 from texture_evaluation.cross_validation.splits import Splitter, groups_name
 from texture_evaluation.metrics import SlideResult
+from texture_evaluation.train import training_examples
 from texture_features.labelled_features import LabelledFeatures
 from texture_recordings.slide_dataset import SlideDataset
 
@@ -39,11 +41,41 @@ class FoldResult:
         Names of the training slides.
     results
         By the name of the test slide.
+    model
+        Trained on the training slides.
+    train_s
+        Processor time of the training, from features to the model, s.
     """
 
     name: str
     trained_on: tuple[str, ...]
     results: Mapping[str, SlideResult]
+    model: TextureModel
+    train_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class FoldFeatures:
+    """Features of all slides, computed once for all folds, and for all recipes of the same windows and features.
+
+    Parameters
+    ----------
+    trained
+        Windows as the recipe is trained on, with its augmentation.
+    tested
+        Windows as the recipe classifies them.
+    """
+
+    trained: LabelledFeatures
+    tested: LabelledFeatures
+
+    @classmethod
+    def of(cls, recipe: Recipe, dataset: SlideDataset) -> FoldFeatures:
+        """Return the features of a recipe; raise InvalidData if no slide has a window."""
+        tested = dataset.features(recipe.feature_set)
+        if recipe.training_windows == recipe.feature_set.windows and not recipe.augmentation.copies:
+            return cls(tested, tested)
+        return cls(training_examples(recipe, dataset), tested)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +157,7 @@ def cross_validate(
     n_jobs: int | None = None,
     *,
     groups: str | AnyArray = 'slide',
+    features: FoldFeatures | None = None,
 ) -> CrossValidation:
     """Train a recipe on some slides and test it on others, for each split of the slides.
 
@@ -145,6 +178,8 @@ def cross_validate(
         `joblib.parallel_config` says, such as the workers of a Dask cluster.
     groups
         What must not be on both sides: 'slide', a condition of the data set, such as 'speed', or an array (n_slides,).
+    features
+        Those of the recipe, if they were computed already.
 
     Raises
     ------
@@ -160,32 +195,24 @@ def cross_validate(
         print(result.as_json()['window_accuracy'])
     """
     columns = _groups(dataset, groups)
-    splits = _split(splitter, dataset.labels, columns)
-    tested = dataset.features(recipe.feature_set)
-    trained = tested
-    if recipe.training_windows != recipe.feature_set.windows or recipe.augmentation.copies:
-        windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
-        trained = dataset.features(windows, recipe.augmentation)
+    splits = split_slides(dataset, splitter, columns)
+    features = features or FoldFeatures.of(recipe, dataset)
     names = dataset.names
-    jobs = [
-        (
+    folds = Parallel(n_jobs=n_jobs)(
+        delayed(_fold)(
             recipe,
-            trained.of_slides(names[train_rows]),
-            tested.of_slides(names[test_rows]),
+            features.trained.of_slides(names[train_rows]),
+            features.tested.of_slides(names[test_rows]),
+            tuple(names[train_rows].tolist()),
             _fold_name(number, columns, test_rows),
         )
         for number, (train_rows, test_rows) in enumerate(splits, 1)
-    ]
-    results = Parallel(n_jobs=n_jobs)(delayed(_fold)(*job) for job in jobs)
-    folds = tuple(
-        FoldResult(job[3], tuple(names[train_rows].tolist()), result)
-        for job, (train_rows, _), result in zip(jobs, splits, results, strict=True)
     )
-    usable = set(tested.groups.tolist())
+    usable = set(features.tested.groups.tolist())
     return CrossValidation(
         recipe.name,
         tuple(np.unique(dataset.labels).tolist()),
-        folds,
+        tuple(folds),
         tuple(name for name in names.tolist() if name not in usable),
     )
 
@@ -233,6 +260,30 @@ def slide_counts(results: Sequence[SlideResult]) -> Array:
     return np.array([(one.estimates[-1].label == one.surface, 1) for one in results], dtype=np.float64)
 
 
+def split_slides(
+    dataset: SlideDataset, splitter: Splitter, groups: str | AnyArray = 'slide'
+) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Return the training and test slides of each split, by their place in the data set.
+
+    Raises
+    ------
+    InvalidData
+        If the slides cannot be split so.
+    """
+    labels, columns = dataset.labels, _groups(dataset, groups)
+    folds = getattr(splitter, 'n_splits', 1)
+    names, counts = np.unique(labels, return_counts=True)
+    if type(splitter).__name__.startswith('Stratified') and counts.min() < folds:
+        raise InvalidData(
+            f"'{names[counts.argmin()]}' has {counts.min()} slides, too few for {folds} folds; "
+            'use fewer folds or record more slides'
+        )
+    try:
+        return list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
+    except ValueError as error:
+        raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
+
+
 def _groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
     if isinstance(groups, str):
         return dataset.names if groups == 'slide' else dataset.condition(groups)
@@ -244,30 +295,18 @@ def _groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
     return columns
 
 
-def _split(
-    splitter: Splitter, labels: NDArray[np.str_], groups: AnyArray
-) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    folds = getattr(splitter, 'n_splits', 1)
-    names, counts = np.unique(labels, return_counts=True)
-    if type(splitter).__name__.startswith('Stratified') and counts.min() < folds:
-        raise InvalidData(
-            f"'{names[counts.argmin()]}' has {counts.min()} slides, too few for {folds} folds; "
-            'use fewer folds or record more slides'
-        )
-    try:
-        return list(splitter.split(np.zeros((len(labels), 1)), labels, groups))
-    except ValueError as error:
-        raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
-
-
 def _fold_name(number: int, groups: AnyArray, test_rows: NDArray[np.intp]) -> str:
     left_out = np.unique(groups[test_rows])
     return groups_name(left_out[0]) if len(left_out) == 1 and len(test_rows) > 1 else str(number)
 
 
-def _fold(recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, name: str) -> dict[str, SlideResult]:
+def _fold(
+    recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, trained_on: tuple[str, ...], name: str
+) -> FoldResult:
+    start = time.process_time()
     try:
         model = train(recipe, trained)
     except InvalidData as error:
         raise InvalidData(f"fold '{name}' cannot be trained: {error}") from error
-    return predict_slides(model, tested)
+    taken_s = time.process_time() - start
+    return FoldResult(name, trained_on, predict_slides(model, tested), model, taken_s)

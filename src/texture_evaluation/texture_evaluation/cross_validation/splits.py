@@ -37,12 +37,13 @@ class Split:
     splitter
         Divides slides.
     groups
-        What must not be on both sides: 'slide', or a condition of `SlideDataset`, such as 'speed'.
+        What must not be on both sides: 'slide', a condition of `SlideDataset`, such as 'speed', or an array,
+        (n_slides,).
     """
 
     name: str
     splitter: Splitter
-    groups: str = 'slide'
+    groups: str | AnyArray = 'slide'
 
 
 def parse_split(text: str, seed: int = 0) -> Split:
