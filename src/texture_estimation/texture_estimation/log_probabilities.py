@@ -9,26 +9,63 @@ from texture_core.arrays import Array
 
 
 def log_softmax(scores: Array) -> Array:
-    """Return scores less the logarithm of the sum of their exponentials, (..., n_labels)."""
+    """Return scores less the logarithm of the sum of their exponentials, (..., n_labels).
+
+    Parameters
+    ----------
+    scores : (..., n_labels)
+
+    Returns
+    -------
+    (..., n_labels)
+        Logarithms of probabilities that add up to 1.
+    """
     shifted = scores - np.maximum.reduce(scores, axis=-1, keepdims=True)
     result: Array = shifted - np.log(np.add.reduce(np.exp(shifted), axis=-1, keepdims=True))
     return result
 
 
 def softmax(scores: Array) -> Array:
-    """Return the exponentials of scores less what makes their sum 1, (..., n_labels)."""
+    """Return the exponentials of scores less what makes their sum 1, (..., n_labels).
+
+    Parameters
+    ----------
+    scores : (..., n_labels)
+
+    Returns
+    -------
+    (..., n_labels)
+        Probabilities that add up to 1.
+    """
     shares: Array = np.exp(scores - np.maximum.reduce(scores, axis=-1, keepdims=True))
     shares /= np.add.reduce(shares, axis=-1, keepdims=True)
     return shares
 
 
 def is_tied(log_probabilities: Array) -> NDArray[np.bool_]:
-    """Return whether several textures share the highest log-probability to the last bit, (...): nothing is decided."""
+    """Return whether several textures share the highest log-probability to the last bit, (...): nothing is decided.
+
+    Parameters
+    ----------
+    log_probabilities : (..., n_labels)
+
+    Returns
+    -------
+    (...) bool
+        True where nothing is decided.
+    """
     best = np.maximum.reduce(log_probabilities, axis=-1, keepdims=True)
     shared: NDArray[np.bool_] = np.count_nonzero(log_probabilities == best, axis=-1) > 1
     return shared
 
 
 def log_loss(log_probabilities: Array, codes: NDArray[np.intp]) -> float:
-    """Return the mean negative log-probability of the true textures; (n, n_labels) and (n,) of their numbers."""
+    """Return the mean negative log-probability of the true textures; (n, n_labels) and (n,) of their numbers.
+
+    Parameters
+    ----------
+    log_probabilities : (n, n_labels)
+    codes : (n,)
+        Numbers of the true labels.
+    """
     return float(-np.take_along_axis(log_probabilities, codes[:, None], axis=-1).mean())

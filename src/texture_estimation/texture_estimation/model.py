@@ -125,11 +125,27 @@ class TextureModel:
         return self._hidden_layer(values) if self._hidden_layer is not None else None
 
     def predict_log_proba(self, values: Array) -> Array:
-        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
+        """Return the log-probability of each label, (..., n_labels) of (..., n_features).
+
+        Parameters
+        ----------
+        values : (..., n_features)
+
+        Returns
+        -------
+        (..., n_labels)
+            Natural logarithms.
+        """
         return log_softmax(self.predictor(values))
 
     def decide(self, values: Array) -> list[str]:
-        """Return the label of each window alone, (n,) of (n, n_features); '' where several labels are equally good."""
+        """Return the label of each window alone, (n,) of (n, n_features); '' where several labels are equally good.
+
+        Parameters
+        ----------
+        values : (n_features,), or (n, n_features)
+            Of the windows of one slide.
+        """
         log_probabilities = self.predict_log_proba(values)
         best = log_probabilities.argmax(axis=-1).tolist()
         none = is_tied(log_probabilities).tolist()
@@ -148,7 +164,13 @@ class TextureModel:
         return self.labels[: int(self.examples.codes.max()) + 1] if self.examples else self.labels
 
     def examples_of(self, label: str) -> Array:
-        """Return the examples of a label from training and added slides, (n, n_features)."""
+        """Return the examples of a label from training and added slides, (n, n_features).
+
+        Returns
+        -------
+        (n, n_features)
+            Those of the training and those added.
+        """
         known = self.examples.of_label(self.labels.index(label)) if self.examples and label in self.labels else None
         own = [added_slide.values for added_slide in self.added_slides if added_slide.label == label]
         return np.concatenate([np.empty((0, len(self.names))) if known is None else known, *own])
@@ -176,7 +198,13 @@ class TextureModel:
         return ridge_classifier
 
     def validate(self) -> None:
-        """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now."""
+        """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now.
+
+        Raises
+        ------
+        ModelMismatch
+            If parts contradict each other, or a number is not finite or out of its range.
+        """
         nothing = np.zeros(len(self.names))
         answer = self.predict_log_proba(nothing)
         if answer.shape != (len(self.labels),) or np.isnan(answer).any():

@@ -48,6 +48,20 @@ def write(path: str | Path, parameters: Mapping[str, Any], card: Mapping[str, An
     """Write NAME.skops and NAME.json, and return NAME.skops.
 
     A reader never sees half a file: both are written beside their places and then moved.
+
+    Parameters
+    ----------
+    path
+        Path of the model, with or without its ending.
+    parameters
+        What was trained: arrays, plain values and trusted types.
+    card
+        What people may read about it: plain values.
+
+    Returns
+    -------
+    Path
+        Of NAME.skops.
     """
     from skops.io import dumps  # noqa: PLC0415  # takes a second, and only who saves or loads needs it
 
@@ -85,6 +99,11 @@ def load_parameters(content: bytes, trusted: Sequence[str], *, estimators: bool 
     estimators
         Whether it may hold any estimator of scikit-learn and its decision trees, too.
 
+    Returns
+    -------
+    dict
+        What `write` was given.
+
     Raises
     ------
     ModelMismatch
@@ -105,7 +124,13 @@ def load_parameters(content: bytes, trusted: Sequence[str], *, estimators: bool 
 
 
 def check_storable(parameters: Mapping[str, Any], name: str) -> None:
-    """Raise InvalidParameter if a model file could not hold an estimator of scikit-learn, or not be read again."""
+    """Raise InvalidParameter if a model file could not hold an estimator of scikit-learn, or not be read again.
+
+    Raises
+    ------
+    InvalidParameter
+        If it could not.
+    """
     from skops.io import dumps  # noqa: PLC0415  # takes a second
 
     try:

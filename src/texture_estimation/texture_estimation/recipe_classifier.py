@@ -54,6 +54,11 @@ class RecipeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  #
         groups : (n,)
             Slide of each window; probabilities are calibrated on held-out slides. None: each window is its own slide.
 
+        Returns
+        -------
+        RecipeClassifier
+            Itself, as scikit-learn wants it.
+
         Raises
         ------
         ValueError
@@ -73,7 +78,18 @@ class RecipeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  #
         return self
 
     def predict_proba(self, X: Any) -> Array:  # noqa: N803
-        """Return the probability of each label, (n, n_labels), of features (n, n_features)."""
+        """Return the probability of each label, (n, n_labels), of features (n, n_features).
+
+        Returns
+        -------
+        (n, n_labels)
+            Columns in the order of `classes_`.
+
+        Raises
+        ------
+        ValueError
+            If there are other features than in the training.
+        """
         check_is_fitted(self)
         values = check_array(X, dtype=np.float64)
         if values.shape[1] != self.n_features_in_:
@@ -84,7 +100,13 @@ class RecipeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  #
         return softmax(np.asarray(self.predictor_(values)))
 
     def predict(self, X: Any) -> AnyArray:  # noqa: N803
-        """Return the most probable label of each row, (n,)."""
+        """Return the most probable label of each row, (n,).
+
+        Returns
+        -------
+        (n,)
+            Elements of `classes_`.
+        """
         best: NDArray[np.intp] = self.predict_proba(X).argmax(axis=1)
         labels: AnyArray = self.classes_[best]
         return labels

@@ -26,7 +26,18 @@ class EvidenceRule(Protocol):
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def window_evidence(self, log_probabilities: Array) -> Array:
-        """Return the evidence of a window, (..., n_labels), from its log-probabilities; the rule gets its mean."""
+        """Return the evidence of a window, (..., n_labels), from its log-probabilities; the rule gets its mean.
+
+        Parameters
+        ----------
+        log_probabilities : (..., n_labels)
+            As the predictor gives them.
+
+        Returns
+        -------
+        (..., n_labels)
+            What is averaged over the windows.
+        """
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the log-probability of each texture given all windows so far, (..., n_labels).
@@ -38,10 +49,30 @@ class EvidenceRule(Protocol):
             Effective window count: sliding time over the length of a window.
         tempering_exponent
             Exponent of the effective window count, 0 to 1, fitted on held-out slides.
+
+        Returns
+        -------
+        (..., n_labels)
+            Logarithms of probabilities that add up to 1.
         """
 
     def posterior(self, mean_evidence: Array, effective_windows: float, tempering_exponent: float) -> Array:
-        """Return the probabilities of which `log_posterior` gives the logarithms; it costs half of that."""
+        """Return the probabilities of which `log_posterior` gives the logarithms; it costs half of that.
+
+        Parameters
+        ----------
+        mean_evidence : (..., n_labels)
+            Mean of the evidence of the windows.
+        effective_windows
+            Effective window count: sliding time over the length of a window.
+        tempering_exponent
+            Exponent of the effective window count, 0 to 1.
+
+        Returns
+        -------
+        (..., n_labels)
+            Probabilities that add up to 1.
+        """
 
 
 @dataclass(frozen=True)

@@ -71,6 +71,25 @@ def fit_novelty(
 
     Returns None if there are too few slides: MIN_SLIDES of each class are needed, and in all MIN_ALL_SLIDES or one over
     the rate of false rejections.
+
+    Parameters
+    ----------
+    learner
+        Learner of the recipe.
+    fitted
+        What it has learnt from the examples.
+    examples
+        Windows of known surfaces.
+    rule
+        Combines the windows of a slide.
+    false_rejection_rate
+        Fraction of slides over known surfaces that may be rejected, above 0.
+    gain_range
+        Largest factor by which copies of the slides are amplified or attenuated.
+
+    Returns
+    -------
+    (NoveltyDetector, sequence of SlideTrace), or None
     """
     classes = np.unique(examples.labels, return_inverse=True)[1]
     names, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)

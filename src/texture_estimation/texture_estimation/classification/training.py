@@ -49,6 +49,11 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     name
         Of the model; that of the recipe if ''.
 
+    Returns
+    -------
+    TextureModel
+        Ready to classify and to be stored.
+
     Raises
     ------
     InvalidData
@@ -162,7 +167,20 @@ def _augmented_examples(
 
 
 def slide_means(values: Array, groups: Codes) -> Array:
-    """Return the mean of the windows of each slide, (n_slides, n_features); slides are numbered from 0."""
+    """Return the mean of the windows of each slide, (n_slides, n_features); slides are numbered from 0.
+
+    Parameters
+    ----------
+    values : (n, n_features)
+        Features of windows.
+    groups : (n,)
+        Number of the slide of each window.
+
+    Returns
+    -------
+    (n_slides, n_features)
+        In the units of the features.
+    """
     means = np.zeros((int(groups.max()) + 1, values.shape[1]))
     np.add.at(means, groups, values)
     means /= np.bincount(groups)[:, None]

@@ -43,7 +43,24 @@ class AddedSlide:
 
 
 def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, feature_set: str) -> Path:
-    """Write an added slide of a model by its number, from 1, atomically."""
+    """Write an added slide of a model by its number, from 1, atomically.
+
+    Parameters
+    ----------
+    model
+        Path of the model.
+    number
+        Number of the slide, from 1; an existing one is replaced.
+    added_slide
+        What is written.
+    feature_set
+        Fingerprint of the features.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     content = {
         'format': FORMAT,
         'feature_set': feature_set,
@@ -67,6 +84,20 @@ def read_added_slides(model: str | Path, feature_set: str, names: Sequence[str])
     """Return the added slides of a model in their order; none if there is no folder.
 
     They hold features, so they stay valid when the model is trained again with the same features.
+
+    Parameters
+    ----------
+    model
+        Path of the model.
+    feature_set
+        Fingerprint of the features of the model.
+    names
+        Name of each feature.
+
+    Returns
+    -------
+    tuple of AddedSlide
+        In the order in which they were added.
 
     Raises
     ------

@@ -58,7 +58,15 @@ class RandomFourierFeatures:
 
     @classmethod
     def over(cls, values: Array, parameters: Mapping[str, Any] | None) -> RandomFourierFeatures:
-        """Return the features for examples (n, n_features); `parameters` are those of a network, or None."""
+        """Return the features for examples (n, n_features); `parameters` are those of a network, or None.
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Examples, which give the scale.
+        parameters
+            Parameters of the network that was trained on them, or None.
+        """
         rng = np.random.default_rng(SEED)
         mean, scale = standardisation(values)
         count = values.shape[1]
@@ -160,13 +168,28 @@ class RidgeClassifier:
         )
 
     def examples_of(self, code: int) -> Array:
-        """Return the examples of a label, (n, n_features)."""
+        """Return the examples of a label, (n, n_features).
+
+        Returns
+        -------
+        (n, n_features)
+            Those that count, thinned.
+        """
         return self._rows[code]
 
     def set_examples(self, code: int, rows: Array, *, as_trained: bool = False) -> None:
         """Let `rows`, (n, n_features), be the examples of a label; of the next new one if `code` is their number.
 
         No rows remove the last label. `as_trained`: the rows are those of the training.
+
+        Parameters
+        ----------
+        code
+            Number of the label.
+        rows : (n, n_features)
+            Its examples; none remove the last label.
+        as_trained
+            Whether they are those of the training alone.
         """
         (self._kept.add if as_trained else self._kept.discard)(code)
         if code == len(self._rows):
@@ -187,7 +210,19 @@ class RidgeClassifier:
 
 
 def thinned(rows: Array, most: int = MAX_EXAMPLES) -> Array:
-    """Return at most so many of the rows, evenly spread over all."""
+    """Return at most so many of the rows, evenly spread over all.
+
+    Parameters
+    ----------
+    rows : (n, n_features)
+    most
+        Largest number of rows.
+
+    Returns
+    -------
+    (at most `most`, n_features)
+        In the same order.
+    """
     kept: Array = rows[spread(len(rows), most)]
     return kept
 

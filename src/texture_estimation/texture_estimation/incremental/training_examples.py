@@ -31,13 +31,32 @@ class TrainingExamples:
 
     @classmethod
     def of(cls, values: Array, codes: Codes, slides: Codes) -> TrainingExamples:
-        """Return what contributes keeping: of each label at most so many that more would hardly help."""
+        """Return what contributes keeping: of each label at most so many that more would hardly help.
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Features of windows.
+        codes, slides : (n,)
+            Number of the label and of the slide of each.
+
+        Returns
+        -------
+        TrainingExamples
+            At most MAX_EXAMPLES of each label.
+        """
         own = [np.flatnonzero(codes == code) for code in range(int(codes.max()) + 1)]
         kept = np.concatenate([rows[spread(len(rows))] for rows in own])
         return cls(values[kept].astype(np.float32), codes[kept], slides[kept])
 
     def check(self, n_features: int, n_labels: int) -> None:
-        """Raise ValueError unless they are examples of so many features and labels."""
+        """Raise ValueError unless they are examples of so many features and labels.
+
+        Raises
+        ------
+        ValueError
+            If shapes or labels do not fit, or a value is not finite.
+        """
         n = len(self.codes)
         if self.values.shape != (n, n_features) or self.slides.shape != (n,) or self.codes.shape != (n,):
             raise ValueError(f'examples of shape {self.values.shape} have {n} labels and {len(self.slides)} slides')
@@ -45,12 +64,24 @@ class TrainingExamples:
             raise ValueError('examples have labels that the model has not, or values that are not finite')
 
     def of_label(self, code: int) -> Array:
-        """Return those of a label, (n, n_features); none of one that came later."""
+        """Return those of a label, (n, n_features); none of one that came later.
+
+        Returns
+        -------
+        (n, n_features)
+            float64.
+        """
         rows: Array = self.values[self.codes == code].astype(np.float64)
         return rows
 
     def as_arrays(self) -> dict[str, AnyArray]:
-        """Return the arrays for the model file."""
+        """Return the arrays for the model file.
+
+        Returns
+        -------
+        dict
+            'values' (n, n_features) float32, 'codes' and 'slides' (n,) int32.
+        """
         return {
             'values': self.values,
             'codes': self.codes.astype(np.int32),

@@ -114,7 +114,17 @@ class PairNetworksPredictor:
         return log_softmax(votes.counted(self.outputs(values) - ROUNDED_UP, self.ties))
 
     def outputs(self, values: Array) -> Array:
-        """Return the output of each pair's network, (..., n_pairs): about 1 for its first label, 0 for its second."""
+        """Return the output of each pair's network, (..., n_pairs): about 1 for its first label, 0 for its second.
+
+        Parameters
+        ----------
+        values : (..., n_features)
+
+        Returns
+        -------
+        (..., n_pairs)
+            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+        """
         active = (values - self.mean) @ self._weights  # type: ignore[attr-defined]
         active += self.hidden_bias.reshape(-1)
         np.tanh(active, out=active)

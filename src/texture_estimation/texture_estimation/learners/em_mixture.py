@@ -120,7 +120,17 @@ class MixturePredictor:
         return log_softmax(np.log(shares @ self.names + LEAST))
 
     def cluster_scores(self, values: Array) -> Array:
-        """Return the log-density of each cluster times its weight, but for a constant, (..., n_clusters)."""
+        """Return the log-density of each cluster times its weight, but for a constant, (..., n_clusters).
+
+        Parameters
+        ----------
+        values : (..., n_features)
+
+        Returns
+        -------
+        (..., n_clusters)
+            In nats.
+        """
         standard = (values - self.mean) / self.scale
         white = (standard @ self._together).reshape(*standard.shape[:-1], *self._shift.shape)  # type: ignore[attr-defined]
         white -= self._shift  # type: ignore[attr-defined]

@@ -13,6 +13,18 @@ def assign_folds(codes: Codes, groups: Codes, count: int) -> tuple[Codes, str] |
     The slides of each label, in the order in which they come, are cut into `count` stretches: sensors and surfaces
     drift, and a neighbour in time would flatter. A label with a single slide is divided by its windows instead, which
     does flatter. None if a label has a single window.
+
+    Parameters
+    ----------
+    codes, groups : (n,)
+        Number of the label and of the slide of each example.
+    count
+        Number of parts, at least 2.
+
+    Returns
+    -------
+    ((n,), str), or None
+        Part of each example, and the division in words.
     """
     folds_of = np.empty(len(codes), dtype=np.intp)
     note = f'held-out slides, {count} parts'

@@ -25,11 +25,27 @@ class HiddenPredictor(Protocol):
     """A predictor with a hidden layer."""
 
     def activations(self, values: Array) -> Array:
-        """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features)."""
+        """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features).
+
+        Parameters
+        ----------
+        values : (..., n_features)
+
+        Returns
+        -------
+        (..., n_hidden)
+            Not negative.
+        """
 
 
 def hidden_layer(predictor: Predictor | HiddenPredictor) -> Callable[[Array], Array] | None:
-    """Return what computes the outputs of the hidden layer of a predictor; None if it has none."""
+    """Return what computes the outputs of the hidden layer of a predictor; None if it has none.
+
+    Returns
+    -------
+    callable or None
+        Takes (..., n_features), returns (..., n_hidden).
+    """
     found: Callable[[Array], Array] | None = getattr(predictor, 'activations', None)
     return found
 
@@ -78,7 +94,22 @@ class Learner(Protocol):
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
+        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,).
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Features of windows; finite.
+        codes : (n,)
+            Number of the label of each, from 0, without gaps.
+        groups : (n,)
+            Number of the slide of each; windows of one slide are held out together.
+
+        Returns
+        -------
+        Fitted
+            Parameters for `predictor`, log-probabilities when held out, and a note on the calibration.
+        """
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:

@@ -43,7 +43,21 @@ class Network:
 
     @classmethod
     def random(cls, n_hidden: int, n_features: int, rng: np.random.Generator, transfer: str = SIGMOID) -> Network:
-        """Return a network before its training, for inputs of unit variance."""
+        """Return a network before its training, for inputs of unit variance.
+
+        Parameters
+        ----------
+        n_hidden
+            Neurons of the hidden layer.
+        n_features
+            Number of inputs.
+        rng
+            Draws the weights.
+
+        Returns
+        -------
+        Network
+        """
         hidden = rng.normal(size=(n_hidden, n_features)) / np.sqrt(n_features)
         bias = rng.uniform(-1.0, 1.0, n_hidden)
         return cls(hidden, bias, rng.normal(size=n_hidden) / np.sqrt(n_hidden), 0.5, transfer)
@@ -62,7 +76,20 @@ class Network:
         return output
 
     def jacobian(self, values: Array) -> tuple[Array, Array]:
-        """Return the output, (n,), and its derivative by each weight, (n, n_weights), in the order of `moved`."""
+        """Return the output, (n,), and its derivative by each weight, (n, n_weights), in the order of `moved`.
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Standardised.
+
+        Returns
+        -------
+        (n,)
+            Output for each example.
+        (n, n_weights)
+            Derivative of each output by each weight.
+        """
         active = self.active(values)
         by_bias = self.slope(active) * self.out
         by_hidden = by_bias[:, :, None] * values[:, None, :]
@@ -70,7 +97,13 @@ class Network:
         return active @ self.out + self.out_bias, np.concatenate(columns, axis=1)
 
     def moved(self, step: Array) -> Network:
-        """Return the network with a step, (n_weights,), added to its weights."""
+        """Return the network with a step, (n_weights,), added to its weights.
+
+        Parameters
+        ----------
+        step : (n_weights,)
+            In the order of `jacobian`.
+        """
         n_hidden = len(self.out)
         hidden, bias, out, out_bias = np.split(step, np.cumsum([self.hidden.size, n_hidden, n_hidden]))
         return Network(
@@ -95,6 +128,11 @@ def fit_network(network: Network, values: Array, targets: Array, held: NDArray[n
         Examples held out, which tell when to stop; none to stop by `iterations` alone.
     iterations
         At most so many.
+
+    Returns
+    -------
+    Network
+        With the shape of `network`.
 
     Source: Hagan & Menhaj 1994; early stopping as in MATLAB's trainlm.
     """

@@ -73,6 +73,22 @@ class Mlp:
 
         With augmented examples, the number of passes counts those over the undisturbed ones. A network for the
         calibration makes half of them.
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Features of windows; finite.
+        codes : (n,)
+            Number of the label of each, from 0, without gaps.
+        groups : (n,)
+            Number of the slide of each.
+        augmented
+            Copies of the examples to draw from, or None.
+
+        Returns
+        -------
+        Fitted
+            Parameters, log-probabilities when held out, and a note on the calibration.
         """
         n_labels = int(codes.max()) + 1
         split = assign_folds(codes, groups, self.folds)

@@ -143,6 +143,18 @@ class HistogramNaiveBayesPredictor:
 
 
 def bins_of(values: Array, edges: Array) -> Codes:
-    """Return how many edges, (n_features, n_edges), each value lies above, (..., n_features)."""
+    """Return how many edges, (n_features, n_edges), each value lies above, (..., n_features).
+
+    Parameters
+    ----------
+    values : (..., n_features)
+    edges : (n_features, n_edges)
+        Ascending.
+
+    Returns
+    -------
+    (..., n_features)
+        Whole numbers, 0 to n_edges.
+    """
     above: Codes = np.count_nonzero(values[..., None] > edges, axis=-1)
     return above

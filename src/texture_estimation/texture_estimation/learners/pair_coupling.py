@@ -53,7 +53,18 @@ class PairCoupling:
         return log_softmax(self.scores(decisions) / self.temperature)
 
     def scores(self, decisions: Array) -> Array:
-        """Return -log(1 + Σ_j exp(-margin)), (..., n_labels)."""
+        """Return -log(1 + Σ_j exp(-margin)), (..., n_labels).
+
+        Parameters
+        ----------
+        decisions : (..., n_pairs)
+            Positive for the first label of a pair.
+
+        Returns
+        -------
+        (..., n_labels)
+            At most 0.
+        """
         margins = decisions * self.slopes + self.offsets
         n_pairs = margins.shape[-1]
         against = np.empty((*margins.shape[:-1], 2 * n_pairs))
@@ -72,7 +83,22 @@ def uncalibrated(n_labels: int) -> PairCoupling:
 
 
 def fit_coupling(decisions: Array, codes: Codes, n_labels: int) -> PairCoupling:
-    """Fit sigmoids and temperature to held-out decision values, (n, n_pairs), and label numbers, (n,)."""
+    """Fit sigmoids and temperature to held-out decision values, (n, n_pairs), and label numbers, (n,).
+
+    Parameters
+    ----------
+    decisions : (n, n_pairs)
+        Decision values of held-out examples.
+    codes : (n,)
+        Numbers of their labels.
+    n_labels
+        At least 2.
+
+    Returns
+    -------
+    PairCoupling
+        With a temperature that makes the labels most probable.
+    """
     pairs = combinations(range(n_labels), 2)
     sigmoids = np.array([_fit_sigmoid(decisions[:, number], codes, *pair) for number, pair in enumerate(pairs)])
     coupling = PairCoupling(n_labels, sigmoids[:, 0], sigmoids[:, 1], 1.0)

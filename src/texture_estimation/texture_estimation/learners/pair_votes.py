@@ -36,12 +36,35 @@ class PairVotes:
         """Return how many pairs each label wins, (..., n_labels), of who wins each pair, (..., n_pairs).
 
         Whole numbers without rounding: labels that tie are equal to the last bit, which means unclassified.
+
+        Parameters
+        ----------
+        first_wins : (..., n_pairs) bool
+            Whether the first label of each pair wins.
+
+        Returns
+        -------
+        (..., n_labels)
+            Whole numbers, 0 to n_labels - 1.
         """
         wins: Array = first_wins @ self._swing + self._second_wins_all  # type: ignore[attr-defined]
         return wins
 
     def counted(self, decisions: Array | NDArray[np.float32], ties: str) -> Array:
-        """Return the pairs won, (..., n_labels), of decisions, (..., n_pairs); `ties` is one of TIES."""
+        """Return the pairs won, (..., n_labels), of decisions, (..., n_pairs); `ties` is one of TIES.
+
+        Parameters
+        ----------
+        decisions : (..., n_pairs)
+            Positive for the first label of a pair.
+        ties
+            'unclassified' leaves ties, 'nearest' breaks them by the clearer decisions.
+
+        Returns
+        -------
+        (..., n_labels)
+            Number of pairs won.
+        """
         return self.won_clearly(decisions) if ties == 'nearest' else self.won(decisions > 0)
 
     def won_clearly(self, decisions: Array | NDArray[np.float32]) -> Array:
@@ -51,6 +74,11 @@ class PairVotes:
         ----------
         decisions : (..., n_pairs)
             Positive for the first label of the pair.
+
+        Returns
+        -------
+        (..., n_labels)
+            Number of pairs won, and less than 0.5 more.
 
         Source: scikit-learn's SVC with break_ties and decision_function_shape 'ovr'.
         """

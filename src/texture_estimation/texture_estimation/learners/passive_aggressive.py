@@ -70,7 +70,15 @@ class OnlineLinearClassifier:
     c: float = 1.0
 
     def update(self, standard: Array, code: int) -> None:
-        """Learn from one example, (n_features,), of label number `code`."""
+        """Learn from one example, (n_features,), of label number `code`.
+
+        Parameters
+        ----------
+        standard : (n_features,)
+            Standardised features.
+        code
+            Number of the true label.
+        """
         extended = np.append(standard, 1.0)
         side = np.full(len(self.planes), -1.0)
         side[code] = 1.0
@@ -101,6 +109,13 @@ class CrammerSingerClassifier:
         taken: tau = min(c, loss / (2 |x|²)) is added to the one and subtracted from the other, times x.
 
         Source: Crammer et al. 2006, section 8.
+
+        Parameters
+        ----------
+        standard : (n_features,)
+            Standardised features.
+        code
+            Number of the true label.
         """
         if len(self.planes) < 2:
             return

@@ -65,7 +65,20 @@ class SklearnLearner:
 
     @classmethod
     def from_recipe(cls, values: Mapping[str, Any], where: str) -> SklearnLearner:
-        """Build from the section of a recipe: the key `estimator`, and the estimator's own parameters."""
+        """Build from the section of a recipe: the key `estimator`, and the estimator's own parameters.
+
+        Parameters
+        ----------
+        values
+            The section.
+        where
+            Where it stands, for the sentence of an error.
+
+        Raises
+        ------
+        InvalidParameter
+            If there is no such classifier or parameter, or a value is no plain one.
+        """
         if not isinstance(values, Mapping) or not isinstance(values.get('estimator', DEFAULT), str):
             raise InvalidParameter(f'{where}: came {safe_repr(values)}; name an estimator, such as {EXAMPLE}')
         parameters = {str(name): value for name, value in values.items() if name != 'estimator'}

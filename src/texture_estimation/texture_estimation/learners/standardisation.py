@@ -14,6 +14,17 @@ def standardisation(values: Array) -> tuple[Array, Array]:
     """Return mean and scale of each feature, (n_features,), of examples (n, n_features).
 
     The scale is the standard deviation; 1 for a constant feature, which then is 0 for every example.
+
+    Parameters
+    ----------
+    values : (n, n_features)
+
+    Returns
+    -------
+    (n_features,)
+        Mean of each feature.
+    (n_features,)
+        Scale of each feature, above 0.
     """
     mean = values.mean(axis=0)
     deviation = values.std(axis=0)

@@ -106,7 +106,17 @@ class LinearPairsPredictor:
         return log_softmax(self._votes.won_clearly(self.decisions(values)))  # type: ignore[attr-defined]
 
     def decisions(self, values: Array) -> Array:
-        """Return the decision value of each pair, (..., n_pairs); positive for its first label."""
+        """Return the decision value of each pair, (..., n_pairs); positive for its first label.
+
+        Parameters
+        ----------
+        values : (..., n_features)
+
+        Returns
+        -------
+        (..., n_pairs)
+            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+        """
         decisions: Array = (values - self.mean) @ self._weights + self.intercepts  # type: ignore[attr-defined]
         return decisions
 

@@ -133,6 +133,13 @@ def principal_components(centred: Array, share: float) -> Array:
     ----------
     centred : (n, n_features)
         Zero mean.
+    share
+        Fraction of the variance that they explain at least, 0 to 1.
+
+    Returns
+    -------
+    (n_features, n_components)
+        Orthonormal columns, the one of the largest variance first.
 
     Source: Hu et al. 2014, eq. 7 to 12.
     """

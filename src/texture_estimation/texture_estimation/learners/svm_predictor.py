@@ -56,7 +56,17 @@ class SvmPredictor:
         return self.coupling(self.decisions(values))
 
     def decisions(self, values: Array) -> Array:
-        """Return the decision value of each pair, (..., n_pairs); positive for its first label."""
+        """Return the decision value of each pair, (..., n_pairs); positive for its first label.
+
+        Parameters
+        ----------
+        values : (..., n_features)
+
+        Returns
+        -------
+        (..., n_pairs)
+            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+        """
         standard = (values - self.mean) / self.scale
         # |x - s|² = |x|² + |s|² - 2 x·s, one product with all support vectors
         squares = self.gamma * np.add.reduce(standard * standard, axis=-1, keepdims=True)
@@ -73,7 +83,22 @@ class SvmPredictor:
 
 
 def export(scaler: Any, svc: Any, coupling: PairCoupling) -> SvmPredictor:
-    """Return the exported predictor of a fitted StandardScaler and SVC(kernel='rbf')."""
+    """Return the exported predictor of a fitted StandardScaler and SVC(kernel='rbf').
+
+    Parameters
+    ----------
+    scaler
+        Fitted StandardScaler.
+    svc
+        Fitted SVC with an RBF kernel, one against one.
+    coupling
+        From decision values to probabilities.
+
+    Returns
+    -------
+    SvmPredictor
+        With the decisions of scikit-learn up to rounding.
+    """
     counts = svc.n_support_
     n_labels, width = len(counts), int(counts.max())
     n_features = svc.support_vectors_.shape[1]

@@ -46,7 +46,18 @@ class ClassConditionalGaussian:
     means: Array
 
     def log_likelihoods(self, places: Array) -> Array:
-        """Return those of slides (..., n_axes) by texture, (..., n_textures), less what all textures share."""
+        """Return those of slides (..., n_axes) by texture, (..., n_textures), less what all textures share.
+
+        Parameters
+        ----------
+        places : (..., n_axes)
+            Features of slides on the axes that separate textures.
+
+        Returns
+        -------
+        (..., n_textures)
+            In nats, up to a constant of each slide.
+        """
         off = places[..., None, :] - self.means
         return np.asarray(-0.5 * np.einsum('...i,...i->...', off, off))
 
@@ -57,6 +68,11 @@ class ClassConditionalGaussian:
 
         Source: Kolchinsky & Tracey 2017, "Estimating mixture entropy with pairwise distances", with the
         Bhattacharyya distance, which of all Chernoff distances bounds best where the covariance is shared.
+
+        Parameters
+        ----------
+        log_prior : (n_textures,)
+            What is known before the slide.
         """
         off = self.means[:, None, :] - self.means
         distance = np.einsum('ijk,ijk->ij', off, off) / 8.0
@@ -66,7 +82,15 @@ class ClassConditionalGaussian:
         return max(0.0, -float(prior[possible] @ np.log(near)))
 
     def sampled_information(self, log_prior: Array, draws: Array) -> float:
-        """Return the same by simulated slides, without bias: `draws` are standard normal, (n_samples, n_axes)."""
+        """Return the same by simulated slides, without bias: `draws` are standard normal, (n_samples, n_axes).
+
+        Parameters
+        ----------
+        log_prior : (n_textures,)
+            What is known before the slide.
+        draws : (n_samples, n_axes)
+            Standard normal numbers.
+        """
         prior = np.exp(log_prior)
         information = 0.0
         for texture in np.flatnonzero(prior > 0.0):
@@ -109,6 +133,10 @@ class NextTouchModel:
             Mean features of each slide.
         textures, motions : (n_slides,)
             What was slid over, and how.
+
+        Returns
+        -------
+        NextTouchModel
 
         Raises
         ------
@@ -168,7 +196,27 @@ class NextTouchModel:
         return np.full(len(self.textures), -math.log(len(self.textures)))
 
     def update(self, log_prior: Array, motion: SlideMotion, values: Array) -> Array:
-        """Return the log-posterior (n_textures,) after a slide with mean features (n_features,)."""
+        """Return the log-posterior (n_textures,) after a slide with mean features (n_features,).
+
+        Parameters
+        ----------
+        log_prior : (n_textures,)
+            What was known before the slide.
+        motion
+            How it was made.
+        values : (n_features,)
+            Its mean features.
+
+        Returns
+        -------
+        (n_textures,)
+            Logarithms of probabilities that add up to 1.
+
+        Raises
+        ------
+        InvalidData
+            If the values have another shape or are not finite.
+        """
         gaussians = self._gaussian(motion)
         values = np.asarray(values, dtype=np.float64)
         if values.shape != self.projection.shape[:1] or not np.isfinite(values).all():
@@ -193,6 +241,11 @@ class NextTouchModel:
             Of simulated slides; without one, the lower bound in closed form.
         samples
             Simulated slides over each texture.
+
+        Returns
+        -------
+        float
+            At least 0, at most the entropy of what is known so far.
         """
         gaussians, log_posterior = self._gaussian(motion), self._checked(log_posterior)
         if rng is None:
@@ -212,6 +265,16 @@ class NextTouchModel:
             Those that may be made.
         rng
             For an estimate by simulated slides; without one, by the lower bound in closed form.
+
+        Returns
+        -------
+        NextTouch
+            The motion and its expected information, in nats.
+
+        Raises
+        ------
+        InvalidParameter
+            If there are no motions.
         """
         if not motions:
             raise InvalidParameter('there is no motion to choose from; name at least one that was trained')
@@ -220,7 +283,18 @@ class NextTouchModel:
         return min((c for c in known_motions if c.information >= most - SAME_NATS), key=lambda c: c.motion.duration_s)
 
     def check(self, values: Array) -> None:
-        """Raise InvalidData if the update with these mean features, (n_features,), is not finite."""
+        """Raise InvalidData if the update with these mean features, (n_features,), is not finite.
+
+        Parameters
+        ----------
+        values : (n_features,)
+            Mean features of a slide.
+
+        Raises
+        ------
+        InvalidData
+            If it is not.
+        """
         for motion in self.gaussians:
             if np.isnan(self.update(self.uniform_log_prior, motion, values)).any():
                 raise InvalidData(f'what textures look like under {motion} is not finite')
@@ -236,7 +310,13 @@ class NextTouchModel:
 
     @classmethod
     def from_arrays(cls, parameters: Mapping[str, Any]) -> NextTouchModel:
-        """Return what `as_arrays` gave."""
+        """Return what `as_arrays` gave.
+
+        Raises
+        ------
+        InvalidData
+            If the shapes of the arrays contradict each other.
+        """
         projection, means = (np.asarray(parameters[name], dtype=np.float64) for name in ('projection', 'means'))
         motions = [SlideMotion(**motion) for motion in parameters['motions']]
         textures = tuple(map(str, parameters['textures']))
@@ -268,6 +348,18 @@ class NextTouchModel:
 
 def slide_values(vectors: Sequence[FeatureVector], feature_set: str) -> Array:
     """Return the mean features of a slide, (n_features,), from those of its windows.
+
+    Parameters
+    ----------
+    vectors
+        Windows of one slide; its end is ignored.
+    feature_set
+        Fingerprint of the features of the model.
+
+    Returns
+    -------
+    (n_features,)
+        In the units of the features.
 
     Raises
     ------

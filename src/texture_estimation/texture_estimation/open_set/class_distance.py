@@ -49,7 +49,15 @@ class ClassDistance:
 
     @classmethod
     def fit(cls, means: Array, classes: Codes) -> ClassDistance:
-        """Fit to the means of slides (n_slides, n_features) and the numbers of their classes (n_slides,)."""
+        """Fit to the means of slides (n_slides, n_features) and the numbers of their classes (n_slides,).
+
+        Parameters
+        ----------
+        means : (n_slides, n_features)
+            Mean features of each slide.
+        classes : (n_slides,)
+            Number of the label of each.
+        """
         names, codes = np.unique(classes, return_inverse=True)
         scale = means.std(axis=0)
         scale[scale <= 1e-12 * np.abs(means).max(axis=0)] = np.inf  # what is constant tells nothing
@@ -85,7 +93,15 @@ class ClassDistance:
         return np.asfortranarray(self.projection)
 
     def score(self, mean: Array, code: int) -> float:
-        """Return the score of the mean features (n_features,) of a slide for a class; infinite without its slides."""
+        """Return the score of the mean features (n_features,) of a slide for a class; infinite without its slides.
+
+        Parameters
+        ----------
+        mean : (n_features,)
+            Mean features of the slide.
+        code
+            Number of the label.
+        """
         found = self._own.get(code)
         if found is None:
             return np.inf
@@ -101,14 +117,28 @@ class ClassDistance:
         return 2.0 * float(np.add.reduce(halves)) / len(halves) + float(np.add.reduce(squares) - squares @ self.weights)
 
     def with_slides(self, means: Array, classes: Codes) -> ClassDistance:
-        """Return the distance with more reference slides, (n_slides, n_features) and (n_slides,)."""
+        """Return the distance with more reference slides, (n_slides, n_features) and (n_slides,).
+
+        Parameters
+        ----------
+        means : (n_slides, n_features)
+            Mean features of each further slide.
+        classes : (n_slides,)
+            Number of the label of each.
+        """
         references = np.concatenate([self.references, means @ self.projection])
         every = np.concatenate([self.classes, classes])
         order = np.argsort(every, kind='stable')
         return ClassDistance(self.projection, references[order], every[order], self.centre, self.weights)
 
     def as_arrays(self) -> dict[str, AnyArray]:
-        """Return the arrays for the model file."""
+        """Return the arrays for the model file.
+
+        Returns
+        -------
+        dict
+            Name of each field, and its array.
+        """
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     @classmethod

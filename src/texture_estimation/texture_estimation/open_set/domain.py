@@ -111,6 +111,11 @@ class Domain:
             Of each slide.
         margins
             How far an exploration may lie outside; the defaults if None.
+
+        Returns
+        -------
+        Domain
+            Ranges of speed and force, motions, directions and sensors of the slides.
         """
         slides = tuple(conditions)
         margins = margins or DomainMargins()

@@ -73,6 +73,11 @@ class NoveltyDetector:
         false_rejection_rate
             Fraction of the slides over known surfaces that may be taken for unknown: of new slides like those held out,
             no more are, on average. With too few slides for the fraction, none of those held out is.
+
+        Returns
+        -------
+        NoveltyDetector
+            With a threshold for each effective window count.
         """
         medians = np.stack([np.median(scores, axis=0) for scores in held_out])
         spreads = np.stack([np.quantile(scores, TAIL_QUANTILE, axis=0) for scores in held_out]) - medians
@@ -136,7 +141,13 @@ class NoveltyDetector:
         return replace(self, distances=distances, distances_only=True)
 
     def as_arrays(self) -> dict[str, AnyArray]:
-        """Return the arrays for the model file."""
+        """Return the arrays for the model file.
+
+        Returns
+        -------
+        dict
+            Name of each field, and its array.
+        """
         numbers = {name: getattr(self, name) for name in ('medians', 'spreads', 'thresholds', 'distance_thresholds')}
         spaces = {
             f'{space}/{name}': array
@@ -243,6 +254,11 @@ def space_means(values: Array, hidden: Array | None, overlap: float) -> dict[str
         Outputs of the hidden layer.
     overlap
         Distance of two windows over their length, at most 1.
+
+    Returns
+    -------
+    dict
+        Mean vector of each space, by its name.
     """
     by_space = {FEATURES: values, HIDDEN: hidden, ONSET: values}
     return {

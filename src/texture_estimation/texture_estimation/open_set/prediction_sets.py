@@ -46,7 +46,15 @@ class PredictionSets:
         )
 
     def members(self, probabilities: Array, effective_windows: float) -> list[int]:
-        """Return the numbers of the textures in the set, the most probable first; none only for a `reason`."""
+        """Return the numbers of the textures in the set, the most probable first; none only for a `reason`.
+
+        Parameters
+        ----------
+        probabilities : (n_labels,)
+            Of each texture after the slide.
+        effective_windows
+            Effective window count of the slide.
+        """
         if not self.thresholds:
             return []
         thresholds = min(
@@ -74,6 +82,11 @@ def fit_prediction_sets(
         Length of the evidence after each window.
     coverage
         Share of slides whose texture is to be in the set.
+
+    Returns
+    -------
+    PredictionSets
+        With a threshold, or with the reason why there is none.
     """
     thresholds = []
     rank = _rank(len(truths), coverage)

@@ -43,7 +43,21 @@ class StoppingRule:
     novelty_score: float = NEVER
 
     def certain(self, confidence: float, effective_windows: float, novelty_score: float = 0.0) -> bool:
-        """Return whether the slide may end."""
+        """Return whether the slide may end.
+
+        Parameters
+        ----------
+        confidence
+            Probability of the best label, 0 to 1.
+        effective_windows
+            Effective window count so far.
+        novelty_score
+            Novelty score so far.
+
+        Returns
+        -------
+        bool
+        """
         confident = confidence >= self.confidence and novelty_score <= self.novelty_score
         return confident or effective_windows >= self.max_windows
 
@@ -89,6 +103,10 @@ def fit_stopping_rule(
         After each window: confidence of the best label, whether it is the true one, length of the evidence.
     wrong
         Share of the slides that may be decided wrongly.
+
+    Returns
+    -------
+    StoppingRule
     """
     tried = [StoppingRule(float(confidence), max_windows) for confidence in CONFIDENCES for max_windows in MAX_WINDOWS]
     outcomes = [_outcome(rule, confidences, right, effective_window_counts) for rule in tried]

@@ -36,17 +36,51 @@ class CheckParams:
 
 
 def checked_columns(names: Sequence[str], feature: str) -> NDArray[np.intp]:
-    """Return the columns that a feature fills, of values named 'input/feature/value/channel'."""
+    """Return the columns that a feature fills, of values named 'input/feature/value/channel'.
+
+    Parameters
+    ----------
+    names
+        Name of each value.
+    feature
+        Name of the feature in the recipe.
+
+    Returns
+    -------
+    (n_columns,)
+        Indices, ascending.
+    """
     return np.flatnonzero([name.split('/')[1:2] == [feature] for name in names])
 
 
 def graded_columns(names: Sequence[str]) -> NDArray[np.intp]:
-    """Return the columns that a regressor sees."""
+    """Return the columns that a regressor sees.
+
+    Returns
+    -------
+    (n_columns,)
+        Indices, ascending.
+    """
     return np.flatnonzero([name.split('/')[1:2] not in ([STICK_SLIP], [LEVEL]) for name in names])
 
 
 def limits_of(params: CheckParams, names: Sequence[str], values: Array) -> dict[str, float]:
-    """Return the largest `bursts` and the least `log_variance` to accept, from training windows (n, n_features)."""
+    """Return the largest `bursts` and the least `log_variance` to accept, from training windows (n, n_features).
+
+    Parameters
+    ----------
+    params
+        Which share of the training windows is accepted.
+    names
+        Name of each value.
+    values : (n, n_features)
+        Features of the training windows.
+
+    Returns
+    -------
+    dict
+        Limits by their names.
+    """
     limits = {}
     if (columns := checked_columns(names, STICK_SLIP)).size:
         limits[STICK_SLIP] = float(values[:, columns].max()) + params.stick_slip_margin

@@ -38,7 +38,13 @@ class GaussianProcess:
     curved: bool = param(True, 'Whether a nonlinear (RBF) term is added; false: Bayesian linear regression.')
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
-        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,)."""
+        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,).
+
+        Raises
+        ------
+        InvalidData
+            If all windows are of one texture.
+        """
         from scipy.optimize import minimize  # noqa: PLC0415
 
         codes = np.unique(textures)

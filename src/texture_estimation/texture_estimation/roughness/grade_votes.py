@@ -14,6 +14,16 @@ def mean_of_votes(votes: NDArray[np.bool_]) -> Array:
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C, where 0 stands
     for none.
+
+    Parameters
+    ----------
+    votes : (..., 5) bool
+        Whether each whole grade fired.
+
+    Returns
+    -------
+    (...)
+        Grades 1 to 5, or NaN.
     """
     count = votes.sum(axis=-1)
     total = votes @ GRADES
@@ -22,6 +32,16 @@ def mean_of_votes(votes: NDArray[np.bool_]) -> Array:
 
 
 def grade_membership(grades: Array) -> NDArray[np.bool_]:
-    """Return to which of the five whole grades each grade belongs, (n, 5)."""
+    """Return to which of the five whole grades each grade belongs, (n, 5).
+
+    Parameters
+    ----------
+    grades : (n,)
+        1 to 5.
+
+    Returns
+    -------
+    (n, 5) bool
+    """
     member: NDArray[np.bool_] = np.rint(grades)[:, None] == GRADES
     return member

@@ -40,12 +40,34 @@ class Calibration:
     within_std: float = 0.0
 
     def shared_variance(self, regressor_std: Array | float) -> Array:
-        """Return the variance that more sliding over the texture does not lessen."""
+        """Return the variance that more sliding over the texture does not lessen.
+
+        Parameters
+        ----------
+        regressor_std
+            Standard deviation that the regressor gives, grades.
+
+        Returns
+        -------
+        array of the same shape
+            Square of grades.
+        """
         variance: Array = self.scale**2 * (np.square(regressor_std) + self.base_std**2)
         return variance
 
     def window_std(self, regressor_std: Array) -> Array:
-        """Return the standard deviation of the grade of a single window."""
+        """Return the standard deviation of the grade of a single window.
+
+        Parameters
+        ----------
+        regressor_std : (...)
+            Standard deviation that the regressor gives, grades.
+
+        Returns
+        -------
+        (...)
+            Grades.
+        """
         return np.sqrt(self.shared_variance(regressor_std) + self.within_std**2)
 
 
@@ -98,7 +120,19 @@ class RoughnessModel:
         return graded_columns(self.names)
 
     def grade(self, values: Array) -> tuple[Array, Array]:
-        """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features)."""
+        """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features).
+
+        Parameters
+        ----------
+        values : (..., n_features)
+
+        Returns
+        -------
+        (...)
+            Grade, 1 to 5.
+        (...)
+            Standard deviation, grades.
+        """
         return self.predictor(values.take(self._columns, axis=-1))
 
     @property

@@ -53,7 +53,30 @@ class RegressionNetworks:
 def fit_networks(
     values: Array, targets: Sequence[Array], textures: Codes, *, hidden: int, iterations: int, seed: int, transfer: str
 ) -> Mapping[str, Any]:
-    """Return the fields of `RegressionNetworks`, one network for each target, (n,), of values (n, n_features)."""
+    """Return the fields of `RegressionNetworks`, one network for each target, (n,), of values (n, n_features).
+
+    Parameters
+    ----------
+    values : (n, n_features)
+        Features of windows.
+    targets : of each network (n,)
+        What it is to answer.
+    textures : (n,)
+        Number of the texture of each window; whole textures are held out to stop early.
+    hidden
+        Neurons of the hidden layer.
+    iterations
+        Largest number of steps.
+    seed
+        Seed of the first weights and of what is held out.
+    transfer
+        Name of the transfer function of the output.
+
+    Returns
+    -------
+    dict
+        Arrays by the names of the fields.
+    """
     mean, scale = standardisation(values)
     standard = (values - mean) / scale
     rng = np.random.default_rng(seed)

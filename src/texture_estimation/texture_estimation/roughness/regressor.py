@@ -31,7 +31,22 @@ class RoughnessRegressor(Protocol):
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
-        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,); return plain arrays."""
+        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,); return plain arrays.
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Features of windows; finite.
+        grades : (n,)
+            Mean grade of the texture of each, 1 to 5.
+        textures : (n,)
+            Number of the texture of each.
+
+        Returns
+        -------
+        mapping
+            Arrays for `predictor` and for the model file.
+        """
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> RegressorPredictor:

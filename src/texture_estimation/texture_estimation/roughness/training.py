@@ -39,7 +39,13 @@ class HeldOutGrades:
         return HeldOutGrades(self.grades[rows], self.stds[rows], self.true[rows], self.textures[rows])
 
     def mean_over_textures(self, values: Array) -> float:
-        """Return the mean of values, (n,), in which each texture counts alike."""
+        """Return the mean of values, (n,), in which each texture counts alike.
+
+        Parameters
+        ----------
+        values : (n,)
+            A number for each window.
+        """
         return float(np.mean([values[self.textures == code].mean() for code in np.unique(self.textures)]))
 
 
@@ -58,6 +64,11 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
         Of every texture in the examples.
     name
         Of the model; that of the recipe if ''.
+
+    Returns
+    -------
+    RoughnessModel
+        Ready to grade and to be stored.
 
     Raises
     ------
@@ -95,7 +106,25 @@ def train_grades(recipe: RoughnessRecipe, examples: LabelledFeatures, grades: Gr
 def hold_out(
     regressor: RoughnessRegressor, values: Array, true: Array, textures: Codes, folds: int
 ) -> HeldOutGrades | None:
-    """Return what is said of each texture by a regressor that trained on the others; None if there are too few."""
+    """Return what is said of each texture by a regressor that trained on the others; None if there are too few.
+
+    Parameters
+    ----------
+    regressor
+        Regressor of the recipe.
+    values : (n, n_features)
+        Features of windows.
+    true : (n,)
+        Grade that people gave the texture of each.
+    textures : (n,)
+        Number of the texture of each.
+    folds
+        Number of parts into which the textures are divided.
+
+    Returns
+    -------
+    HeldOutGrades or None
+    """
     codes = np.unique(textures)
     if len(codes) < MIN_TEXTURES:
         return None

@@ -55,6 +55,11 @@ def algorithm_for(
         Of all that it draws.
     start
         Individuals of the first generation; the others are drawn.
+
+    Returns
+    -------
+    pymoo's Algorithm
+        Set up, before its first generation.
     """
     problem = Problem(n_var=len(space.names), n_obj=n_objectives, xl=0.0, xu=1.0)
     algorithm = ALGORITHMS[n_objectives](

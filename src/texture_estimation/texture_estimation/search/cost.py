@@ -40,6 +40,11 @@ def operations(
         Values of all features.
     n_labels, n_training
         Surfaces or grades, and training examples, all of which may become support vectors.
+
+    Returns
+    -------
+    float
+        Additions and multiplications.
     """
     extracted = sum(_feature(feature, n_samples) for feature in features)
     return extracted + LEARNERS.get(type(learner), _unknown_learner)(learner, n_values, n_labels, n_training)

@@ -46,11 +46,36 @@ class FeatureCache:
         self.misses = 0
 
     def values(self, feature_set: FeatureSet, parallel_map: ParallelMap = serial_map) -> Array:
-        """Return the values of each window, (n, n_values)."""
+        """Return the values of each window, (n, n_values).
+
+        Parameters
+        ----------
+        feature_set
+            Windows, inputs and features.
+        parallel_map
+            Over what missing features are computed.
+
+        Returns
+        -------
+        (n, n_values)
+            In the order of the features of the set.
+        """
         return self.many([feature_set], parallel_map)[0]
 
     def many(self, feature_sets: Sequence[FeatureSet], parallel_map: ParallelMap = serial_map) -> list[Array]:
         """Return the values of each feature set, (n, n_values) each; missing ones are computed in parallel.
+
+        Parameters
+        ----------
+        feature_sets
+            All of the same windows.
+        parallel_map
+            Over what missing features are computed.
+
+        Returns
+        -------
+        list of (n, n_values)
+            In the order of the sets.
 
         Raises
         ------

@@ -19,12 +19,22 @@ def fitness(learning: Sequence[float] | Array, test: Sequence[float] | Array) ->
     """Return the mean of learning and test accuracy over all halves.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section IV.
+
+    Parameters
+    ----------
+    learning, test : (n_halves,)
+        Accuracy on the examples that were trained on, and on the others, 0 to 1.
     """
     return float((np.mean(learning) + np.mean(test)) / 2.0)
 
 
 def decisions(scores: Array) -> Codes:
-    """Return the label with the highest score, (n,) of (n, n_labels); UNDECIDED where several share it."""
+    """Return the label with the highest score, (n,) of (n, n_labels); UNDECIDED where several share it.
+
+    Parameters
+    ----------
+    scores : (n, n_labels)
+    """
     best = scores.max(axis=1, keepdims=True)
     chosen: Codes = scores.argmax(axis=1)
     chosen[(scores == best).sum(axis=1) > 1] = UNDECIDED
@@ -32,7 +42,20 @@ def decisions(scores: Array) -> Codes:
 
 
 def shares_right(decided: Codes, codes: Codes, training: Mask) -> tuple[float, float]:
-    """Return the shares of right decisions among the training and among the other examples; undecided is not right."""
+    """Return the shares of right decisions among the training and among the other examples; undecided is not right.
+
+    Parameters
+    ----------
+    decided, codes : (n,)
+        Number of the label that was decided, and of the true one.
+    training : (n,) bool
+        Which examples were trained on.
+
+    Returns
+    -------
+    (float, float)
+        0 to 1 each.
+    """
     right = decided == codes
     return float(right[training].mean()), float(right[~training].mean())
 
@@ -50,6 +73,13 @@ def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share
         Joins the windows.
     hop_share
         Distance of the windows over their length: of what overlaps, only the new part counts.
+
+    Returns
+    -------
+    (n_slides,)
+        Number of the label, or UNDECIDED.
+    (n_slides,)
+        Row of the first window of each slide.
     """
     _, first, member = np.unique(slides, return_index=True, return_inverse=True)
     member = member.reshape(-1)

@@ -131,6 +131,11 @@ def search(
         Over what the trials are spread.
     tell
         Called after each generation.
+
+    Returns
+    -------
+    SearchOutcome
+        The best individuals, and what each generation was like.
     """
     n_objectives = 2 if params.objective == 'front' else 1
     algorithm = algorithm_for(space, params.population, n_objectives, params.seed, start)

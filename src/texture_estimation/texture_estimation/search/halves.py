@@ -25,6 +25,11 @@ def random_halves(codes: Codes, groups: Codes, count: int, rng: np.random.Genera
     rng
         Draws the slides.
 
+    Returns
+    -------
+    (count, n) bool
+        True for training.
+
     Raises
     ------
     InvalidData

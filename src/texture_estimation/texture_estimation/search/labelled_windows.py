@@ -52,7 +52,20 @@ class LabelledWindows:
         return cls(inputs, labels, np.array([event.exploration_id for event in cut]))
 
     def of(self, names: Sequence[str]) -> tuple[LabelledWindows, NDArray[np.bool_]]:
-        """Return the examples of some surfaces alone, and which of all these are, (n,)."""
+        """Return the examples of some surfaces alone, and which of all these are, (n,).
+
+        Parameters
+        ----------
+        names
+            Surfaces to keep.
+
+        Returns
+        -------
+        LabelledWindows
+            Those examples.
+        (n,) bool
+            Which of all examples they are.
+        """
         rows = np.isin(self.labels, names)
         inputs = {
             topic: WindowBatch(

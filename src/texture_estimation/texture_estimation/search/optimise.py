@@ -103,6 +103,11 @@ def optimise(
     tell
         Called after each generation.
 
+    Returns
+    -------
+    SearchResult
+        The best recipes, each evaluated by its own learner.
+
     Raises
     ------
     InvalidParameter

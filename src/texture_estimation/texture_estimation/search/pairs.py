@@ -64,6 +64,26 @@ def optimise_pairs(
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
     to each pair of textures.
+
+    Parameters
+    ----------
+    space
+        The recipe, and what of it is varied.
+    search_slides
+        Slides and their halves.
+    params
+        Population, generations and so on.
+    parallel_map
+        Over cores or a cluster.
+    checkpoint, resume
+        Files that are written after each generation, and read first.
+    tell
+        Called after each generation of a pair.
+
+    Returns
+    -------
+    PairSearchResult
+        The recipe of each pair, and what all decide together.
     """
     features = FeatureCache(search_slides.cut)
     names = search_slides.examples(space.base.training_windows).names

@@ -71,6 +71,11 @@ def race(fitness_function: FitnessFunction, known: HalfScores, incumbent: Array 
         Mean scores on each half of one that is to be beaten; None: all halves are done.
     n_halves
         How many there are.
+
+    Returns
+    -------
+    HalfScores
+        Those that were known, and the new ones.
     """
     scores = list(zip(known.learning.tolist(), known.test.tolist(), strict=True))
     half: HalfScorer | None = None
@@ -91,6 +96,20 @@ def raced_fitness(record: HalfScores, incumbent: Array | None, n_halves: int) ->
     """Return the fitness and the halves it rests on, as `race` would have found them: what else is known is not used.
 
     One that lost is placed below its rival by their mean difference on the halves that both did.
+
+    Parameters
+    ----------
+    record
+        Scores of an individual on each half.
+    incumbent : (n_halves,) or None
+        Mean scores of the one that is to be beaten.
+    n_halves
+        Number of halves.
+
+    Returns
+    -------
+    (float, int)
+        Fitness, 0 to 1, and number of halves.
     """
     for number in range(1, n_halves):
         means = record.means[:number]
@@ -100,7 +119,15 @@ def raced_fitness(record: HalfScores, incumbent: Array | None, n_halves: int) ->
 
 
 def is_clearly_worse(means: Array, incumbent: Array) -> bool:
-    """Tell whether an individual is worse than its rival beyond chance (paired, one-sided t test)."""
+    """Tell whether an individual is worse than its rival beyond chance (paired, one-sided t test).
+
+    Parameters
+    ----------
+    means : (n,)
+        Scores on each half.
+    incumbent : (n,)
+        Scores of the rival on the same halves.
+    """
     difference = means - incumbent
     parallel_map = max(float(difference.std(ddof=1)), MIN_SCATTER) / np.sqrt(len(difference))
     return bool(difference.mean() + _quantile(len(difference) - 1) * parallel_map < 0.0)

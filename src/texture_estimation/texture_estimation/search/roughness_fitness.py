@@ -56,6 +56,19 @@ class RoughnessFitness:
 
 
 def nearness(grades: Array, true: Array) -> Array:
-    """Return 1 - |error| / 4 of each grade, (n,); 0 for NaN."""
+    """Return 1 - |error| / 4 of each grade, (n,); 0 for NaN.
+
+    Parameters
+    ----------
+    grades : (n,)
+        Estimated grades; NaN for none.
+    true : (n,)
+        Grades that people gave.
+
+    Returns
+    -------
+    (n,)
+        0 to 1.
+    """
     near: Array = 1.0 - np.minimum(np.abs(np.nan_to_num(grades, nan=np.inf) - true), WORST) / WORST
     return near

@@ -48,7 +48,13 @@ class ScoreCache:
             self.records[individual] = record
 
     def save(self, path: str | Path) -> None:
-        """Write the checkpoint; a reader never sees half a file."""
+        """Write the checkpoint; a reader never sees half a file.
+
+        Raises
+        ------
+        InvalidParameter
+            If the file cannot be written.
+        """
         target = Path(path).expanduser()
         content = {
             'format': FORMAT,

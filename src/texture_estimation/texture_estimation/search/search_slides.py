@@ -37,11 +37,22 @@ class SearchSlides:
         return self._split(windows)[0]
 
     def halves(self, windows: WindowParams) -> Mask:
-        """Return which windows are used for training in each half, (n_halves, n)."""
+        """Return which windows are used for training in each half, (n_halves, n).
+
+        Returns
+        -------
+        (n_halves, n) bool
+            True for training.
+        """
         return self._split(windows)[1]
 
     def rows(self, windows: WindowParams) -> Mask:
-        """Return which of all windows that `cut` gives are those, (n_all,)."""
+        """Return which of all windows that `cut` gives are those, (n_all,).
+
+        Returns
+        -------
+        (n_all,) bool
+        """
         return self._split(windows)[2]
 
     def only(self, labels: Sequence[str]) -> SearchSlides:

@@ -63,7 +63,29 @@ class SearchTask(Protocol[R_contra]):
             Which windows are used for training in each half.
         quick
             Whether a quick stand-in will do, or the learner itself is wanted.
+
+        Returns
+        -------
+        FitnessFunction
+            Gives the accuracies on each half.
         """
 
     def cost(self, recipe: R_contra, n_samples: int, n_values: int, examples: LabelledWindows) -> float:
-        """Return about how many operations a window costs, of so many samples and values."""
+        """Return about how many operations a window costs, of so many samples and values.
+
+        Parameters
+        ----------
+        recipe
+            What is tried.
+        n_samples
+            Samples of a window, all channels together.
+        n_values
+            Values of all features.
+        examples
+            The windows, which say how many labels and examples there are.
+
+        Returns
+        -------
+        float
+            Additions and multiplications.
+        """

@@ -57,7 +57,13 @@ class SlideArrays:
     _known: dict[WindowParams, LabelledWindows] = field(default_factory=dict, repr=False)
 
     def of(self, chosen: NDArray[np.bool_]) -> SlideArrays:
-        """Return some of the scans; `chosen` is (n_scans,)."""
+        """Return some of the scans; `chosen` is (n_scans,).
+
+        Parameters
+        ----------
+        chosen : (n_slides,) bool
+            Which are kept.
+        """
         streams = {topic: replace(stream, samples=stream.samples[chosen]) for topic, stream in self.streams.items()}
         return SlideArrays(streams, self.labels[chosen], self.speed_m_s[chosen], self.force_n[chosen])
 

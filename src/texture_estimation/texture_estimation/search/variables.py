@@ -131,12 +131,23 @@ class SearchSpace:
         return tuple(self.variables)
 
     def decode(self, point: Array) -> Individual:
-        """Return the individual in whose cell a point of the unit cube lies, (n_variables,)."""
+        """Return the individual in whose cell a point of the unit cube lies, (n_variables,).
+
+        Parameters
+        ----------
+        point : (n_variables,)
+            0 to 1 each.
+        """
         cells = self._cells(point).astype(int).tolist()
         return tuple(variable.value(cell) for variable, cell in zip(self.variables.values(), cells, strict=True))
 
     def encode(self, individual: Sequence[Value]) -> Array:
         """Return the middle of an individual's cell, (n_variables,).
+
+        Returns
+        -------
+        (n_variables,)
+            0 to 1 each.
 
         Raises
         ------
@@ -153,7 +164,18 @@ class SearchSpace:
         return middle
 
     def snap(self, points: Array) -> Array:
-        """Return the middles of the cells in which points lie, (..., n_variables): what is alike becomes equal."""
+        """Return the middles of the cells in which points lie, (..., n_variables): what is alike becomes equal.
+
+        Parameters
+        ----------
+        points : (..., n_variables)
+            0 to 1 each.
+
+        Returns
+        -------
+        (..., n_variables)
+            0 to 1 each.
+        """
         middle: Array = (self._cells(points) + 0.5) / self._counts
         return middle
 

@@ -23,6 +23,20 @@ def ann_pairs(learner: AnnPairs, values: Array, codes: Codes, groups: Codes) -> 
     Each network sees the examples of its pair, of 200 that are drawn from all labels, and makes ten steps of the
     Levenberg-Marquardt method, without a part held out to stop early; `exact` does what the learner does. Both
     accuracies are told of the whole half.
+
+    Parameters
+    ----------
+    learner
+        Learner of the recipe.
+    values : (n, n_features)
+        Features of all examples.
+    codes, groups : (n,)
+        Number of the label and of the slide of each.
+
+    Returns
+    -------
+    callable
+        Takes which examples are used for training, (n,), returns scores (n, n_labels).
     """
     mean, scale = standardisation(values)
     standard = np.ascontiguousarray((values - mean) / scale)

@@ -22,12 +22,42 @@ EXAMPLES = 16
 
 
 def ann1(regressor: Ann1, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
-    """Return a scorer of one half split by one network whose output is the grade."""
+    """Return a scorer of one half split by one network whose output is the grade.
+
+    Parameters
+    ----------
+    regressor
+        Regressor of the recipe.
+    values : (n, n_features)
+        Features of all examples.
+    grades, textures : (n,)
+        Grade and number of the texture of each.
+
+    Returns
+    -------
+    callable
+        Takes which examples are used for training, (n,), returns grades (n,).
+    """
     return _surrogate(regressor, values, grades[None], textures, lambda outputs: np.clip(outputs[:, 0], SMOOTH, ROUGH))
 
 
 def ann5(regressor: Ann5, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
-    """Return a scorer of one half split by a network for each grade."""
+    """Return a scorer of one half split by a network for each grade.
+
+    Parameters
+    ----------
+    regressor
+        Regressor of the recipe.
+    values : (n, n_features)
+        Features of all examples.
+    grades, textures : (n,)
+        Grade and number of the texture of each.
+
+    Returns
+    -------
+    callable
+        Takes which examples are used for training, (n,), returns grades (n,).
+    """
     wanted = grade_membership(grades).T.astype(np.float64)
     return _surrogate(regressor, values, wanted, textures, lambda outputs: mean_of_votes(outputs >= VOTE_THRESHOLD))
 

@@ -9,7 +9,22 @@ from texture_estimation.search.surrogates.surrogate import ScoresOfHalf
 
 
 def exact(learner: Learner, values: Array, codes: Codes, groups: Codes) -> ScoresOfHalf:
-    """Return what fits the learner to a half, standardisation included, and lets its exported predictor evaluate."""
+    """Return what fits the learner to a half, standardisation included, and lets its exported predictor evaluate.
+
+    Parameters
+    ----------
+    learner
+        Learner of the recipe.
+    values : (n, n_features)
+        Features of all examples.
+    codes, groups : (n,)
+        Number of the label and of the slide of each.
+
+    Returns
+    -------
+    callable
+        Takes which examples are used for training, (n,), returns scores (n, n_labels).
+    """
 
     def scores(training: Mask) -> Array:
         fitted = learner.fit(values[training], codes[training], groups[training])

@@ -10,7 +10,22 @@ from texture_estimation.search.surrogates.regressor_surrogate import GradesOfHal
 
 
 def exact_grades(regressor: RoughnessRegressor, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
-    """Return what fits the head to a half, standardisation included, and lets its exported predictor grade."""
+    """Return what fits the head to a half, standardisation included, and lets its exported predictor grade.
+
+    Parameters
+    ----------
+    regressor
+        Regressor of the recipe.
+    values : (n, n_features)
+        Features of all examples.
+    grades, textures : (n,)
+        Grade and number of the texture of each.
+
+    Returns
+    -------
+    callable
+        Takes which examples are used for training, (n,), returns grades (n,).
+    """
 
     def graded(training: Mask) -> Array:
         parameters = regressor.fit(values[training], grades[training], textures[training])

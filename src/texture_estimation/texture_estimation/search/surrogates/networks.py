@@ -51,6 +51,11 @@ class SurrogateNetworks:
             Draws the first weights.
         transfer
             Of the hidden layer.
+
+        Returns
+        -------
+        SurrogateNetworks
+            n_networks of them.
         """
         networks = cls.random(len(targets), values.shape[-1], n_hidden, rng)
         networks.transfer = transfer
@@ -59,7 +64,23 @@ class SurrogateNetworks:
 
     @classmethod
     def random(cls, n_networks: int, n_features: int, n_hidden: int, rng: np.random.Generator) -> SurrogateNetworks:
-        """Return networks before their training, alike for all."""
+        """Return networks before their training, alike for all.
+
+        Parameters
+        ----------
+        n_networks
+            Number of networks.
+        n_features
+            Number of inputs.
+        n_hidden
+            Neurons of the hidden layer.
+        rng
+            Draws the weights.
+
+        Returns
+        -------
+        SurrogateNetworks
+        """
         hidden = rng.normal(size=(1, n_features, n_hidden)) / np.sqrt(n_features)
         bias = rng.uniform(-1.0, 1.0, (1, 1, n_hidden))
         out = rng.normal(size=(1, 1, n_hidden)) / np.sqrt(n_hidden)
@@ -67,7 +88,16 @@ class SurrogateNetworks:
         return cls(np.tile(hidden, copies), np.tile(bias, copies), np.tile(out, copies), np.full((n_networks, 1), 0.5))
 
     def outputs(self, standard: Array) -> Array:
-        """Return the output of each network, (n, n_networks), of standardised values, (n, n_features)."""
+        """Return the output of each network, (n, n_networks), of standardised values, (n, n_features).
+
+        Parameters
+        ----------
+        standard : (n, n_features)
+
+        Returns
+        -------
+        (n, n_networks)
+        """
         n_networks, n_features, n_hidden = self.hidden.shape
         active = standard @ self.hidden.transpose(1, 0, 2).reshape(n_features, -1)
         active += self.bias.reshape(-1)
@@ -82,6 +112,15 @@ class SurrogateNetworks:
 
         There are fewer examples than weights, mostly. So with the Jacobian J and the residual r, the step
         (JᵀJ + μ)⁻¹ Jᵀ r is taken as Jᵀ (J Jᵀ + μ)⁻¹ r, where J Jᵀ is a sum of products of small matrices.
+
+        Parameters
+        ----------
+        values : (n_networks or 1, n, n_features)
+            Standardised examples of each network, or of all.
+        targets : (n_networks, n)
+            What each network is to answer.
+        steps
+            Number of steps.
         """
         n_networks, n = targets.shape
         products = values @ values.swapaxes(-1, -2) + 1.0
@@ -124,7 +163,24 @@ class SurrogateNetworks:
 
 
 def sample_rows(codes: Codes, training: Mask, most: int, rng: np.random.Generator) -> NDArray[np.intp]:
-    """Return the rows of `most` training examples of each label, of the rarest one all, (n_labels, count)."""
+    """Return the rows of `most` training examples of each label, of the rarest one all, (n_labels, count).
+
+    Parameters
+    ----------
+    codes : (n,)
+        Number of the label of each example.
+    training : (n,) bool
+        Which examples may be drawn.
+    most
+        Largest number of rows of each label.
+    rng
+        Draws them.
+
+    Returns
+    -------
+    (n_labels, count)
+        Indices; as many of each label.
+    """
     members = [np.flatnonzero(training & (codes == label)) for label in np.unique(codes)]
     count = min(most, *map(len, members))
     return np.array([rng.choice(of_label, count, replace=False) for of_label in members])

@@ -29,6 +29,20 @@ def svm_pairs(learner: SvmPairs, values: Array, codes: Codes, groups: Codes) -> 
 
     The kernel is computed once for all halves. So the features are standardised by all examples, not by the half
     alone: their scale differs by about one per cent, and no label is used. `exact` does it without that.
+
+    Parameters
+    ----------
+    learner
+        Learner of the recipe.
+    values : (n, n_features)
+        Features of all examples.
+    codes, groups : (n,)
+        Number of the label and of the slide of each.
+
+    Returns
+    -------
+    callable
+        Takes which examples are used for training, (n,), returns scores (n, n_labels).
     """
     kernel = kernel_of(values, learner.kernel_scale, standardise=learner.standardise)
     votes = PairVotes(int(codes.max()) + 1)
@@ -45,6 +59,20 @@ def kernel_of(values: Array, scale: float, *, standardise: bool = True) -> Kerne
 
     In single precision, as libsvm's own cache holds it. With each example's square as two more columns, one product
     of matrices gives -|x - y|² / 2.
+
+    Parameters
+    ----------
+    values : (n, n_features)
+        Features of all examples.
+    scale
+        Width of the kernel, above 0.
+    standardise
+        Whether the features are standardised first.
+
+    Returns
+    -------
+    (n, n) float32
+        0 to 1.
     """
     mean, deviation = standardisation(values)
     standard = (values - mean) / deviation if standardise else values - mean
@@ -60,7 +88,24 @@ def kernel_of(values: Array, scale: float, *, standardise: bool = True) -> Kerne
 
 
 def pair_decisions(kernel: Kernel, codes: Codes, training: Mask, box_constraint: float) -> NDArray[np.float32]:
-    """Return the decision value of each pair for every example, (n, n_pairs); positive for the pair's first label."""
+    """Return the decision value of each pair for every example, (n, n_pairs); positive for the pair's first label.
+
+    Parameters
+    ----------
+    kernel : (n, n)
+        As `kernel_of` gives it.
+    codes : (n,)
+        Number of the label of each example.
+    training : (n,) bool
+        Which examples are trained on.
+    box_constraint
+        Penalty of a training error.
+
+    Returns
+    -------
+    (n, n_pairs) float32
+        Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+    """
     # a second, which who only looks up names need not wait for
     from sklearn import config_context  # noqa: PLC0415
     from sklearn.svm import SVC  # noqa: PLC0415

@@ -14,7 +14,22 @@ from texture_estimation.search.surrogates.svm_pairs import CACHE_MB, TOLERANCE, 
 
 
 def svm5(regressor: Svm5, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
-    """Return a scorer with one SVM per grade, standardised over all examples as in `svm_pairs`."""
+    """Return a scorer with one SVM per grade, standardised over all examples as in `svm_pairs`.
+
+    Parameters
+    ----------
+    regressor
+        Regressor of the recipe.
+    values : (n, n_features)
+        Features of all examples.
+    grades, textures : (n,)
+        Grade and number of the texture of each.
+
+    Returns
+    -------
+    callable
+        Takes which examples are used for training, (n,), returns grades (n,).
+    """
     from sklearn.svm import SVC  # noqa: PLC0415  # takes a second
 
     kernel = kernel_of(values, regressor.kernel_scale)
