@@ -17,7 +17,22 @@ RELIEF_COLOURS = 'cividis'
 
 
 def slide_picture(view: SceneView, title: str, path: str | Path) -> Path:
-    """Draw one slide: relief with the way, profile, signal and spectrum."""
+    """Draw one slide: relief with the way, profile, signal and spectrum.
+
+    Parameters
+    ----------
+    view
+        What the finger meets and measures.
+    title
+        Above the panels.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     wide = (view.extent_m[1] - view.extent_m[0]) > WIDE * (view.extent_m[3] - view.extent_m[2])
     with chart(path, (11.0, 5.8 if wide else 7.2), title) as figure:
         # A straight way lies above the curves, a round one beside them.
@@ -44,7 +59,22 @@ def slide_picture(view: SceneView, title: str, path: str | Path) -> Path:
 
 
 def table_picture(views: Sequence[SceneView], title: str, path: str | Path) -> Path:
-    """Draw all surfaces of a scene, one in each row."""
+    """Draw all surfaces of a scene, one in each row.
+
+    Parameters
+    ----------
+    views
+        One for each surface.
+    title
+        Above the panels.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (13.0, 0.8 + 1.75 * len(views)), title) as figure:
         rows = figure.subplots(len(views), 4, squeeze=False, width_ratios=[1.5, 1, 1, 1])
         for (relief, profile, signal, spectrum), view in zip(rows, views, strict=True):
@@ -62,7 +92,21 @@ def table_picture(views: Sequence[SceneView], title: str, path: str | Path) -> P
 
 
 def caption(name: str, sensor: str, plan: ViewPlan) -> str:
-    """Return what is shown, in one line."""
+    """Return what is shown, in one line.
+
+    Parameters
+    ----------
+    name
+        Name of the scene.
+    sensor
+        Name of the sensor.
+    plan
+        Speed, force and way of the finger.
+
+    Returns
+    -------
+    str
+    """
     way = f'a circle of {MM * plan.radius_m:g} mm' if plan.radius_m else 'a line'
     return f'{name}, simulated: along {way} at {plan.speed_m_s:g} m/s with {plan.force_n:g} N ({sensor})'
 

@@ -27,6 +27,11 @@ def find(catalogue: Mapping[str, T], name: str, kind: str) -> T:
     kind
         Noun for the error sentence, such as 'feature'.
 
+    Returns
+    -------
+    object
+        The entry, or the imported class.
+
     Raises
     ------
     UnknownName
@@ -50,6 +55,11 @@ def unknown_name(name: str, known: Iterable[str], kind: str) -> UnknownName:
         All names that are allowed.
     kind
         Noun for the error sentence, such as 'feature'.
+
+    Returns
+    -------
+    UnknownName
+        To be raised.
     """
     names = sorted(known)
     near = difflib.get_close_matches(name, names, n=1)

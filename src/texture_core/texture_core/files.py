@@ -69,7 +69,13 @@ class Budget:
         self._most, self._left = most_bytes, most_bytes
 
     def spend(self, count: int) -> None:
-        """Subtract bytes; FileRefused if fewer are left."""
+        """Subtract bytes; FileRefused if fewer are left.
+
+        Raises
+        ------
+        FileRefused
+            If fewer are left.
+        """
         self._left -= count
         if self._left < 0:
             raise FileRefused(
@@ -133,12 +139,23 @@ def read_text(path: str | Path, most_bytes: int, encoding: str = 'utf-8') -> str
         Largest allowed size in bytes.
     encoding
         Encoding of the text.
+
+    Returns
+    -------
+    str
+        The whole text.
     """
     return read_bounded(path, most_bytes).decode(encoding)
 
 
 def take_all(file: Readable, most_bytes: int) -> bytes:
-    """Return what a stream still holds; FileRefused if that is more than `most_bytes`."""
+    """Return what a stream still holds; FileRefused if that is more than `most_bytes`.
+
+    Raises
+    ------
+    FileRefused
+        If it holds more than is allowed.
+    """
     parts, count = [], 0
     while part := file.read(BLOCK_BYTES):
         count += len(part)
@@ -153,6 +170,15 @@ def read_array(file: Readable, budget: Budget, *, records: bool = False) -> AnyA
 
     Memory is taken as the values come, and not as the header promises. Each value counts as 8 bytes at least, since
     it will be computed with as such. With `records`, records of plain numbers are read, too.
+
+    Parameters
+    ----------
+    file
+        Stream at the beginning of the array.
+    budget
+        Bytes that may still be taken; what is read is subtracted.
+    records
+        Whether records are allowed.
 
     Returns
     -------

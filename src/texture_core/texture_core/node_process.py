@@ -86,7 +86,13 @@ class NodeProcess:
 
     @property
     def process(self) -> subprocess.Popen[bytes]:
-        """The process, once started."""
+        """The process, once started.
+
+        Raises
+        ------
+        RuntimeError
+            If it has not been started.
+        """
         if self._process is None:
             raise RuntimeError(f'{self.name} has not been started: use it in a with block')
         return self._process

@@ -44,6 +44,11 @@ def param(
         Highest allowed value; None for no limit.
     choices
         Allowed texts; () for any.
+
+    Returns
+    -------
+    dataclasses.Field
+        With these facts in its metadata.
     """
     metadata = {'description': description, 'unit': unit, 'low': low, 'high': high, 'choices': tuple(choices)}
     if isinstance(default, list):
@@ -124,6 +129,20 @@ def parameters_of(cls: type) -> list[Parameter]:
 
 def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
     """Build a parameter dataclass from a mapping (a YAML section); what is not named keeps its default.
+
+    Parameters
+    ----------
+    cls
+        Parameter dataclass.
+    values
+        Values by the names of the fields.
+    where
+        Where the values stand, for the sentence of an error.
+
+    Returns
+    -------
+    instance of `cls`
+        Checked.
 
     Raises
     ------

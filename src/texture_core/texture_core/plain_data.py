@@ -89,7 +89,15 @@ def load_json(path: Path, most_bytes: int) -> Any:
 
 
 def parse_json(text: str) -> Any:
-    """Return the plain values in a text; ValueError if it is no JSON, or one with too many or too deep values."""
+    """Return the plain values in a text; ValueError if it is no JSON, or one with too many or too deep values.
+
+    Raises
+    ------
+    ValueError
+        If it is no JSON.
+    FileRefused
+        If it has too many values or is nested too deeply.
+    """
     marks = np.frombuffer(JSON_STRING.sub('', text).encode('utf-8', 'replace'), np.uint8)
     depth = int(_among(marks, b'[{').sum(initial=0)) and int(np.cumsum(_steps(marks)).max(initial=0))
     if depth > MAX_DEPTH:

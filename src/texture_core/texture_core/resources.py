@@ -36,6 +36,11 @@ def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix
     suffix
         Ending of the shipped files.
 
+    Returns
+    -------
+    Path
+        Of an existing file.
+
     Raises
     ------
     UnknownName

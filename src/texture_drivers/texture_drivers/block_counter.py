@@ -54,6 +54,11 @@ class BlockCounter:
         lost_frames
             Frames of this stream missing just before it.
 
+        Returns
+        -------
+        int
+            Running index, from 0.
+
         Raises
         ------
         DeviceError

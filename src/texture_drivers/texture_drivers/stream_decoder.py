@@ -53,7 +53,13 @@ class FramedStream:
             )
 
     def check(self, frame: Frame) -> None:
-        """Raise DeviceError if a frame is of another version or another number of channels."""
+        """Raise DeviceError if a frame is of another version or another number of channels.
+
+        Raises
+        ------
+        DeviceError
+            If it is.
+        """
         if frame.version != VERSION:
             raise DeviceError(
                 f"'{self.sensor}' sends frames of version {frame.version}, and {VERSION} is known; update the device "

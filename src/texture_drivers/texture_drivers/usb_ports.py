@@ -40,6 +40,11 @@ def resolve(device: str, usb_ids: Sequence[UsbId], kind: str, ports: ListPorts =
     ports
         Lists the ports of this machine.
 
+    Returns
+    -------
+    str
+        Path of a port.
+
     Raises
     ------
     DeviceError

@@ -13,6 +13,11 @@ def krippendorff_alpha(grades: Array) -> float:
     """Return Krippendorff's alpha for intervals of grades (n_raters, n_textures); NaN if all are the same.
 
     Source: Krippendorff 1980, chapter 12; as `nltk` computes it.
+
+    Parameters
+    ----------
+    grades : (n_raters, n_textures)
+        On an interval scale; NaN where a rater gave none.
     """
     from nltk.metrics import interval_distance  # type: ignore[import-untyped]  # noqa: PLC0415  # slow to import
     from nltk.metrics.agreement import AnnotationTask  # type: ignore[import-untyped]  # noqa: PLC0415

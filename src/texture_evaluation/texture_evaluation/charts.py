@@ -31,7 +31,24 @@ MANY = 25  # more labels than this: no numbers in the cells
 
 
 def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: str | Path) -> Path:
-    """Draw a confusion table; each row is a surface and adds up to 100 %."""
+    """Draw a confusion table; each row is a surface and adds up to 100 %.
+
+    Parameters
+    ----------
+    labels
+        Name of each row and column.
+    table : (n, n)
+        Counts, true surfaces in the rows.
+    title
+        Above the chart.
+    path
+        File that is written; its ending says the format.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     side = 3.5 + 0.28 * len(labels)
     with chart(path, (side + 0.8, side)) as figure:
         axes = figure.subplots()
@@ -41,7 +58,22 @@ def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: st
 
 
 def evidence_chart(series: Mapping[str, tuple[Array, Array]], title: str, path: str | Path) -> Path:
-    """Draw the share of slides recognised over the sliding time used, one line a method."""
+    """Draw the share of slides recognised over the sliding time used, one line a method.
+
+    Parameters
+    ----------
+    series
+        Name of the method → sliding time in s and share recognised, 0 to 1, (n,) each.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     percent = {name: (seconds, 100 * np.asarray(accuracy)) for name, (seconds, accuracy) in series.items()}
     return line_chart(percent, title, ('sliding time used (s)', 'slides recognised (%)'), path)
 
@@ -54,7 +86,26 @@ def line_chart(
     *,
     logarithmic: bool = False,
 ) -> Path:
-    """Draw lines of percentages over x, on a logarithmic x axis if wanted; (x, y) by the name of each line."""
+    """Draw lines of percentages over x, on a logarithmic x axis if wanted; (x, y) by the name of each line.
+
+    Parameters
+    ----------
+    series
+        Name of the line → x and share, 0 to 1, (n,) each.
+    title
+        Above the chart.
+    axis_labels
+        Of x and of y.
+    path
+        File that is written.
+    logarithmic
+        Whether the x axis is logarithmic.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (7.0, 4.2)) as figure:
         axes = figure.subplots()
         for (name, (x, y)), style in zip(series.items(), line_styles(), strict=False):
@@ -77,7 +128,26 @@ def error_chart(
     *,
     points: int,
 ) -> Path:
-    """Draw positive errors over time on a logarithmic axis: the largest of each of `points` stretches of time."""
+    """Draw positive errors over time on a logarithmic axis: the largest of each of `points` stretches of time.
+
+    Parameters
+    ----------
+    series
+        Name of the line → time and error, above 0, (n,) each.
+    title
+        Above the chart.
+    axis_labels
+        Of time and of error, with their units.
+    path
+        File that is written.
+    points
+        Number of stretches of time.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (7.0, 4.2)) as figure:
         axes = figure.subplots()
         for (name, (x, y)), colour in zip(series.items(), COLOURS, strict=False):
@@ -97,6 +167,15 @@ def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], 
     ----------
     panels
         Kind of fault → name of the line → faults per byte, share recovered and share of false ones, 0 to 1, (n,) each.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     with chart(path, (4.0 * len(panels), 4.0), title) as figure:
         rows = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
@@ -120,6 +199,17 @@ def front_chart(
     ----------
     panels
         Title of the panel → name of the method → its cost, on a logarithmic axis, and its share, 0 to 1.
+    title
+        Above the chart.
+    axis_labels
+        Of cost and of share, with their units.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     names = list(dict.fromkeys(name for points in panels.values() for name in points))
     with chart(path, (4.2 * len(panels) + 2.0, 4.8), title) as figure:
@@ -144,7 +234,24 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
 
 
 def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, path: str | Path) -> Path:
-    """Draw how values are spread, each group on its own row; the line stands at 99 % of them."""
+    """Draw how values are spread, each group on its own row; the line stands at 99 % of them.
+
+    Parameters
+    ----------
+    series
+        Name of the group → its values, (n,).
+    title
+        Above the chart.
+    axis_label
+        Of the values, with their unit.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (7.0, 1.0 + 1.3 * len(series)), title) as figure:
         rows = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
         longest = max(float(np.max(values)) for values in series.values())
@@ -164,6 +271,20 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '') -> Itera
     """Give an empty figure, with a title over all its panels if wanted, and save it at the end.
 
     No display is needed and no global state is touched.
+
+    Parameters
+    ----------
+    path
+        File that is written; its ending says the format.
+    size
+        Width and height, inches.
+    title
+        Above all panels; '' for none.
+
+    Yields
+    ------
+    Figure
+        To be drawn into.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, layout='constrained')
@@ -198,7 +319,17 @@ def line_styles() -> Iterator[dict[str, Any]]:
 
 
 def draw_confusion(axes: Any, labels: Sequence[str], table: AnyArray) -> None:
-    """Draw a confusion table into a panel; each row adds up to 100 %."""
+    """Draw a confusion table into a panel; each row adds up to 100 %.
+
+    Parameters
+    ----------
+    axes
+        Panel of matplotlib.
+    labels
+        Name of each row and column.
+    table : (n, n)
+        Counts, true surfaces in the rows.
+    """
     totals = np.maximum(table.sum(axis=1, keepdims=True), 1)
     percent = 100 * table / totals
     image = axes.imshow(percent, cmap='Blues', vmin=0, vmax=100)

@@ -76,7 +76,13 @@ class EvaluationReport:
         }
 
     def write(self, path: str | Path) -> None:
-        """Write the figures as JSON."""
+        """Write the figures as JSON.
+
+        Raises
+        ------
+        InvalidParameter
+            If the file cannot be written.
+        """
         try:
             Path(path).write_text(json.dumps(self.as_json(), indent=1) + '\n', encoding='utf-8')
         except OSError as error:
@@ -86,7 +92,23 @@ class EvaluationReport:
 def evaluate_bags(
     model: str | Path, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None
 ) -> EvaluationReport:
-    """Load a model and `evaluate` it."""
+    """Load a model and `evaluate` it.
+
+    Parameters
+    ----------
+    model
+        Path of the model.
+    bags
+        Bags, or folders of bags.
+    slides
+        Which slides of each surface, such as '31-40'; '' for all.
+    namespace
+        Namespace of the finger, if bags hold several.
+
+    Returns
+    -------
+    EvaluationReport
+    """
     return evaluate(load_model(model), bags, slides, namespace)
 
 
@@ -106,6 +128,10 @@ def evaluate(
         unknown ones.
     namespace
         Of the finger, if bags hold several.
+
+    Returns
+    -------
+    EvaluationReport
 
     Raises
     ------
@@ -150,7 +176,26 @@ def evaluate_dataset(model: TextureModel, dataset: SlideDataset) -> EvaluationRe
 def run_model(
     model: TextureModel, events: Iterable[WindowEvent], clock: Callable[[], float] = time.perf_counter
 ) -> tuple[list[FeatureVector], list[TextureEstimate], Array]:
-    """Return vector, estimate and time (µs, by the clock) of each window and of the end of one slide, one by one."""
+    """Return vector, estimate and time (µs, by the clock) of each window and of the end of one slide, one by one.
+
+    Parameters
+    ----------
+    model
+        Trained model.
+    events
+        Windows of one slide and its end, in order.
+    clock
+        Gives the time in s.
+
+    Returns
+    -------
+    list of FeatureVector
+        One for each event.
+    list of TextureEstimate
+        One for each event.
+    (n_events,)
+        From window to estimate, µs.
+    """
     evidence = EvidenceAccumulator(model)
     vectors, estimates, taken_us = [], [], []
     for event in events:

@@ -102,7 +102,22 @@ def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
 
 
 def decided_at(results: Sequence[SlideResult], confidences: Sequence[float]) -> tuple[Array, Array]:
-    """Return mean time (s) and share right of slides that end at a confidence or go on to their end, (n,) each."""
+    """Return mean time (s) and share right of slides that end at a confidence or go on to their end, (n,) each.
+
+    Parameters
+    ----------
+    results
+        Slides with their estimates.
+    confidences : (n,)
+        Confidence at which a slide ends, 0 to 1.
+
+    Returns
+    -------
+    (n,)
+        Mean time, s.
+    (n,)
+        Share of slides that are right, 0 to 1.
+    """
     times, shares = [], []
     for confidence in confidences:
         ends = [next((e for e in r.estimates if e.confidence >= confidence), r.estimates[-1]) for r in results]
@@ -186,6 +201,18 @@ def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray
     """Return how many windows of each surface (row) were taken for each label (column), (n_labels, n_labels).
 
     Unclassified windows stand in no column.
+
+    Parameters
+    ----------
+    results
+        Slides with their estimates.
+    labels
+        Order of rows and columns.
+
+    Returns
+    -------
+    (n_labels, n_labels)
+        Whole numbers.
     """
     place = {label: index for index, label in enumerate(labels)}
     table = np.zeros((len(labels), len(labels)), dtype=int)
@@ -196,7 +223,15 @@ def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray
 
 
 def curve(results: Sequence[SlideResult]) -> tuple[Array, Array]:
-    """Return seconds of sliding and the share of slides recognised after them, as far as every slide reaches."""
+    """Return seconds of sliding and the share of slides recognised after them, as far as every slide reaches.
+
+    Returns
+    -------
+    (n,)
+        Sliding time, s.
+    (n,)
+        Share recognised, 0 to 1.
+    """
     shortest = min((result.estimates[-1].evidence_s for result in results), default=0.0)
     times = sorted({round(e.evidence_s, 6) for result in results for e in result.estimates})
     times = [seconds for seconds in times if seconds <= shortest + TOLERANCE_S]

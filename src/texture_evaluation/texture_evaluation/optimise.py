@@ -144,10 +144,19 @@ def optimise_from_bags(
     tell
         Called after each generation with the pair of surfaces ('' for all) and what it brought.
 
+    Returns
+    -------
+    Written
+        What was found, and the paths of the files.
+
     Raises
     ------
     TextureError
         With one sentence, if recipe, bags, search space or checkpoint are wrong.
+    InvalidParameter
+        If the folder of `out` does not exist.
+    InvalidData
+        If there is no checkpoint to go on from.
     """
     target = Path(out).expanduser()
     if not target.parent.is_dir():
@@ -244,7 +253,22 @@ def _write_pairs(pairs: PairSearchResult, wanted: Wanted, params: SearchParams, 
 
 
 def write_recipe(finalist: Finalist[Any], path: Path, origin: str) -> None:
-    """Write a recipe as a file that `texture train` reads; where it comes from stands at the top."""
+    """Write a recipe as a file that `texture train` reads; where it comes from stands at the top.
+
+    Parameters
+    ----------
+    finalist
+        Recipe and its scores.
+    path
+        File that is written.
+    origin
+        Where it comes from, in words.
+
+    Raises
+    ------
+    InvalidParameter
+        If the file cannot be written.
+    """
     content = yaml.safe_dump(finalist.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
     try:
         path.write_text(f'# {origin}\n# {_scores(finalist)}.\n{content}', encoding='utf-8')

@@ -12,7 +12,22 @@ NAMED = 10  # lines of more searches than this are not named
 
 
 def convergence_chart(searches: Mapping[str, Sequence[Generation]], title: str, path: str | Path) -> Path:
-    """Draw the fitness of the best individual over the generations, a line for each search."""
+    """Draw the fitness of the best individual over the generations, a line for each search.
+
+    Parameters
+    ----------
+    searches
+        Name of the search → its generations.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()
         for number, (name, history) in enumerate(searches.items()):
@@ -37,6 +52,15 @@ def search_front_chart(fronts: Mapping[str, Sequence[tuple[float, float]]], titl
     ----------
     fronts
         Name of the search → (operations of a window, fitness from 0 to 1) of each recipe.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()

@@ -74,7 +74,13 @@ class PanelReport:
         }
 
     def write(self, folder: Path) -> tuple[Path, Path]:
-        """Write panel.json, and grades.csv that training takes; return their paths."""
+        """Write panel.json, and grades.csv that training takes; return their paths.
+
+        Raises
+        ------
+        InvalidParameter
+            If a file cannot be written.
+        """
         ratings = self.ratings
         try:
             folder.mkdir(parents=True, exist_ok=True)

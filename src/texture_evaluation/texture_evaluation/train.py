@@ -47,6 +47,10 @@ def train_from_bags(
     namespace
         Of the finger, if bags hold several.
 
+    Returns
+    -------
+    TextureModel
+
     Raises
     ------
     TextureError
@@ -69,7 +73,13 @@ def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures
 
 
 def with_channels(recipe: Recipe, channels: str) -> Recipe:
-    """Return the recipe as it is for 'all' channels, with the input `signal` alone for 'fast'."""
+    """Return the recipe as it is for 'all' channels, with the input `signal` alone for 'fast'.
+
+    Raises
+    ------
+    InvalidParameter
+        If `channels` is neither, or the recipe has no vibration.
+    """
     if channels not in CHANNELS:
         raise InvalidParameter(f"channels are '{channels}'; 'fast' or 'all' is needed")
     if channels == 'all':

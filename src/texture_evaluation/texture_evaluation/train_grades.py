@@ -44,10 +44,16 @@ def train_grades_from_bags(
     namespace
         Of the finger, if bags hold several.
 
+    Returns
+    -------
+    RoughnessModel
+
     Raises
     ------
     TextureError
         With one sentence, if recipe, bags, grades, slides or place are wrong.
+    InvalidParameter
+        If the model cannot be saved.
     """
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)

@@ -66,7 +66,13 @@ class ChildLauncher:
         self.stop()
 
     def check(self) -> None:
-        """Raise LaunchFailed, with what the log says, if the nodes have ended."""
+        """Raise LaunchFailed, with what the log says, if the nodes have ended.
+
+        Raises
+        ------
+        LaunchFailed
+            If they have.
+        """
         if self._process is not None and self._process.poll() is not None:
             raise LaunchFailed(f'{self._reason()}; everything the nodes said is in {self.log}')
 

@@ -41,14 +41,26 @@ def check_form(element: Element, kind: str) -> None:
 
 
 def attribute(element: Element, name: str) -> str:
-    """Return an attribute that must be there."""
+    """Return an attribute that must be there.
+
+    Raises
+    ------
+    InvalidLaunch
+        If it is missing.
+    """
     if name not in element.attrib:
         raise InvalidLaunch(f"<{element.tag}> has no attribute '{name}'; give it one")
     return element.attrib[name]
 
 
 def truth(text: str, where: str) -> bool:
-    """Return whether a text says true; `where` is named in the error if it says neither."""
+    """Return whether a text says true; `where` is named in the error if it says neither.
+
+    Raises
+    ------
+    InvalidLaunch
+        If it says neither.
+    """
     value = TRUTH.get(text.strip().lower())
     if value is None:
         raise InvalidLaunch(f"{where} is '{text}'; true, false, 1 or 0 is needed")

@@ -34,7 +34,13 @@ def find_launch_file(name_or_path: str) -> Path:
 
 
 def given_arguments(texts: Iterable[str]) -> dict[str, str]:
-    """Return the launch arguments in texts of the form NAME:=VALUE; the last one of a name counts."""
+    """Return the launch arguments in texts of the form NAME:=VALUE; the last one of a name counts.
+
+    Raises
+    ------
+    InvalidLaunch
+        If a text has no ':='.
+    """
     given = {}
     for text in texts:
         name, mark, value = text.partition(':=')

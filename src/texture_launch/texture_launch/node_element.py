@@ -48,7 +48,13 @@ def joined_namespace(base: str, name: str) -> str:
 
 
 def command_line(text: str, scope: Scope) -> tuple[str, ...]:
-    """Return the arguments in a text, split at spaces outside quotes; what a substitution gives is never split."""
+    """Return the arguments in a text, split at spaces outside quotes; what a substitution gives is never split.
+
+    Raises
+    ------
+    InvalidLaunch
+        If quotes are not closed.
+    """
     parts = template.parse(text)
     values = {f'\0{index}\0': part for index, part in enumerate(parts) if isinstance(part, template.Call)}
     marked = ''.join(part if isinstance(part, str) else f'\0{index}\0' for index, part in enumerate(parts))

@@ -73,6 +73,13 @@ def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -
         Launch arguments by name.
     environment
         Environment of the launcher: what `$(env …)` sees and the nodes inherit.
+    path
+        Of the launch file.
+
+    Returns
+    -------
+    list of NodeDescription
+        Included files in their place.
 
     Raises
     ------

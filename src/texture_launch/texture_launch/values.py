@@ -34,6 +34,19 @@ def parameter_value(text: str, type_name: str, expand: Callable[[str], str]) -> 
     Upstream reads the text as YAML first and performs substitutions afterwards, in what is a string then; the result
     is read as YAML again. So quotes do not keep `'$(var x)'` a string: `type="str"` does.
 
+    Parameters
+    ----------
+    text
+        Value as it stands in the launch file.
+    type_name
+        Content of the attribute `type`; '' lets the text decide.
+    expand
+        Performs the substitutions in a text.
+
+    Returns
+    -------
+    bool, int, float, str or a list of one of them
+
     Raises
     ------
     InvalidLaunch

@@ -63,7 +63,13 @@ def check_storage(path: Path) -> None:
 
 
 def check_index(storage: Any) -> None:
-    """Raise FileRefused if the index of an opened MCAP file names a part of the file twice."""
+    """Raise FileRefused if the index of an opened MCAP file names a part of the file twice.
+
+    Raises
+    ------
+    FileRefused
+        If it does.
+    """
     budget = _budget(Path(storage.path).stat().st_size)
     end = 0
     for chunk in sorted(storage.chunks, key=lambda chunk: int(chunk.chunk_start_offset)):

@@ -70,7 +70,17 @@ class BagWriter:
             raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
 
     def write(self, topic: str, value: Any, log_ns: int) -> None:
-        """Write a data class of texture_core as received at `log_ns`."""
+        """Write a data class of texture_core as received at `log_ns`.
+
+        Parameters
+        ----------
+        topic
+            Name of the topic, such as 'signal'.
+        value
+            Data class of texture_core that has a message.
+        log_ns
+            Time at which it is logged, ns.
+        """
         self.write_raw(RawMessage(topic, TYPES[type(value)], log_ns, encode(value)))
 
     def write_raw(self, message: RawMessage) -> None:

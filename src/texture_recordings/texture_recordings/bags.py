@@ -95,6 +95,11 @@ def read_raw(
     start_ns, stop_ns
         Only messages logged from `start_ns` to before `stop_ns`.
 
+    Yields
+    ------
+    RawMessage
+        Topic, type, log time in ns and bytes.
+
     Raises
     ------
     InvalidData
@@ -114,6 +119,27 @@ def read_bag(
 
     Only messages of the suite are read. Topics are named by their last part, 'signal' for '/left/signal', in
     `topics` as in the answer; samples are views of the bytes read. The other arguments are those of `read_raw`.
+
+    Parameters
+    ----------
+    path
+        The bag.
+    topics
+        Last parts of the topics to read; None for all.
+    namespace
+        Only topics of this namespace; None if the bag has but one.
+    start_ns, stop_ns
+        Only messages logged from `start_ns` to before `stop_ns`.
+
+    Yields
+    ------
+    (str, int, object)
+        Last part of the topic, log time in ns, and data class.
+
+    Raises
+    ------
+    InvalidData
+        If there is no bag, or it is damaged.
     """
     wanted = None if topics is None else set(topics)
     signals: dict[str, SignalDecoder] = {}

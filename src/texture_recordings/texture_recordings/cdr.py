@@ -44,7 +44,13 @@ STAMPS = {'stamp_ns', 'start_ns'}
 
 @cache
 def typestore() -> Typestore:
-    """Return the message types of ROS 2 Jazzy and of the suite."""
+    """Return the message types of ROS 2 Jazzy and of the suite.
+
+    Raises
+    ------
+    InvalidData
+        If the message definitions of the suite are not installed.
+    """
     store = get_typestore(Stores.ROS2_JAZZY)
     directory = folder('texture_msgs', 'msg')
     definitions = sorted(directory.glob('*.msg'))

@@ -42,6 +42,11 @@ def segment_bags(
     namespace
         Of the finger, if bags hold several.
 
+    Returns
+    -------
+    dict
+        Number of slides, by the path of the copy.
+
     Raises
     ------
     InvalidData

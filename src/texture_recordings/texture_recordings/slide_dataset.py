@@ -89,6 +89,11 @@ class SlideDataset:
         topics
             Signals to read.
 
+        Returns
+        -------
+        SlideDataset
+            By bag and time.
+
         Raises
         ------
         InvalidData
@@ -127,6 +132,11 @@ class SlideDataset:
             Names of the channels of each topic; 'c0', 'c1', … if not given.
         motion, sensor, session
             Name of the motion, of the sensor and of the recording.
+
+        Returns
+        -------
+        SlideDataset
+            In the order of the arrays.
 
         Raises
         ------
@@ -193,6 +203,16 @@ class SlideDataset:
         Speeds and forces within 5 %, and directions within 0.1 rad, of their neighbour in order count as equal: the
         rounded mean of each group is returned.
 
+        Parameters
+        ----------
+        name
+            One of `CONDITIONS`.
+
+        Returns
+        -------
+        (n_slides,)
+            Numbers in SI units, or names.
+
         Raises
         ------
         InvalidData
@@ -229,6 +249,11 @@ class SlideDataset:
         where
             Says of a slide whether to keep it.
 
+        Returns
+        -------
+        SlideDataset
+            In the same order.
+
         Raises
         ------
         InvalidData
@@ -247,7 +272,13 @@ class SlideDataset:
         )
 
     def take(self, indices: AnyArray) -> SlideDataset:
-        """Return the slides of a mask or of indices, as a splitter gives them; they keep their numbers."""
+        """Return the slides of a mask or of indices, as a splitter gives them; they keep their numbers.
+
+        Parameters
+        ----------
+        indices : (n_slides,) bool, or (n_taken,) int
+            Which slides are taken.
+        """
         return SlideDataset(tuple(self.slides[int(index)] for index in np.arange(len(self))[indices]))
 
     def windows(self, feature_set: FeatureSet) -> Iterator[tuple[LabelledSlide, list[WindowEvent]]]:
@@ -319,6 +350,18 @@ class SlideDataset:
 
     def to_numpy(self, topic: str = 'signal') -> tuple[list[Array], NDArray[np.str_]]:
         """Return the samples of each slide, (n_samples, n_channels) each, and its label, (n_slides,).
+
+        Parameters
+        ----------
+        topic
+            Signal to return.
+
+        Returns
+        -------
+        list of (n_samples, n_channels)
+            In the unit of the signal.
+        (n_slides,) of text
+            Surface of each.
 
         Raises
         ------

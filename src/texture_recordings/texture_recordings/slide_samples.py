@@ -78,7 +78,22 @@ class SlideSamples:
         )  # fmt: skip
 
     def windows(self, start: int = 0, count: int | None = None, speed_m_s: float | None = None) -> WindowBatch:
-        """Return a stretch of the slide, all of it by default, to be described; at another speed if one is given."""
+        """Return a stretch of the slide, all of it by default, to be described; at another speed if one is given.
+
+        Parameters
+        ----------
+        start
+            Number of the first sample.
+        count
+            Number of samples; None for all from there on.
+        speed_m_s
+            Speed to which the stretch is resampled; None keeps that of the slide.
+
+        Returns
+        -------
+        WindowBatch
+            One window.
+        """
         samples = self.samples[start : None if count is None else start + count]
         speed = self.speed_m_s if speed_m_s is None else speed_m_s
         return WindowBatch(samples, self.rate_hz, np.array(speed), np.array(self.force_n), channels=self.channels)

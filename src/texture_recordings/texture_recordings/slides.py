@@ -135,6 +135,20 @@ def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | N
 
     Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
 
+    Parameters
+    ----------
+    bags
+        Bags, or folders of bags.
+    slides
+        Slides of each surface to keep, such as '1-30'; '' keeps all.
+    namespace
+        Namespace of the finger, if bags hold several.
+
+    Returns
+    -------
+    list of LabelledSlide
+        With empty signals.
+
     Raises
     ------
     InvalidData
@@ -158,6 +172,11 @@ def read_labelled_slides(
         Namespace of the finger, if bags hold several.
     topics
         Signals to read.
+
+    Returns
+    -------
+    list of LabelledSlide
+        By bag and time.
 
     Raises
     ------

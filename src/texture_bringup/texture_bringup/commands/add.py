@@ -19,7 +19,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Add or remove a slide, and print what is known now."""
+    """Add or remove a slide, and print what is known now.
+
+    Raises
+    ------
+    InvalidParameter
+        If there is neither a label nor --undo, or both.
+    """
     if options.undo == bool(options.label):
         raise InvalidParameter('give the label of the texture to add, or --undo alone')
     with Operator(options.namespace) as operator:

@@ -62,7 +62,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def tell(explored: ExplorationResult) -> bool:
-    """Print how an exploration ended; return whether it succeeded."""
+    """Print how an exploration ended; return whether it succeeded.
+
+    Raises
+    ------
+    MotionRefused
+        If the explorer refused it.
+    """
     if sys.stderr.isatty():
         print(file=sys.stderr)
     if not explored.exploration_id:

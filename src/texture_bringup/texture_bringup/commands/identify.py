@@ -28,7 +28,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Slide until it is sure; return 1 as soon as a slide was ended early by a fault or a stop."""
+    """Slide until it is sure; return 1 as soon as a slide was ended early by a fault or a stop.
+
+    Raises
+    ------
+    InvalidParameter
+        If a number is out of its range.
+    """
     if options.slides < 1 or not 0.0 < options.sure <= 1.0:
         raise InvalidParameter(
             f'--slides is {options.slides} and --sure {options.sure:g}; 1 or more and a probability are needed'
@@ -53,7 +59,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def next_touch_model_of(model: TextureModel) -> NextTouchModel:
-    """Return what the textures look like under each motion."""
+    """Return what the textures look like under each motion.
+
+    Raises
+    ------
+    InvalidParameter
+        If the model knows no motions.
+    """
     if model.next_touch_model is None:
         raise InvalidParameter(
             f"model '{model.name}' knows no motions to choose from; train it on slides over every texture, two or more "
@@ -83,6 +95,12 @@ def motion_text(motion: SlideMotion) -> str:
 
 
 def belief_text(known: NextTouchModel, belief: Array) -> str:
-    """Return the most probable textures in words."""
+    """Return the most probable textures in words.
+
+    Parameters
+    ----------
+    belief : (n_textures,)
+        Log-probabilities.
+    """
     first = np.argsort(-belief, kind='stable')[:SHOWN]
     return ', '.join(f'{known.textures[k]} {np.exp(belief[k]):.2f}' for k in first)

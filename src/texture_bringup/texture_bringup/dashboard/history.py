@@ -36,7 +36,17 @@ class History:
         self._past: OrderedDict[str, Past] = OrderedDict()
 
     def add(self, exploration_id: str, summary: dict[str, Any], frame: str = '') -> None:
-        """Note what is now known of an exploration, and the frame shown now if it is going on."""
+        """Note what is now known of an exploration, and the frame shown now if it is going on.
+
+        Parameters
+        ----------
+        exploration_id
+            Id of the exploration.
+        summary
+            Plain values for the page.
+        frame
+            Frame of the page, as JSON; '' if it is over.
+        """
         past = self._past.setdefault(exploration_id, Past({}))
         past.summary = {**past.summary, **summary, 'id': exploration_id}
         if frame:

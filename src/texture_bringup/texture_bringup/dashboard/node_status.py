@@ -28,7 +28,21 @@ class NodeStatuses:
         self._lights: dict[str, NodeStatus] = {}
 
     def update(self, name: str, level: str, message: str, time_s: float, ended: bool = False) -> None:
-        """Take note of a report; when there are too many names, the one silent for longest is forgotten."""
+        """Take note of a report; when there are too many names, the one silent for longest is forgotten.
+
+        Parameters
+        ----------
+        name
+            Name of the status.
+        level
+            'OK', 'WARN', 'ERROR' or 'STALE'.
+        message
+            One sentence.
+        time_s
+            When it came, of a clock that only rises.
+        ended
+            Whether the node has ended.
+        """
         self._lights.pop(name, None)
         self._lights[name[:MAX_CHARACTERS]] = NodeStatus(level, message[:MAX_CHARACTERS], time_s, ended)
         if len(self._lights) > MAX_LIGHTS:

@@ -28,7 +28,13 @@ class Recorder:
         self._child: ChildLauncher | None = None
 
     def begin(self, name: str) -> str:
-        """Begin a recording of this name; return what is to be said."""
+        """Begin a recording of this name; return what is to be said.
+
+        Raises
+        ------
+        InvalidParameter
+            If one is going on already, or the folder cannot be written.
+        """
         if self._child is not None:
             raise InvalidParameter(f"'{self.bag}' is being recorded already; end that first")
         try:

@@ -43,7 +43,18 @@ class Ring:
         self._append(fresh[-len(self._samples) :])
 
     def newest(self, length_s: float) -> NDArray[np.float64]:
-        """Return the newest samples, (n_samples,), oldest first; NaN where none came yet."""
+        """Return the newest samples, (n_samples,), oldest first; NaN where none came yet.
+
+        Parameters
+        ----------
+        length_s
+            Length of the stretch.
+
+        Returns
+        -------
+        (n_samples,)
+            In the unit of the signal.
+        """
         count = min(len(self._samples), round(length_s * self.rate_hz))
         return np.roll(self._samples, -self._at)[len(self._samples) - count :]
 

@@ -84,7 +84,22 @@ VIEWERS: web.AppKey[Viewers] = web.AppKey('viewers', Viewers)
 
 
 def make_app(commands: Commands, access: Access, page: Path) -> web.Application:
-    """Return the application; `page` is the folder of the static files."""
+    """Return the application; `page` is the folder of the static files.
+
+    Parameters
+    ----------
+    commands
+        Carries out what the page asks for.
+    access
+        Who may ask for what.
+    page
+        Folder of the static files.
+
+    Returns
+    -------
+    web.Application
+        Not started yet.
+    """
     app = web.Application(middlewares=[_guard(access)], client_max_size=MAX_BODY_BYTES)
     viewers = app[VIEWERS] = Viewers()
     app.router.add_get('/ws', _watch(viewers))

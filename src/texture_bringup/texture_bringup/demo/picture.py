@@ -32,6 +32,13 @@ def draw(bag: Path, surface: str, report: EvaluationReport, source: str, path: P
         Where the signal comes from, in words.
     note
         One sentence below the panels.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     states, estimates, batches = _gather(bag)
     candidates = [name for name in estimates if states[name][0].surface == surface]

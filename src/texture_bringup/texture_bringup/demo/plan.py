@@ -27,7 +27,21 @@ class DemoPlan:
     untrained_speed_m_s: float = 0.02
 
     def requests(self, surface: str, slides: int, early_stopping: bool = False) -> Iterator[ExplorationRequest]:
-        """Yield the explorations of one surface."""
+        """Yield the explorations of one surface.
+
+        Parameters
+        ----------
+        surface
+            Label of the surface.
+        slides
+            Number of explorations.
+        early_stopping
+            Whether a slide may end when it is certain.
+
+        Yields
+        ------
+        ExplorationRequest
+        """
         for number in range(slides):
             yield ExplorationRequest(
                 'linear_slide',

@@ -43,7 +43,15 @@ class ProgressLog:
         self._write(f'{MARGIN}{text}\n')
 
     def part(self, text: str, *, first: bool = False, last: bool = False) -> None:
-        """Say a part of a line, for what takes its time."""
+        """Say a part of a line, for what takes its time.
+
+        Parameters
+        ----------
+        text
+            What is printed.
+        first, last
+            Whether it begins a line, and whether it ends one.
+        """
         self._write(f'{MARGIN * first}{text}{chr(10) * last}')
 
     def _write(self, text: str) -> None:

@@ -81,7 +81,25 @@ class Places:
 
 
 def demonstrate(out: Path, recipe: str, seed: int, plan: DemoPlan, progress: ProgressLog) -> bool:
-    """Explore, learn, recognise and report on the emulator; return whether all was recognised that was trained."""
+    """Explore, learn, recognise and report on the emulator; return whether all was recognised that was trained.
+
+    Parameters
+    ----------
+    out
+        Folder of recordings, model, figures and picture.
+    recipe
+        Name of the recipe.
+    seed
+        Of the surfaces and places.
+    plan
+        Surfaces, slides and numbers.
+    progress
+        Takes what is printed.
+
+    Returns
+    -------
+    bool
+    """
     places = Places(out)
     places.clear()
     progress.section('Starting the emulator: simulated surfaces, arm and sensor; the other nodes are the real ones')

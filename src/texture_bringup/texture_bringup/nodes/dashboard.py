@@ -80,7 +80,15 @@ class DashboardNode(Node):
     # What the page asks for: coroutines of the web server's thread.
 
     async def explore(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Explore until it is over."""
+        """Explore until it is over.
+
+        Raises
+        ------
+        InvalidParameter
+            If no motion is named, or a number is none.
+        MotionAborted
+            If the explorer ends during the exploration.
+        """
         if 'motion' not in asked:
             raise InvalidParameter('no motion is asked for; give its name as `motion`')
         request = from_mapping(ExplorationRequest, {name: _short(value) for name, value in asked.items()})
@@ -102,7 +110,13 @@ class DashboardNode(Node):
         return await self._ask(self._stop, Trigger.Request(), 'explorer')
 
     async def add(self, asked: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Add an exploration, the last one if it has no id, or remove the last added slide."""
+        """Add an exploration, the last one if it has no id, or remove the last added slide.
+
+        Raises
+        ------
+        InvalidParameter
+            If the texture has no name.
+        """
         if asked.get('undo'):
             return await self._ask(self._undo, Trigger.Request(), 'classifier')
         label, exploration = (_short(str(asked.get(name, ''))).strip() for name in ('label', 'id'))

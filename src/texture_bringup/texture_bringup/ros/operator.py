@@ -117,6 +117,15 @@ class Operator:
     def wait_for_listeners(self, topics: Sequence[str], number: int, guard: Callable[[], None]) -> None:
         """Wait until each topic has so many subscriptions, and they had time to be found; `guard` is called meanwhile.
 
+        Parameters
+        ----------
+        topics
+            Names of the topics.
+        number
+            Number of subscriptions that each needs.
+        guard
+            Called while waiting; what it raises ends the waiting.
+
         Raises
         ------
         LaunchFailed
@@ -209,6 +218,20 @@ class Operator:
     def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
         """Add an exploration, the last one if '', to a texture; return its number of examples and a message.
 
+        Parameters
+        ----------
+        label
+            Label of the texture.
+        exploration_id
+            Id of the exploration; '' for the last one.
+        deadline_s
+            Longest time to wait for the answer.
+
+        Returns
+        -------
+        (int, str)
+            Number of examples of the texture, and a sentence.
+
         Raises
         ------
         LaunchFailed
@@ -259,6 +282,15 @@ class Operator:
 
     def set_parameters(self, node: str, values: Mapping[str, Any], deadline_s: float = 30.0) -> None:
         """Set parameters of a node.
+
+        Parameters
+        ----------
+        node
+            Name of the node.
+        values
+            Values by the names of the parameters.
+        deadline_s
+            Longest time to wait for the answer.
 
         Raises
         ------

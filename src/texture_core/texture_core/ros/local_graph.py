@@ -62,6 +62,11 @@ class LocalGraph:
             Name of the topic.
         qos
             Quality of service, or the depth of the queue.
+
+        Returns
+        -------
+        list
+            Grows while the graph spins.
         """
         received: list[Any] = []
         self.peer.create_subscription(kind, topic, received.append, qos)

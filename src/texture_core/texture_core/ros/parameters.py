@@ -39,6 +39,11 @@ def declare(node: Any, cls: type[T], *, changeable: bool = False) -> T:
         Whether a running node follows changes (see `on_change`). If not, the parameters are read-only after the start:
         a change that had no effect would look as if it had one.
 
+    Returns
+    -------
+    instance of `cls`
+        Checked.
+
     Raises
     ------
     InvalidParameter
@@ -62,7 +67,17 @@ def read(node: Any, cls: type[T]) -> T:
 
 
 def on_change(node: Any, cls: type[T], apply: Callable[[T], None]) -> None:
-    """Call `apply` with the new values before a change of parameters is accepted; what it refuses is not set."""
+    """Call `apply` with the new values before a change of parameters is accepted; what it refuses is not set.
+
+    Parameters
+    ----------
+    node
+        The rclpy node whose parameters were declared.
+    cls
+        Parameter dataclass, as it was declared.
+    apply
+        Takes all values; it refuses them by raising a TextureError.
+    """
     known = {item.name for item in parameters_of(cls)}
 
     def check(changes: list[RosParameter]) -> SetParametersResult:

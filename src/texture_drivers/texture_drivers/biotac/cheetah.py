@@ -54,7 +54,13 @@ class Cheetah:
         self._pause_at: int | None = None
 
     def open(self) -> None:
-        """Open the first free adapter and start sampling; DeviceError if there is none."""
+        """Open the first free adapter and start sampling; DeviceError if there is none.
+
+        Raises
+        ------
+        DeviceError
+            If there is no free adapter, or its library is missing.
+        """
         self.close()
         try:
             self._api = importlib.import_module(MODULE)

@@ -46,6 +46,15 @@ def decode(frames: bytes, layout: BioTacLayout, fingers: int) -> Replies:
     ----------
     frames : n_frames * layout.frame_bytes(fingers)
         Replies in the order of time; each slot is two bytes of echo and two bytes for each BioTac.
+    layout
+        Slots of a frame, and the channel of each.
+    fingers
+        Number of BioTacs on the bus.
+
+    Returns
+    -------
+    Replies
+        Samples in counts and the damaged words, for each finger.
 
     Raises
     ------

@@ -208,6 +208,13 @@ class FrameCounter:
             The device's number of the first frame.
         start_ns
             When it began.
+        count
+            Number of frames.
+
+        Returns
+        -------
+        int
+            Running index, from 0.
         """
         skipped = 0
         if self._next_number is not None:

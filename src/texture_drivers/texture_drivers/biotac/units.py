@@ -68,6 +68,8 @@ def to_physical(
     samples : (n_samples, n_channels) counts
     channels
         Names, as in a signal.
+    scales
+        Offsets and factors of the channels; None takes those of the manual.
 
     Returns
     -------

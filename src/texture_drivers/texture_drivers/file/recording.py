@@ -139,7 +139,18 @@ def _is_number(text: str) -> bool:
 
 
 def rate_from_times(time_s: Array) -> float:
-    """Return the rate of evenly spaced times, (n,); ValueError if they are not."""
+    """Return the rate of evenly spaced times, (n,); ValueError if they are not.
+
+    Parameters
+    ----------
+    time_s : (n,)
+        Rising.
+
+    Raises
+    ------
+    ValueError
+        If they do not rise or are not evenly spaced.
+    """
     steps = np.diff(time_s)
     if not len(steps) or not np.median(steps) > 0:
         raise ValueError('its times do not rise; leave the column out and set `rate_hz`')

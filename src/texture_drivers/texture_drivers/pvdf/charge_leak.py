@@ -47,7 +47,18 @@ class ChargeLeak:
         return 1 / (2 * math.pi * self.time_constant_s)
 
     def response(self, frequency_hz: Array) -> NDArray[np.complex128]:
-        """Return the charge per force at frequencies, (n,), C/N."""
+        """Return the charge per force at frequencies, (n,), C/N.
+
+        Parameters
+        ----------
+        frequency_hz : (n,)
+            At least 0.
+
+        Returns
+        -------
+        (n,) complex
+            C/N.
+        """
         transfer = 2j * np.pi * frequency_hz * self.time_constant_s
         response: NDArray[np.complex128] = self.d33_c_n * transfer / (1 + transfer)
         return response
@@ -70,7 +81,18 @@ class LeakingFilm:
         self._filter = FirstOrder((1.0, -1.0), (1.0, -self._pole))
 
     def update(self, force_n: Samples) -> Samples:
-        """Return the charge, (n_samples, n_channels) C, for forces of the same shape; at rest before the first."""
+        """Return the charge, (n_samples, n_channels) C, for forces of the same shape; at rest before the first.
+
+        Parameters
+        ----------
+        force_n : (n_samples, n_channels)
+            Force on the film.
+
+        Returns
+        -------
+        (n_samples, n_channels)
+            Charge, C.
+        """
         return self._gain * self._filter.update(force_n)
 
 
@@ -95,7 +117,18 @@ class ForceReconstructor:
         self._filter = FirstOrder((1.0, -pole), (1.0, -restored_pole))
 
     def update(self, charge_c: Samples) -> Samples:
-        """Return the force, (n_samples, n_channels) N, for charges of the same shape; at rest before the first."""
+        """Return the force, (n_samples, n_channels) N, for charges of the same shape; at rest before the first.
+
+        Parameters
+        ----------
+        charge_c : (n_samples, n_channels)
+            Charge of the film.
+
+        Returns
+        -------
+        (n_samples, n_channels)
+            Force, N.
+        """
         return self._gain * self._filter.update(charge_c)
 
     def restart(self) -> None:
@@ -115,7 +148,18 @@ class FirstOrder:
         self._state: Samples | None = None
 
     def update(self, samples: Samples) -> Samples:
-        """Return the filtered samples, (n_samples, n_channels)."""
+        """Return the filtered samples, (n_samples, n_channels).
+
+        Parameters
+        ----------
+        samples : (n_samples, n_channels)
+            Follow those of the last call.
+
+        Returns
+        -------
+        (n_samples, n_channels)
+            In the unit of the samples.
+        """
         from scipy.signal import lfilter  # noqa: PLC0415 – no other sensor needs scipy
 
         if self._state is None:

@@ -53,6 +53,8 @@ class Network:
             Number of inputs.
         rng
             Draws the weights.
+        transfer
+            Transfer function of the hidden layer, one of TRANSFERS.
 
         Returns
         -------
@@ -63,11 +65,31 @@ class Network:
         return cls(hidden, bias, rng.normal(size=n_hidden) / np.sqrt(n_hidden), 0.5, transfer)
 
     def active(self, values: Array) -> Array:
-        """Return what the hidden layer gives, (n, n_hidden) of (n, n_features)."""
+        """Return what the hidden layer gives, (n, n_hidden) of (n, n_features).
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Standardised.
+
+        Returns
+        -------
+        (n, n_hidden)
+        """
         return TRANSFERS[self.transfer](values @ self.hidden.T + self.hidden_bias)
 
     def slope(self, active: Array) -> Array:
-        """Return the derivative of the transfer function where it gives `active`, (n, n_hidden)."""
+        """Return the derivative of the transfer function where it gives `active`, (n, n_hidden).
+
+        Parameters
+        ----------
+        active : (n, n_hidden)
+            As `active` gives it.
+
+        Returns
+        -------
+        (n, n_hidden)
+        """
         return SLOPES[self.transfer](active)
 
     def __call__(self, values: Array) -> Array:

@@ -89,7 +89,13 @@ def table(result: CrossValidation, split: str) -> list[str]:
 
 
 def refuse_slow_channels(model: TextureModel) -> None:
-    """Raise ModelMismatch if a model needs more than the vibration."""
+    """Raise ModelMismatch if a model needs more than the vibration.
+
+    Raises
+    ------
+    ModelMismatch
+        If it does.
+    """
     slow = [topic for topic in model.recipe.feature_set.topics if topic != FAST_TOPIC]
     if slow:
         raise ModelMismatch(

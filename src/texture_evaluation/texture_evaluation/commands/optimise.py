@@ -95,7 +95,22 @@ class Progress:
 
 
 def bar(generation: Generation, taken_s: float, pair: str = '') -> str:
-    """Return one line: how far, how good, how many tried, how long."""
+    """Return one line: how far, how good, how many tried, how long.
+
+    Parameters
+    ----------
+    generation
+        What the last generation brought.
+    taken_s
+        Time since the search began.
+    pair
+        Names of the pair of surfaces; '' for all.
+
+    Returns
+    -------
+    str
+        Without an end of line.
+    """
     done = BAR * generation.number // generation.of
     return (
         f'{pair}{": " if pair else ""}[{"#" * done}{"." * (BAR - done)}] {generation.number}/{generation.of}  '

@@ -41,7 +41,17 @@ class ChronologicalSplit:
         self.train_size = train_size
 
     def get_n_splits(self, X: object = None, y: object = None, groups: object = None) -> int:  # noqa: N803
-        """Return 1."""
+        """Return 1.
+
+        Parameters
+        ----------
+        X, y, groups
+            Not used; scikit-learn's splitters take them.
+
+        Returns
+        -------
+        int
+        """
         return 1
 
     def split(  # X is there because scikit-learn's splitters have it

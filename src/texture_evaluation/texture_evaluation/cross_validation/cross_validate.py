@@ -181,6 +181,11 @@ def cross_validate(
     features
         Those of the recipe, if they were computed already.
 
+    Returns
+    -------
+    CrossValidation
+        Results of every slide of every fold.
+
     Raises
     ------
     InvalidData
@@ -250,13 +255,25 @@ def interval(results: Sequence[SlideResult], counts: Callable[[Sequence[SlideRes
 
 
 def window_counts(results: Sequence[SlideResult]) -> Array:
-    """Return right and all windows of each slide, (n_slides, 2)."""
+    """Return right and all windows of each slide, (n_slides, 2).
+
+    Returns
+    -------
+    (n_slides, 2)
+        Whole numbers.
+    """
     counts = [(sum(label == one.surface for label in one.window_labels), len(one.window_labels)) for one in results]
     return np.array(counts, dtype=np.float64)
 
 
 def slide_counts(results: Sequence[SlideResult]) -> Array:
-    """Return whether each slide is right, and 1, (n_slides, 2)."""
+    """Return whether each slide is right, and 1, (n_slides, 2).
+
+    Returns
+    -------
+    (n_slides, 2)
+        0 or 1, and 1.
+    """
     return np.array([(one.estimates[-1].label == one.surface, 1) for one in results], dtype=np.float64)
 
 
@@ -264,6 +281,20 @@ def split_slides(
     dataset: SlideDataset, splitter: Splitter, groups: str | AnyArray = 'slide'
 ) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
     """Return the training and test slides of each split, by their place in the data set.
+
+    Parameters
+    ----------
+    dataset
+        The slides.
+    splitter
+        One of scikit-learn's, or a `ChronologicalSplit`.
+    groups
+        As in `cross_validate`.
+
+    Returns
+    -------
+    list of ((n_train,), (n_test,))
+        Indices of slides.
 
     Raises
     ------

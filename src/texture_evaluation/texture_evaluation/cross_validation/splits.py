@@ -23,7 +23,20 @@ class Splitter(Protocol):
     """Interface of scikit-learn's splitters."""
 
     def split(self, X: Any, y: Any, groups: Any) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:  # noqa: N803
-        """Yield train and test rows."""
+        """Yield train and test rows.
+
+        Parameters
+        ----------
+        X : (n, ...)
+            One row for each slide; only their number matters.
+        y, groups : (n,)
+            Label and group of each row.
+
+        Yields
+        ------
+        ((n_train,), (n_test,))
+            Indices.
+        """
 
 
 @dataclass(frozen=True)
@@ -101,5 +114,11 @@ ALLOWED = (
 
 
 def groups_name(value: AnyArray) -> str:
-    """Return the name of a fold that leaves a value out."""
+    """Return the name of a fold that leaves a value out.
+
+    Parameters
+    ----------
+    value
+        A single value, as an array without axes.
+    """
     return f'{value:g}' if np.issubdtype(np.asarray(value).dtype, np.number) else str(value)

@@ -83,6 +83,11 @@ def import_biotac20(
     channels
         'fast' for the vibration (PAC, 2200 Hz) alone, 'all' for the slow channels (100 Hz) too.
 
+    Returns
+    -------
+    list of Path
+        Of the bags.
+
     Raises
     ------
     InvalidData
@@ -129,7 +134,18 @@ def _recordings(file: Path, wanted: frozenset[int] | None) -> Iterator[BiotacSli
 
 
 def frame_indices(frame_time: AnyArray) -> AnyArray:
-    """Return the running index of each frame on the 10 ms grid: it jumps where frames are missing."""
+    """Return the running index of each frame on the 10 ms grid: it jumps where frames are missing.
+
+    Parameters
+    ----------
+    frame_time : (n_frames,)
+        Time of each frame, s, rising.
+
+    Returns
+    -------
+    (n_frames,)
+        Whole numbers, the first 0.
+    """
     steps = np.diff(np.asarray(frame_time, dtype=float))
     missing = np.where(steps > LOST_AFTER_S, np.rint(steps / (FRAME_NS / NANOSECONDS)) - 1, 0)
     return np.concatenate([[0], np.cumsum(1 + missing)]).astype(int)
@@ -144,6 +160,11 @@ def restore_sign(rectified: AnyArray) -> Array:
     ----------
     rectified : (n_samples,)
         |PAC − offset|, ≥ 0, a whole slide.
+
+    Returns
+    -------
+    (n_samples,)
+        In the unit of the samples.
     """
     x = np.asarray(rectified, dtype=float)
     # Where the line through two samples of equal sign crosses zero, the sign turns; right after a crossing the line

@@ -49,7 +49,23 @@ def place(key: str) -> tuple[str, SlideRun] | None:
 
 
 def slide(key: str, surface: str, run: SlideRun, recorded: AnyArray) -> SteadySlide:
-    """Return a slide, given its rows as recorded."""
+    """Return a slide, given its rows as recorded.
+
+    Parameters
+    ----------
+    key
+        Name of the run in the file.
+    surface
+        Label of the fabric or grating.
+    run
+        Direction, force, speed and repeat.
+    recorded : (n_rows, n_columns)
+        Time in s and the taxels.
+
+    Returns
+    -------
+    SteadySlide
+    """
     speed_m_s = run.speed_mm_s / 1000.0
     direction_rad = math.pi / 2 if run.up else -math.pi / 2
     first, last = (round(way / speed_m_s / ROW_S) for way in (RAMP_M, RAMP_M + STEADY_M))
@@ -86,6 +102,11 @@ def import_fabricslide(
         Names of fabrics or gratings; none for all.
     channels
         'all': the taxels are slow channels, and there are no fast ones.
+
+    Returns
+    -------
+    list of Path
+        Of the bags.
 
     Raises
     ------

@@ -42,13 +42,47 @@ def place(key: str) -> tuple[str, SlideCondition] | None:
 
 
 def slide(key: str, texture: str, condition: SlideCondition, recorded: AnyArray) -> SteadySlide:
-    """Return a slide, given its rows as recorded."""
+    """Return a slide, given its rows as recorded.
+
+    Parameters
+    ----------
+    key
+        Name of the slide in the file.
+    texture
+        Label of the texture.
+    condition
+        Speed, force and direction.
+    recorded : (n_rows, n_columns)
+        Time in s and the taxels.
+
+    Returns
+    -------
+    SteadySlide
+    """
     samples = evenly(np.asarray(recorded[:, :TAXELS], dtype=float), float(recorded[-1, TIME] - recorded[0, TIME]))
     return SteadySlide(key, texture, samples, condition.speed_mm_s / 1000.0, condition.force_n, math.nan)
 
 
 def evenly(samples: Array, duration_s: float) -> Array:
-    """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels)."""
+    """Return samples, evenly spaced over a duration, at 320 Hz, (n, n_channels).
+
+    Parameters
+    ----------
+    samples : (n_recorded, n_channels)
+        Evenly spaced over the duration.
+    duration_s
+        Time from the first to the last sample.
+
+    Returns
+    -------
+    (n, n_channels)
+        In the unit of the samples.
+
+    Raises
+    ------
+    ValueError
+        If there are too few samples, or the duration makes no sense.
+    """
     from scipy.interpolate import CubicSpline  # noqa: PLC0415 – nothing else in this package needs scipy
 
     if not 0 < duration_s <= SLOWEST * len(samples) / RATE_HZ:
@@ -85,6 +119,11 @@ def import_ntp21(
         Names of textures; none for all.
     channels
         'fast' and 'all' are the same here: the nine taxels at 320 Hz.
+
+    Returns
+    -------
+    list of Path
+        Of the bags.
 
     Raises
     ------

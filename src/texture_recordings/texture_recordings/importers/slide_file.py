@@ -30,6 +30,22 @@ class SlideFile:
     def write_bags(self, source: str | Path, out: str | Path, slides: str, surfaces: Sequence[str]) -> list[Path]:
         """Write the slides of each surface that `slides` names ('' for all), of all surfaces if none is named.
 
+        Parameters
+        ----------
+        source
+            Folder of the file.
+        out
+            Folder for the bags; made if missing.
+        slides
+            Numbers of the slides of each surface, such as '1-30'; '' for all.
+        surfaces
+            Labels of the surfaces; none for all.
+
+        Returns
+        -------
+        list of Path
+            Of the bags.
+
         Raises
         ------
         InvalidData, UnknownName

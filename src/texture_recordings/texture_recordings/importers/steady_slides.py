@@ -61,6 +61,20 @@ def write_steady_slides(path: Path, stream: ImportedStream, slides: Iterable[Ste
     """Write a bag of slides, one after the other in the order given; the stamps are made up.
 
     A state is published at the start of each phase and promises its whole length: speed and force do not change.
+
+    Parameters
+    ----------
+    path
+        Of the new bag.
+    stream
+        Topic, sensor, channels and rate of the samples.
+    slides
+        In the order of their writing.
+
+    Returns
+    -------
+    Path
+        Of the bag.
     """
     start_ns, first = START_NS, 0
     with BagWriter(path) as bag:
