@@ -41,6 +41,11 @@ class FingerTrack:
             Number of points.
         rate_hz
             Points a second.
+
+        Returns
+        -------
+        Trajectory
+            `n_points` points, m and N.
         """
         end = self._expected(until_ns)
         travelled_m = max(abs(end[0] - self._at[0]), abs(end[1] - self._at[1]))

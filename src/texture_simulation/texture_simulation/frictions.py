@@ -23,7 +23,18 @@ class Drag(Protocol):
     """What a finger senses of the friction along its path, block by block."""
 
     def advance(self, path: Trajectory) -> Array:
-        """Return the force that the sensor senses beside the shape of the surface, (..., n) N."""
+        """Return the force that the sensor senses beside the shape of the surface, (..., n) N.
+
+        Parameters
+        ----------
+        path
+            The next points of the trajectory.
+
+        Returns
+        -------
+        (..., n)
+            N.
+        """
 
 
 def _stick_slip_drag(
@@ -58,5 +69,10 @@ def make_drag(friction: Any, rate_hz: float, rng: np.random.Generator, batch_sha
         Decides how far the skin is stretched where a slide begins under load.
     batch_shape
         () for one slide, (count,) for many at once.
+
+    Returns
+    -------
+    Drag
+        At rest before the first point.
     """
     return DRAGS[type(friction)](friction, rate_hz, rng, batch_shape)

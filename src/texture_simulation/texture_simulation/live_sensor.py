@@ -126,6 +126,11 @@ def live_tsf85(
         Which individual of the sensor.
     long_stamps
         64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
+
+    Returns
+    -------
+    LiveSensor
+        Closed when its context ends.
     """
     model = tsf85.Tsf85Model(scene, surface, rng, TSF85S[layout])
     device = EmulatedTsf85(link, rng, finger, long_stamps)
@@ -152,6 +157,11 @@ def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.G
         Symbolic link that leads to the device.
     rng
         All random numbers: positions on the sample, effects, noise.
+
+    Returns
+    -------
+    LiveSensor
+        Closed when its context ends.
     """
     layout = LAYOUTS['biotac']
     model, device = biotac.BioTacModel(scene, surface, rng, layout), EmulatedBioTac(link, rng)
@@ -178,6 +188,11 @@ def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Gene
         Symbolic link that leads to the device.
     rng
         All random numbers: positions on the sample, effects, noise.
+
+    Returns
+    -------
+    LiveSensor
+        Closed when its context ends.
     """
     model, device = daq.DaqModel(scene, surface, rng), EmulatedDaq(link, rng)
     return LiveSensor(
@@ -203,6 +218,11 @@ def live_pvdf(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Gen
         Symbolic link that leads to the device.
     rng
         All random numbers: positions on the sample, effects, noise.
+
+    Returns
+    -------
+    LiveSensor
+        Closed when its context ends.
     """
     model, device = pvdf.PvdfModel(scene, surface, rng), EmulatedPvdf(link, rng)
     rate_hz = pvdf.PATH_RATE_HZ / pvdf.OVERSAMPLING

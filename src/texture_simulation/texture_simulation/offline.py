@@ -73,6 +73,11 @@ def record(
         Stamp of the first sample.
     finger
         Which individual of the sensor.
+
+    Returns
+    -------
+    SimulatedRecording
+        Signals of steady sliding.
     """
     sliding = SimulatedSlide(speed_m_s, force_n, duration_s, direction_rad, radius_m)
     kind = find(SENSORS, scene.sensor, 'sensor model')
@@ -114,6 +119,13 @@ def simulate_exploration(
         Of a circle, travelled anticlockwise; 0 for a straight line.
     finger
         Which individual of the sensor: each has traits of its own.
+    exploration_id
+        Id of the exploration in its states.
+
+    Returns
+    -------
+    SimulatedRecording
+        States and signals, in the order of time.
     """
     kind = find(SENSORS, scene.sensor, 'sensor model')
     speed, force = np.array([speed_m_s]), np.array([force_n])

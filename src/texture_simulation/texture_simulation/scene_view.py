@@ -112,6 +112,11 @@ def view(scene: Scene, surface: str, plan: ViewPlan, rng: np.random.Generator) -
     rng
         All random numbers: positions on the sample, effects, noise.
 
+    Returns
+    -------
+    SceneView
+        Relief, path, signal and spectrum.
+
     Raises
     ------
     UnknownName
@@ -176,6 +181,11 @@ def lines_hz(surface: Surface, speed_m_s: float, direction_rad: float) -> list[f
         Speed along the surface.
     direction_rad
         Direction of travel, from +x towards +y.
+
+    Returns
+    -------
+    list of float
+        Hz, one for each term with ridges.
     """
     waves = [wave for term in surface.terms for wave in WAVES.get(type(term), _no_waves)(term)]
     lines = [speed_m_s * abs(math.cos(angle - direction_rad)) / pitch for pitch, angle in waves]

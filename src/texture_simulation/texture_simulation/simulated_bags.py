@@ -62,6 +62,11 @@ def write_simulated(
         Decides where the surfaces are touched, errors and noise.
     scene, surfaces
         Name or file of the scene, and which of its surfaces; all if none is named.
+
+    Returns
+    -------
+    list of Path
+        Of the bags.
     """
     table = load_scene(scene)
     chosen = [table.surface(name).name for name in surfaces] or list(table.surfaces)

@@ -46,6 +46,11 @@ class SimulatedSlide:
             Number of points.
         rate_hz
             Points a second.
+
+        Returns
+        -------
+        Trajectory
+            Places in m, force in N.
         """
         time_s = np.arange(1, n_points + 1) / rate_hz
         return trajectory_along(speed_m_s * time_s, np.broadcast_to(force_n, (*force_n.shape[:-1], n_points)), self)
@@ -62,6 +67,11 @@ def trajectory_along(travelled_m: Array, force_n: Array, sliding: SimulatedSlide
         Normal force at each point.
     sliding
         Direction, and the radius of a circle.
+
+    Returns
+    -------
+    Trajectory
+        Places in m, force in N.
     """
     direction = np.asarray(sliding.direction_rad, dtype=np.float64)[..., None]
     radius_m = sliding.radius_m

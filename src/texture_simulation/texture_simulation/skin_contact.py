@@ -145,6 +145,11 @@ class SkinContact:
             Length over which each element averages.
         offset_m : (n_elements, 1)
             Position x and y of each element in the finger.
+
+        Returns
+        -------
+        (..., n_elements, n)
+            N.
         """
         _, gain = self._blur_and_stiffness(placed.force_n)
         for effect in self._gains:
@@ -179,5 +184,14 @@ class SkinContact:
 
 
 def constant(values: Array) -> Array:
-    """Return (..., 1) of values that numpy repeats without a copy, as `numpy.broadcast_to` does, else the values."""
+    """Return (..., 1) of values that numpy repeats without a copy, as `numpy.broadcast_to` does, else the values.
+
+    Parameters
+    ----------
+    values : (..., n)
+
+    Returns
+    -------
+    (..., 1) or (..., n)
+    """
     return values[..., :1] if values.strides and values.strides[-1] == 0 and values.shape[-1] else values

@@ -39,6 +39,11 @@ def simulate_slides(
         All random numbers: positions on the sample, effects, noise.
     finger
         Which individual of the sensor.
+
+    Returns
+    -------
+    (count, n_samples, n_channels)
+        In the unit the driver publishes.
     """
     return simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=False)['signal']
 

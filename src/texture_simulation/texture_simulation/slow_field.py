@@ -22,6 +22,13 @@ def interpolated_field(field: Callable[[Array, Array], AnyArray], x_m: Array, y_
         Takes and returns arrays of equal shape.
     x_m, y_m : (..., n)
         n at least 1.
+    within_m
+        Largest distance of the places at which the field is computed.
+
+    Returns
+    -------
+    (..., n)
+        In the unit of the field.
     """
     n_points = x_m.shape[-1]
     longest_m = np.abs(np.diff(x_m)).max(initial=0.0) + np.abs(np.diff(y_m)).max(initial=0.0)

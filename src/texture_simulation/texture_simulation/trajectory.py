@@ -30,11 +30,22 @@ class Trajectory:
         return int(self.x_m.shape[-1])
 
     def moved(self, x_m: float | Array, y_m: float | Array) -> Trajectory:
-        """Return the same path starting elsewhere; (..., 1) for many."""
+        """Return the same path starting elsewhere; (..., 1) for many.
+
+        Parameters
+        ----------
+        x_m, y_m : a number, or (..., 1)
+            Added to each place.
+        """
         return Trajectory(self.x_m + x_m, self.y_m + y_m, self.force_n)
 
     def at(self, indices: NDArray[np.intp] | slice) -> Trajectory:
         """Return some of its points.
+
+        Parameters
+        ----------
+        indices : (m,)
+            Numbers of the points, or a slice.
 
         Returns
         -------
@@ -55,12 +66,30 @@ def straight(start: tuple[float, float, float], end: tuple[float, float, float],
         x, y and force at the last point; m and N.
     n_points
         Number of points.
+
+    Returns
+    -------
+    Trajectory
+        (n_points,) each.
     """
     shares = np.arange(1, n_points + 1) / n_points
     return Trajectory(*(first + (last - first) * shares for first, last in zip(start, end, strict=True)))
 
 
 def before_first(path: Trajectory) -> tuple[Array, Array]:
-    """Return x and y before the first of at least one point, (..., 1) each: as far from it as the second is."""
+    """Return x and y before the first of at least one point, (..., 1) each: as far from it as the second is.
+
+    Parameters
+    ----------
+    path
+        At least one point.
+
+    Returns
+    -------
+    (..., 1)
+        x, m.
+    (..., 1)
+        y, m.
+    """
     x_m, y_m = (2 * place[..., :1] - place[..., :2][..., -1:] for place in (path.x_m, path.y_m))
     return x_m, y_m

@@ -74,6 +74,11 @@ def reply_frame(sequence: int, time_us: int, values: Values, reply: bytes, versi
         Bytes of the reply.
     version
         Version of the protocol.
+
+    Returns
+    -------
+    bytes
+        The whole frame.
     """
     rows, columns = values.shape
     return _frame(struct.pack('<cBHIBB', b'B', version, sequence % 2**16, time_us % 2**32, rows, columns) + reply)
@@ -90,6 +95,11 @@ def serials_frame(sequence: int, time_us: int, serials: Sequence[str]) -> bytes:
         Device's time of its first row; wraps at 32 bits.
     serials
         Serial number of each place; '' for an empty one.
+
+    Returns
+    -------
+    bytes
+        The whole frame.
     """
     header = struct.pack('<cBHIBB', b'S', VERSION, sequence % 2**16, time_us % 2**32, 1, len(serials))
     return _frame(header + ','.join(serials).encode('ascii'))

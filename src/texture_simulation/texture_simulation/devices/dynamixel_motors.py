@@ -170,7 +170,22 @@ class DynamixelMotors:
         self._show()
 
     def write(self, motor: int, address: int, data: bytes) -> int:
-        """Write into a control table unless the motor refuses it; return the error of the status packet."""
+        """Write into a control table unless the motor refuses it; return the error of the status packet.
+
+        Parameters
+        ----------
+        motor
+            Id of the motor.
+        address
+            First address of the control table.
+        data
+            Bytes to write.
+
+        Returns
+        -------
+        int
+            Error number of Protocol 2.0; 0 if the motor took it.
+        """
         table = self.tables[motor]
         error = self._refusal(table, address, data)
         if not error:

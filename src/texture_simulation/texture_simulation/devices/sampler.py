@@ -109,6 +109,11 @@ def encode(stream: SampledStream, number: int, time_us: int, counts: Counts, ver
         Samples of the frame.
     version
         Version of the protocol.
+
+    Returns
+    -------
+    bytes
+        The whole frame.
     """
     rows, columns = counts.shape
     content = struct.pack('<BBHIBB', stream.kind, version, number % 2**16, time_us % 2**32, rows, columns)

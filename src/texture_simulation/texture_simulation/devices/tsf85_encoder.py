@@ -65,6 +65,11 @@ class Tsf85Encoder:
             Taxel image.
         image_is_new
             Whether the image changed since the last call.
+
+        Returns
+        -------
+        bytes
+            Packets one after the other.
         """
         return b''.join(self.packets(first_ms, dynamic, image, image_is_new))
 
@@ -81,6 +86,11 @@ class Tsf85Encoder:
             The same.
         image_is_new
             Whether it has changed since the last call.
+
+        Yields
+        ------
+        bytes
+            One packet each.
         """
         rows = np.tile(self._template, (len(dynamic), 1))
         stamps = (first_ms + np.arange(len(dynamic))).astype(self._stamp_type)  # 16 bits wrap, as they do in the device

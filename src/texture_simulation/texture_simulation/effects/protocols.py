@@ -59,6 +59,11 @@ class PathEffect(Protocol):
             Sampling rate of the samples or points.
         batch_shape
             () for one slide, (count,) for many at once.
+
+        Returns
+        -------
+        callable
+            Takes and returns a Trajectory; keeps a state from piece to piece.
         """
 
 
@@ -69,6 +74,11 @@ class GrowthEffect(Protocol):
     def blur_growth(self, force_n: Array) -> Array | float:
         """Return how much larger the contact is than at 1 N.
 
+        Parameters
+        ----------
+        force_n : (...)
+            Normal force.
+
         Returns
         -------
         (...)
@@ -77,6 +87,11 @@ class GrowthEffect(Protocol):
 
     def gain_growth(self, force_n: Array) -> Array | float:
         """Return how much stronger a texture is measured than at 1 N.
+
+        Parameters
+        ----------
+        force_n : (...)
+            Normal force.
 
         Returns
         -------
@@ -90,7 +105,20 @@ class TextureEffect(Protocol):
     """Changes how strongly the texture is measured."""
 
     def gain(self, path: Trajectory, finger: int) -> Array | float:
-        """Return the gain at places, (..., n), for one individual of the sensor."""
+        """Return the gain at places, (..., n), for one individual of the sensor.
+
+        Parameters
+        ----------
+        path
+            Places on the sample.
+        finger
+            Which individual of the sensor.
+
+        Returns
+        -------
+        (..., n), or a number
+            Factor of the texture.
+        """
 
 
 @runtime_checkable
@@ -108,6 +136,11 @@ class ForceEffect(Protocol):
             Sampling rate of the samples or points.
         batch_shape
             () for one slide, (count,) for many at once.
+
+        Returns
+        -------
+        callable
+            Takes and returns (..., n) N; keeps a state from piece to piece.
         """
 
 
@@ -132,4 +165,9 @@ class SignalEffect(Protocol):
             Number of channels.
         slow
             Whether the stream is the slow one.
+
+        Returns
+        -------
+        callable
+            Takes and returns (..., n_samples, n_channels) counts; keeps a state from piece to piece.
         """

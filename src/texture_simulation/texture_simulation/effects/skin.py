@@ -52,7 +52,18 @@ class Skin:
         return through
 
     def sections(self, rate_hz: float) -> Array:
-        """Return the filter, (1, 6)."""
+        """Return the filter, (1, 6).
+
+        Parameters
+        ----------
+        rate_hz
+            Sampling rate.
+
+        Returns
+        -------
+        (1, 6)
+            Second-order section as scipy.signal.sosfilt takes it.
+        """
         k = math.tan(math.pi * self.resonance_hz / rate_hz)
         scale = 1 + 2 * self.damping * k + k * k
         ahead = [k * k / scale, 2 * k * k / scale, k * k / scale]

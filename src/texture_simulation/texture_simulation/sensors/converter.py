@@ -55,7 +55,18 @@ class Converter:
         ]
 
     def exact(self, counts: Samples) -> Samples:
-        """Return the next samples, (..., n_samples, n_channels), with the effects, clipped and whole."""
+        """Return the next samples, (..., n_samples, n_channels), with the effects, clipped and whole.
+
+        Parameters
+        ----------
+        counts : (..., n_samples, n_channels)
+            What the sensor measures, in counts that need not be whole.
+
+        Returns
+        -------
+        (..., n_samples, n_channels)
+            Counts.
+        """
         if self._filters:
             counts = counts / self._scale
             for apply in self._filters:
@@ -66,6 +77,13 @@ class Converter:
 
     def counts(self, counts: Samples, kind: type[Integer]) -> NDArray[Integer]:
         """Return the same as whole numbers.
+
+        Parameters
+        ----------
+        counts : (..., n_samples, n_channels)
+            What the sensor measures, in counts that need not be whole.
+        kind
+            Integer type of numpy.
 
         Returns
         -------

@@ -29,6 +29,11 @@ class SensorModel(Protocol):
             The next points, whole steps of the sensor.
         slow
             Whether the slow stream is wanted, too.
+
+        Returns
+        -------
+        mapping
+            Topic → (..., n_samples, n_channels).
         """
 
 

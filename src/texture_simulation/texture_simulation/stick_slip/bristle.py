@@ -51,6 +51,11 @@ def rate(friction: StickSlip, tip: Tip, speed_m_s: Value, force_n: Value, exp: A
         Normal force, at least 0.
     exp
         `math.exp` for one slide in floats, `numpy.exp` for arrays.
+
+    Returns
+    -------
+    Tip
+        Derivative of each part of the state by time.
     """
     stretch, slip, bend = tip
     fading = exp(-slip * slip / friction.stribeck_m_s**2)
@@ -72,6 +77,11 @@ def energy_j(friction: StickSlip, tip: Tip, force_n: Value) -> Value:
         State of the tip, floats or arrays of one shape.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    float or array
+        J, at least 0.
     """
     moving = friction.mass_kg * tip.slip_m_s**2
     bent = force_n * friction.bristle_1_m * tip.bend_m**2
@@ -89,6 +99,11 @@ def jacobian(friction: StickSlip, slip_m_s: float, force_n: float) -> Array:
         Speed of the tip over the surface; 0 if it sticks.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    (3, 3)
+        1/s, in the order of the fields of `Tip`.
     """
     fading = math.exp(-((slip_m_s / friction.stribeck_m_s) ** 2))
     curve = friction.kinetic + (friction.static - friction.kinetic) * fading

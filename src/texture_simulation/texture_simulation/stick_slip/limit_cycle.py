@@ -43,6 +43,11 @@ def slow_drag(friction: StickSlip, speed_m_s: float, force_n: float) -> LimitCyc
         Speed of the base along the surface.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    LimitCycle
+        Period in s and amplitudes.
     """
     drop_n = (friction.static - friction.kinetic) * force_n
     natural_1_s = math.sqrt(friction.skin_n_m / friction.mass_kg)
@@ -63,6 +68,11 @@ def nudged(friction: StickSlip, base_m_s: float, force_n: float) -> Tip:
         Speed of the base; 0 for a tip at rest.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    Tip
+        In floats.
     """
     curve = float(coefficient(friction, np.array(base_m_s))) if base_m_s else 0.0
     off = BEND_NUDGE * (curve or friction.kinetic)

@@ -50,6 +50,11 @@ def solve(
         One of `SOLVERS`.
     tolerance
         Relative tolerance of the solver.
+
+    Returns
+    -------
+    Solution
+        State at each time, and what it took.
     """
 
     def slope(_: float, state: Array) -> Tip:

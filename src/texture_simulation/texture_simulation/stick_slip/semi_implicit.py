@@ -33,6 +33,11 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
         Length of an integration step.
     exp
         `math.exp` for one slide in floats, `numpy.exp` for arrays.
+
+    Returns
+    -------
+    callable
+        Takes a Tip, speed and force at the end of the step, returns the next Tip.
     """
     stiffness, damping, viscous = friction.skin_n_m, friction.skin_n_s_m, friction.viscous_s_m
     bristle, bristle_damping = friction.bristle_1_m, friction.bristle_s_m
@@ -76,6 +81,11 @@ def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) 
         Speed of the tip over the surface; 0 if it sticks.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    float
+        s; inf if every step is stable.
     """
     f = friction
     sticking = slip_m_s == 0.0

@@ -39,6 +39,8 @@ def drag(
         What integrates.
     start, force_before_n
         State of the tip and force before the first step, (...).
+    friction
+        Friction of the surface, and the skin.
 
     Returns
     -------
@@ -125,7 +127,18 @@ def pull_n(friction: StickSlip, tip: Tip, speed_m_s: Array) -> Array:
 
 
 def check_drive(speed_m_s: Array, force_n: Array) -> None:
-    """Raise InvalidData for speeds and forces that no finger has."""
+    """Raise InvalidData for speeds and forces that no finger has.
+
+    Parameters
+    ----------
+    speed_m_s, force_n : (..., n)
+        For each step.
+
+    Raises
+    ------
+    InvalidData
+        If the shapes differ, a number is not finite, or a force is below 0.
+    """
     if speed_m_s.shape != force_n.shape:
         raise InvalidData(f'speeds {speed_m_s.shape} and forces {force_n.shape}; give one of each for every step')
     if not (np.isfinite(speed_m_s).all() and np.isfinite(force_n).all()):

@@ -22,6 +22,11 @@ def max_slip_m_s(friction: StickSlip, speed_m_s: float, force_n: float) -> float
         Speed of the base along the surface.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    float
+        m/s.
     """
     drop_n = (friction.static - friction.kinetic) * force_n
     return speed_m_s + drop_n / math.sqrt(friction.skin_n_m * friction.mass_kg)
@@ -40,6 +45,11 @@ def max_stable_step_s(integrator: Integrator, friction: StickSlip, speed_m_s: fl
         Speed of the base along the surface.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    float
+        s.
     """
     slip_m_s = max(max_slip_m_s(friction, speed_m_s, force_n), friction.stribeck_m_s)
     cases = ((0.0, force_n), (slip_m_s, force_n), (slip_m_s, 0.0))
@@ -61,6 +71,11 @@ def check_step(integrator: Integrator, friction: StickSlip, step_s: float, speed
         Speed of the base along the surface.
     force_n
         Normal force, at least 0.
+
+    Raises
+    ------
+    InvalidParameter
+        If the step is not above 0 or too long.
     """
     if not step_s > 0:
         raise InvalidParameter(f'a step of {step_s} s; it must be above 0')

@@ -17,6 +17,11 @@ def coefficient(friction: StickSlip, speed_m_s: Array) -> Array:
     kinetic + (static − kinetic)·exp(−(speed/stribeck)²).
     Source: Bo & Pavelescu 1982; Armstrong-Hélouvry et al. 1994.
 
+    Parameters
+    ----------
+    speed_m_s : (...)
+        Speed of the tip over the surface, of either sign.
+
     Returns
     -------
     (...)
@@ -50,6 +55,11 @@ def steady_force_n(friction: StickSlip, speed_m_s: Array, force_n: float) -> Arr
 
 def slope_s_m(friction: StickSlip, speed_m_s: Array) -> Array:
     """Return by how much the coefficient grows with a speed ≥ 0, viscous part included; mostly negative.
+
+    Parameters
+    ----------
+    speed_m_s : (...)
+        Speed of the tip over the surface, at least 0.
 
     Returns
     -------

@@ -24,6 +24,11 @@ def profile(across_m: Array, blur_m: Array, pitch_m: float, shape: str, duty: fl
     blur_m : (..., n) or (..., 1)
     pitch_m, shape, duty
         Of the ridges; a square one takes the share `duty` of the pitch.
+
+    Returns
+    -------
+    (..., n)
+        From -1 to 1.
     """
     cosine = np.cos(2 * np.pi / pitch_m * across_m)
     first_share = np.exp(-0.5 * (2 * np.pi * blur_m / pitch_m) ** 2)

@@ -30,6 +30,11 @@ class Term(Protocol):
             Positions along y.
         blur_m : (..., n) or (..., 1)
             Standard deviation of the contact that averages.
+
+        Returns
+        -------
+        (..., n)
+            m, of zero mean.
         """
 
 

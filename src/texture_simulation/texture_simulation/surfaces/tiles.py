@@ -32,7 +32,13 @@ class RandomRelief(Protocol):
         """Distance of the tile's points."""
 
     def sharp(self) -> Array:
-        """Return the height over one tile, (SIDE, SIDE) m, not blurred, going on periodically."""
+        """Return the height over one tile, (SIDE, SIDE) m, not blurred, going on periodically.
+
+        Returns
+        -------
+        (SIDE, SIDE)
+            m.
+        """
 
     def __hash__(self) -> int:
         """Return what tells it from others."""
@@ -51,6 +57,11 @@ def tile_height(random: RandomRelief, x_m: Array, y_m: Array, blur_m: Array) -> 
         Positions along y.
     blur_m : (..., n) or (..., 1)
         Standard deviation of the contact that averages.
+
+    Returns
+    -------
+    (..., n)
+        m.
     """
     cosine, sine = math.cos(TURN_RAD) / random.spacing_m, math.sin(TURN_RAD) / random.spacing_m
     rows, columns = x_m * cosine - y_m * sine, x_m * sine + y_m * cosine
@@ -140,6 +151,17 @@ def _blurred(spectrum: NDArray[np.complex128], wave_1_m: Array, blur_m: float) -
 
 
 def waves_1_m(spacing_m: float) -> Array:
-    """Return the wave number of each coefficient of a tile's spectrum, (SIDE, SIDE // 2 + 1) 1/m."""
+    """Return the wave number of each coefficient of a tile's spectrum, (SIDE, SIDE // 2 + 1) 1/m.
+
+    Parameters
+    ----------
+    spacing_m
+        Distance of two points of the tile.
+
+    Returns
+    -------
+    (SIDE, SIDE // 2 + 1)
+        1/m.
+    """
     waves: Array = np.hypot(np.fft.fftfreq(SIDE, spacing_m)[:, None], np.fft.rfftfreq(SIDE, spacing_m)[None, :])
     return waves

@@ -20,7 +20,22 @@ class RobotMove(Protocol):
     done: bool
 
     def velocity(self, pose: Array, velocity: Array, step_s: float) -> Array:
-        """Return the velocity of the next step, (6,)."""
+        """Return the velocity of the next step, (6,).
+
+        Parameters
+        ----------
+        pose : (6,)
+            Place of the tool in m and rotation vector in rad.
+        velocity : (6,)
+            m/s and rad/s.
+        step_s
+            Length of the step.
+
+        Returns
+        -------
+        (6,)
+            m/s and rad/s.
+        """
 
 
 class StopMove:
@@ -88,7 +103,19 @@ class ServoMove:
 
 
 def approach(now: Array, wanted: Array, step: float) -> Array:
-    """Return `now` led towards `wanted` by at most `step`."""
+    """Return `now` led towards `wanted` by at most `step`.
+
+    Parameters
+    ----------
+    now, wanted : (n,)
+        In one unit.
+    step
+        Largest change of their distance, in that unit.
+
+    Returns
+    -------
+    (n,)
+    """
     offset = wanted - now
     distance = math.sqrt(offset @ offset)
     return wanted if distance <= step else now + step / distance * offset

@@ -89,7 +89,15 @@ class EmulatedRobot:
         self._offset[:3] = -self._contact
 
     def touches(self, direction: Array, threshold_n: float) -> bool:
-        """Return whether a force against a direction, (3,), is measured; a direction of 0 means any."""
+        """Return whether a force against a direction, (3,), is measured; a direction of 0 means any.
+
+        Parameters
+        ----------
+        direction : (3,)
+            Direction of the movement; 0 for any.
+        threshold_n
+            Force from which on it counts.
+        """
         force = self.force[:3]
         length = math.sqrt(direction @ direction)
         against = math.sqrt(force @ force) if length == 0 else -(force @ direction) / length
