@@ -120,33 +120,33 @@ class TextureModel:
     def _hidden_layer(self) -> Callable[[Array], Array] | None:
         return hidden_layer(self.recipe.learner.predictor(self.parameters))
 
-    def activations(self, values: Array) -> Array | None:
+    def activations(self, X: Array) -> Array | None:
         """Return the outputs of the trained hidden layer, (..., n_hidden); None if the classifier has none."""
-        return self._hidden_layer(values) if self._hidden_layer is not None else None
+        return self._hidden_layer(X) if self._hidden_layer is not None else None
 
-    def predict_log_proba(self, values: Array) -> Array:
+    def predict_log_proba(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features).
 
         Parameters
         ----------
-        values : (..., n_features)
+        X : (..., n_features)
 
         Returns
         -------
         (..., n_labels)
             Natural logarithms.
         """
-        return log_softmax(self.predictor(values))
+        return log_softmax(self.predictor(X))
 
-    def decide(self, values: Array) -> list[str]:
+    def decide(self, X: Array) -> list[str]:
         """Return the label of each window alone, (n,) of (n, n_features); '' where several labels are equally good.
 
         Parameters
         ----------
-        values : (n_features,), or (n, n_features)
+        X : (n_features,), or (n, n_features)
             Of the windows of one slide.
         """
-        log_probabilities = self.predict_log_proba(values)
+        log_probabilities = self.predict_log_proba(X)
         best = log_probabilities.argmax(axis=-1).tolist()
         none = is_tied(log_probabilities).tolist()
         return ['' if tied else self.labels[index] for index, tied in zip(best, none, strict=True)]

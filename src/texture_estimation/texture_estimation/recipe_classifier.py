@@ -42,7 +42,7 @@ class RecipeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  #
     def __init__(self, recipe: str = 'default') -> None:
         self.recipe = recipe
 
-    def fit(self, X: Any, y: Any, groups: Any = None) -> RecipeClassifier:  # noqa: N803
+    def fit(self, X: Any, y: Any, groups: Any = None) -> RecipeClassifier:
         """Learn from examples.
 
         Parameters
@@ -77,7 +77,7 @@ class RecipeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  #
         self.predictor_ = learner.predictor(self.fitted_.parameters)
         return self
 
-    def predict_proba(self, X: Any) -> Array:  # noqa: N803
+    def predict_proba(self, X: Any) -> Array:
         """Return the probability of each label, (n, n_labels), of features (n, n_features).
 
         Returns
@@ -99,7 +99,7 @@ class RecipeClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  #
             )
         return softmax(np.asarray(self.predictor_(values)))
 
-    def predict(self, X: Any) -> AnyArray:  # noqa: N803
+    def predict(self, X: Any) -> AnyArray:
         """Return the most probable label of each row, (n,).
 
         Returns

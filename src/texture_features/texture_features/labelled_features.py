@@ -80,7 +80,7 @@ class LabelledFeatures:
             )
 
     @property
-    def X(self) -> Array:  # noqa: N802  # scikit-learn's name
+    def X(self) -> Array:  # scikit-learn's name
         """Features, (n, n_features), as scikit-learn names them."""
         return self.values
 

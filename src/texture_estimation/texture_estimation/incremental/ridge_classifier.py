@@ -80,12 +80,12 @@ class RandomFourierFeatures:
         weight = HIDDEN_WEIGHT / np.where(deviation > 0, deviation, 1.0)
         return cls(cosines, phases, hidden * weight, offset * weight)
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return the features, (..., n_hidden + n_cosines + 1), of (..., n_features); the last is 1."""
         n_hidden, n_cosines = self.hidden.shape[1], self.cosines.shape[1]
-        expanded = np.ones((*values.shape[:-1], n_hidden + n_cosines + 1))
-        np.maximum(values @ self.hidden + self.hidden_offset, 0.0, out=expanded[..., :n_hidden])
-        np.cos(values @ self.cosines + self.phases, out=expanded[..., n_hidden:-1])
+        expanded = np.ones((*X.shape[:-1], n_hidden + n_cosines + 1))
+        np.maximum(X @ self.hidden + self.hidden_offset, 0.0, out=expanded[..., :n_hidden])
+        np.cos(X @ self.cosines + self.phases, out=expanded[..., n_hidden:-1])
         return expanded
 
 
@@ -109,12 +109,12 @@ class RidgePredictor:
     trained: Predictor
     kept: Codes
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        scores: Array = self.random_features(values) @ self.weights
+        scores: Array = self.random_features(X) @ self.weights
         if len(self.kept) > 1:
             own = scores[..., self.kept]
-            both = log_softmax(0.5 * (own + self.trained(values)[..., self.kept]))
+            both = log_softmax(0.5 * (own + self.trained(X)[..., self.kept]))
             highest = np.maximum.reduce(own, axis=-1, keepdims=True)
             any_of_them = highest + np.log(np.add.reduce(np.exp(own - highest), axis=-1, keepdims=True))
             scores[..., self.kept] = any_of_them + both
@@ -137,25 +137,24 @@ class RidgeClassifier:
 
     def __init__(
         self,
-        values: Array,
-        codes: Codes,
+        X: Array,
+        y: Codes,
         slides: Codes,
         *,
         trained: Predictor,
         parameters: Mapping[str, Any] | None = None,
     ) -> None:
         self._trained = trained
-        self._kept = set(range(int(codes.max()) + 1))
-        self._random_features = RandomFourierFeatures.over(values, parameters)
-        self._rows: list[Array] = [values[codes == code] for code in range(int(codes.max()) + 1)]
-        expanded = self._random_features(values)
-        half = _half(codes, slides)
+        self._kept = set(range(int(y.max()) + 1))
+        self._random_features = RandomFourierFeatures.over(X, parameters)
+        self._rows: list[Array] = [X[y == code] for code in range(int(y.max()) + 1)]
+        expanded = self._random_features(X)
+        half = _half(y, slides)
         halves = [
-            [_Moments.of(expanded[(codes == code) & (half == side)]) for code in range(len(self._rows))]
-            for side in (0, 1)
+            [_Moments.of(expanded[(y == code) & (half == side)]) for code in range(len(self._rows))] for side in (0, 1)
         ]
         whole = [first.with_(second) for first, second in zip(*halves, strict=True)]
-        self._inverse_temperature = _inverse_temperature(halves, expanded, codes, half)
+        self._inverse_temperature = _inverse_temperature(halves, expanded, y, half)
         self._squares = np.sum([moments.square for moments in whole], axis=0)
         self._means = [moments.mean for moments in whole]
 
@@ -258,21 +257,21 @@ def _solve(squares: Array, means: list[Array]) -> Array:
     return weights
 
 
-def _half(codes: Codes, slides: Codes) -> Codes:
+def _half(y: Codes, slides: Codes) -> Codes:
     """Return 0 or 1 for each example: every second slide of each label, or window if a label has a single slide."""
-    half = np.zeros(len(codes), dtype=np.intp)
-    for code in np.unique(codes):
-        rows = np.flatnonzero(codes == code)
+    half = np.zeros(len(y), dtype=np.intp)
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
         numbers = np.unique(slides[rows], return_inverse=True)[1].reshape(-1)
         half[rows] = (numbers if numbers.any() else np.arange(len(rows))) % 2
     return half
 
 
-def _inverse_temperature(halves: list[list[_Moments]], expanded: Array, codes: Codes, half: Codes) -> float:
+def _inverse_temperature(halves: list[list[_Moments]], expanded: Array, y: Codes, half: Codes) -> float:
     """Return the factor of the scores that makes each half most probable to a layer fitted to the other."""
     if any(moments.count == 0 for side in halves for moments in side):
         return DEFAULT_INVERSE_TEMPERATURE
-    scores = np.empty((len(codes), len(halves[0])))
+    scores = np.empty((len(y), len(halves[0])))
     for side in (0, 1):
         training = halves[1 - side]
         weights = _solve(
@@ -280,6 +279,6 @@ def _inverse_temperature(halves: list[list[_Moments]], expanded: Array, codes: C
         )
         scores[half == side] = expanded[half == side] @ weights
     best = minimize_scalar(
-        lambda log_s: log_loss(log_softmax(scores * math.exp(log_s)), codes), bounds=(0.0, 5.0), method='bounded'
+        lambda log_s: log_loss(log_softmax(scores * math.exp(log_s)), y), bounds=(0.0, 5.0), method='bounded'
     )
     return math.exp(best.x)

@@ -49,18 +49,18 @@ class AnnPairs:
         choices=TIES,
     )
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
-        mean, scale = standardisation(values)
-        standard = (values - mean) / scale
-        held = _held_out(codes, groups)
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        held = _held_out(y, groups)
         rng = np.random.default_rng(self.seed)
-        n_labels = int(codes.max()) + 1
+        n_labels = int(y.max()) + 1
         networks = []
         for first, second in combinations(range(n_labels), 2):
-            rows = np.flatnonzero((codes == first) | (codes == second))
-            start = Network.random(self.hidden, values.shape[1], rng)
-            targets = (codes[rows] == first).astype(np.float64)
+            rows = np.flatnonzero((y == first) | (y == second))
+            start = Network.random(self.hidden, X.shape[1], rng)
+            targets = (y[rows] == first).astype(np.float64)
             networks.append(fit_network(start, standard[rows], targets, held[rows], self.iterations))
         parameters = {
             'mean': mean,
@@ -108,10 +108,10 @@ class PairNetworksPredictor:
         object.__setattr__(self, '_weights', weights.T.copy())
         object.__setattr__(self, '_votes', PairVotes(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0)))
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
         votes: PairVotes = self._votes  # type: ignore[attr-defined]
-        return log_softmax(votes.counted(self.outputs(values) - ROUNDED_UP, self.ties))
+        return log_softmax(votes.counted(self.outputs(X) - ROUNDED_UP, self.ties))
 
     def outputs(self, values: Array) -> Array:
         """Return the output of each pair's network, (..., n_pairs): about 1 for its first label, 0 for its second.
@@ -134,11 +134,11 @@ class PairNetworksPredictor:
         return outputs + self.out_bias
 
 
-def _held_out(codes: Codes, groups: Codes) -> NDArray[np.bool_]:
+def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
     """Return which examples tell when to stop: every seventh slide of a label, or example if there are few slides."""
-    held = np.zeros(len(codes), dtype=bool)
-    for code in np.unique(codes):
-        rows = np.flatnonzero(codes == code)
+    held = np.zeros(len(y), dtype=bool)
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
         slides = np.unique(groups[rows], return_inverse=True)[1].reshape(-1)
         number = slides if slides.max() + 1 >= HELD_OUT else np.arange(len(rows))
         held[rows] = number % HELD_OUT == HELD_OUT - 1

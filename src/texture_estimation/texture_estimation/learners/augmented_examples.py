@@ -65,7 +65,7 @@ class AugmentedBatches:
     ----------
     inputs : (n, n_features) float32
         Undisturbed examples, standardised.
-    codes : (n,)
+    y : (n,)
         Their labels.
     augmented
         What is drawn besides.
@@ -76,14 +76,14 @@ class AugmentedBatches:
     def __init__(
         self,
         inputs: Inputs,
-        codes: Codes,
+        y: Codes,
         augmented: AugmentedExamples,
         rng: np.random.Generator,
         *,
         mean: Array,
         scale: Array,
     ) -> None:
-        self._inputs, self._codes, self._augmented, self._rng = inputs, codes, augmented, rng
+        self._inputs, self._codes, self._augmented, self._rng = inputs, y, augmented, rng
         self._mean, self._factor = mean.astype(np.float32), (1.0 / scale).astype(np.float32)
         self._response = (augmented.gain_response / scale).astype(np.float32)
         self._deviations = (augmented.slide_deviations / scale).astype(np.float32)

@@ -46,13 +46,13 @@ class EmMixture:
     )
     seed: int = param(0, 'Sets the seed of the random initialisations; equal seeds give equal models.', low=0)
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
         from sklearn.mixture import GaussianMixture  # noqa: PLC0415  # scikit-learn takes a second to import
 
-        mean, scale = standardisation(values)
-        standard = (values - mean) / scale
-        n_labels = int(codes.max()) + 1
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        n_labels = int(y.max()) + 1
         distinct = len(np.unique(standard, axis=0))
         mixture = GaussianMixture(
             min(self.clusters_per_label * n_labels, distinct),
@@ -64,7 +64,7 @@ class EmMixture:
         found = mixture.predict(standard)
         n_clusters = len(mixture.weights_)
         counts = np.zeros((n_clusters, n_labels))
-        np.add.at(counts, (found, codes), 1.0)
+        np.add.at(counts, (found, y), 1.0)
         factors = mixture.precisions_cholesky_
         parameters = {
             'mean': mean,
@@ -114,24 +114,24 @@ class MixturePredictor:
         object.__setattr__(self, '_shift', shift)
         object.__setattr__(self, '_constant', determinants + self.log_weights)
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        shares = np.exp(log_softmax(self.cluster_scores(values)))
+        shares = np.exp(log_softmax(self.cluster_scores(X)))
         return log_softmax(np.log(shares @ self.names + LEAST))
 
-    def cluster_scores(self, values: Array) -> Array:
+    def cluster_scores(self, X: Array) -> Array:
         """Return the log-density of each cluster times its weight, but for a constant, (..., n_clusters).
 
         Parameters
         ----------
-        values : (..., n_features)
+        X : (..., n_features)
 
         Returns
         -------
         (..., n_clusters)
             In nats.
         """
-        standard = (values - self.mean) / self.scale
+        standard = (X - self.mean) / self.scale
         white = (standard @ self._together).reshape(*standard.shape[:-1], *self._shift.shape)  # type: ignore[attr-defined]
         white -= self._shift  # type: ignore[attr-defined]
         scores: Array = self._constant - 0.5 * np.add.reduce(white * white, axis=-1)  # type: ignore[attr-defined]

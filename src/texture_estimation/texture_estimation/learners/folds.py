@@ -7,7 +7,7 @@ import numpy as np
 from texture_estimation.learners.learner import Codes
 
 
-def assign_folds(codes: Codes, groups: Codes, count: int) -> tuple[Codes, str] | None:
+def assign_folds(y: Codes, groups: Codes, count: int) -> tuple[Codes, str] | None:
     """Return the part (0 to count - 1) in which each example is held out, and how they were divided.
 
     The slides of each label, in the order in which they come, are cut into `count` stretches: sensors and surfaces
@@ -16,7 +16,7 @@ def assign_folds(codes: Codes, groups: Codes, count: int) -> tuple[Codes, str] |
 
     Parameters
     ----------
-    codes, groups : (n,)
+    y, groups : (n,)
         Number of the label and of the slide of each example.
     count
         Number of parts, at least 2.
@@ -26,10 +26,10 @@ def assign_folds(codes: Codes, groups: Codes, count: int) -> tuple[Codes, str] |
     ((n,), str), or None
         Part of each example, and the division in words.
     """
-    folds_of = np.empty(len(codes), dtype=np.intp)
+    folds_of = np.empty(len(y), dtype=np.intp)
     note = f'held-out slides, {count} parts'
-    for code in np.unique(codes):
-        rows = np.flatnonzero(codes == code)
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
         slides = _numbered(groups[rows])
         if not slides.any():
             note = 'held-out windows, as a label has a single slide: too confident'

@@ -17,19 +17,19 @@ Codes = NDArray[np.intp]
 class Predictor(Protocol):
     """Predict from features, as plain arrays."""
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
 
 
 class HiddenPredictor(Protocol):
     """A predictor with a hidden layer."""
 
-    def activations(self, values: Array) -> Array:
+    def activations(self, X: Array) -> Array:
         """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features).
 
         Parameters
         ----------
-        values : (..., n_features)
+        X : (..., n_features)
 
         Returns
         -------
@@ -93,14 +93,14 @@ class Learner(Protocol):
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,).
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
         Parameters
         ----------
-        values : (n, n_features)
+        X : (n, n_features)
             Features of windows; finite.
-        codes : (n,)
+        y : (n,)
             Number of the label of each, from 0, without gaps.
         groups : (n,)
             Number of the slide of each; windows of one slide are held out together.

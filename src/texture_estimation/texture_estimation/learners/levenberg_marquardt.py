@@ -64,19 +64,19 @@ class Network:
         bias = rng.uniform(-1.0, 1.0, n_hidden)
         return cls(hidden, bias, rng.normal(size=n_hidden) / np.sqrt(n_hidden), 0.5, transfer)
 
-    def active(self, values: Array) -> Array:
+    def active(self, X: Array) -> Array:
         """Return what the hidden layer gives, (n, n_hidden) of (n, n_features).
 
         Parameters
         ----------
-        values : (n, n_features)
+        X : (n, n_features)
             Standardised.
 
         Returns
         -------
         (n, n_hidden)
         """
-        return TRANSFERS[self.transfer](values @ self.hidden.T + self.hidden_bias)
+        return TRANSFERS[self.transfer](X @ self.hidden.T + self.hidden_bias)
 
     def slope(self, active: Array) -> Array:
         """Return the derivative of the transfer function where it gives `active`, (n, n_hidden).
@@ -92,9 +92,9 @@ class Network:
         """
         return SLOPES[self.transfer](active)
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return the output, (n,) of (n, n_features)."""
-        output: Array = self.active(values) @ self.out + self.out_bias
+        output: Array = self.active(X) @ self.out + self.out_bias
         return output
 
     def jacobian(self, values: Array) -> tuple[Array, Array]:

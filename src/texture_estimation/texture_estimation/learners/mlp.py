@@ -68,17 +68,17 @@ class Mlp:
         low=0,
     )
 
-    def fit(self, values: Array, codes: Codes, groups: Codes, augmented: AugmentedExamples | None = None) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,).
+    def fit(self, X: Array, y: Codes, groups: Codes, augmented: AugmentedExamples | None = None) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
         With augmented examples, the number of passes counts those over the undisturbed ones. A network for the
         calibration makes half of them.
 
         Parameters
         ----------
-        values : (n, n_features)
+        X : (n, n_features)
             Features of windows; finite.
-        codes : (n,)
+        y : (n,)
             Number of the label of each, from 0, without gaps.
         groups : (n,)
             Number of the slide of each.
@@ -90,26 +90,26 @@ class Mlp:
         Fitted
             Parameters, log-probabilities when held out, and a note on the calibration.
         """
-        n_labels = int(codes.max()) + 1
-        split = assign_folds(codes, groups, self.folds)
+        n_labels = int(y.max()) + 1
+        split = assign_folds(y, groups, self.folds)
         if split is None:
-            fitted = self._fit(values, codes, n_labels, augmented)
+            fitted = self._fit(X, y, n_labels, augmented)
             return Fitted(fitted, None, 'not calibrated, as a label has a single window')
         folds_of, note = split
-        scores = np.empty((len(codes), n_labels))
+        scores = np.empty((len(y), n_labels))
         short = self if augmented is None else dataclasses.replace(self, epochs=-(-self.epochs // 2))
         folds = []
         for part in np.unique(folds_of):
             held = folds_of == part
             slides = np.unique(groups[held])
             rest = augmented.without(slides) if augmented else None
-            folds.append(FoldFit(slides, short._fit(values[~held], codes[~held], n_labels, rest)))
-            scores[held] = self.predictor(folds[-1].parameters)(values[held])
+            folds.append(FoldFit(slides, short._fit(X[~held], y[~held], n_labels, rest)))
+            scores[held] = self.predictor(folds[-1].parameters)(X[held])
         best = minimize_scalar(
-            lambda log_t: log_loss(log_softmax(scores / math.exp(log_t)), codes), bounds=(-2.0, 4.0), method='bounded'
+            lambda log_t: log_loss(log_softmax(scores / math.exp(log_t)), y), bounds=(-2.0, 4.0), method='bounded'
         )
         temperature = math.exp(best.x)
-        fitted = _calibrated(self._fit(values, codes, n_labels, augmented), temperature)
+        fitted = _calibrated(self._fit(X, y, n_labels, augmented), temperature)
         folds = [FoldFit(fold.held_out, _calibrated(fold.parameters, temperature)) for fold in folds]
         return Fitted(fitted, log_softmax(scores / temperature), note, folds)
 
@@ -120,15 +120,15 @@ class Mlp:
         names = MlpPredictor.__dataclass_fields__
         return MlpPredictor(*(np.asarray(folds_of[name], dtype=np.float64, order='F') for name in names))
 
-    def _fit(self, values: Array, codes: Codes, n_labels: int, augmented: AugmentedExamples | None) -> dict[str, Array]:
+    def _fit(self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None) -> dict[str, Array]:
         """Return the layers, with the standardisation worked into them."""
-        mean, scale = values.mean(axis=0), values.std(axis=0)
+        mean, scale = X.mean(axis=0), X.std(axis=0)
         scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # what is constant tells nothing
-        inputs, rng = ((values - mean) / scale).astype(np.float32), np.random.default_rng(self.seed)
+        inputs, rng = ((X - mean) / scale).astype(np.float32), np.random.default_rng(self.seed)
         drawn: _Draws = (
-            AugmentedBatches(inputs, codes, augmented, rng, mean=mean, scale=scale)
+            AugmentedBatches(inputs, y, augmented, rng, mean=mean, scale=scale)
             if augmented
-            else _Batches(inputs, codes, rng)
+            else _Batches(inputs, y, rng)
         )
         weights = self._descend(drawn, inputs.shape, n_labels, rng)
         hidden, hidden_offset, output, output_offset = (part.astype(np.float64) for part in weights)
@@ -165,8 +165,8 @@ class _Draws(Protocol):
 class _Batches:
     """The examples in batches of nearly equal size, in a new order at each pass."""
 
-    def __init__(self, inputs: NDArray[np.float32], codes: Codes, rng: np.random.Generator) -> None:
-        self._inputs, self._codes, self._rng = inputs, codes, rng
+    def __init__(self, inputs: NDArray[np.float32], y: Codes, rng: np.random.Generator) -> None:
+        self._inputs, self._codes, self._rng = inputs, y, rng
         self._count = -(-len(inputs) // BATCH)
         self._drawn = 0
         self._order: Codes = np.zeros(0, np.intp)
@@ -196,16 +196,16 @@ class MlpPredictor:
     output: Array
     output_offset: Array
 
-    def activations(self, values: Array) -> Array:
+    def activations(self, X: Array) -> Array:
         """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features)."""
-        active: Array = values @ self.hidden
+        active: Array = X @ self.hidden
         active += self.hidden_offset
         np.maximum(active, 0.0, out=active)
         return active
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        scores: Array = self.activations(values) @ self.output
+        scores: Array = self.activations(X) @ self.output
         scores += self.output_offset
         return scores
 

@@ -39,17 +39,17 @@ class NaiveBayes:
         high=1000,
     )
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
-        n_labels = int(codes.max()) + 1
-        split = assign_folds(codes, groups, FOLDS)
-        parameters = self._fit(values, codes, n_labels)
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
+        n_labels = int(y.max()) + 1
+        split = assign_folds(y, groups, FOLDS)
+        parameters = self._fit(X, y, n_labels)
         if split is None:
             return Fitted(parameters, None, 'not calibrated, as a label has a single window')
-        held_out = np.empty((len(codes), n_labels))
+        held_out = np.empty((len(y), n_labels))
         for part in np.unique(split[0]):
             held = split[0] == part
-            held_out[held] = self.predictor(self._fit(values[~held], codes[~held], n_labels))(values[held])
+            held_out[held] = self.predictor(self._fit(X[~held], y[~held], n_labels))(X[held])
         return Fitted(parameters, held_out, f'not calibrated; growth from {split[1]}')
 
     @staticmethod
@@ -61,22 +61,22 @@ class NaiveBayes:
             else GaussianNaiveBayesPredictor(**parameters)
         )
 
-    def _fit(self, values: Array, codes: Codes, n_labels: int) -> dict[str, Array]:
-        log_priors = np.log(np.bincount(codes, minlength=n_labels) / len(codes))
-        fitted = self._counted(values, codes, n_labels) if self.bins else self._normal(values, codes, n_labels)
+    def _fit(self, X: Array, y: Codes, n_labels: int) -> dict[str, Array]:
+        log_priors = np.log(np.bincount(y, minlength=n_labels) / len(y))
+        fitted = self._counted(X, y, n_labels) if self.bins else self._normal(X, y, n_labels)
         return {**fitted, 'log_priors': log_priors}
 
-    def _counted(self, values: Array, codes: Codes, n_labels: int) -> dict[str, Array]:
-        edges = np.quantile(values, np.arange(1, self.bins) / self.bins, axis=0).T
-        places = bins_of(values, edges)
-        counts = np.ones((values.shape[1], self.bins, n_labels))  # none is impossible because it never occurred
-        np.add.at(counts, (np.arange(values.shape[1]), places, codes[:, None]), 1.0)
+    def _counted(self, X: Array, y: Codes, n_labels: int) -> dict[str, Array]:
+        edges = np.quantile(X, np.arange(1, self.bins) / self.bins, axis=0).T
+        places = bins_of(X, edges)
+        counts = np.ones((X.shape[1], self.bins, n_labels))  # none is impossible because it never occurred
+        np.add.at(counts, (np.arange(X.shape[1]), places, y[:, None]), 1.0)
         return {'edges': edges, 'log_shares': np.log(counts / counts.sum(axis=1, keepdims=True))}
 
-    def _normal(self, values: Array, codes: Codes, n_labels: int) -> dict[str, Array]:
-        mean, scale = standardisation(values)
-        standard = (values - mean) / scale
-        own = [standard[codes == code] for code in range(n_labels)]
+    def _normal(self, X: Array, y: Codes, n_labels: int) -> dict[str, Array]:
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        own = [standard[y == code] for code in range(n_labels)]
         variances = np.stack([rows.var(axis=0) for rows in own])
         return {
             'mean': mean,
@@ -112,9 +112,9 @@ class GaussianNaiveBayesPredictor:
         object.__setattr__(self, '_quadratic', quadratic.T.copy())
         object.__setattr__(self, '_constant', constant + self.log_priors)
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        standard = (values - self.mean) / self.scale
+        standard = (X - self.mean) / self.scale
         both = np.concatenate((standard * standard, standard), axis=-1)
         scores: Array = both @ self._quadratic + self._constant  # type: ignore[attr-defined]
         return log_softmax(scores)
@@ -136,9 +136,9 @@ class HistogramNaiveBayesPredictor:
     log_shares: Array
     log_priors: Array
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        shares = self.log_shares[np.arange(len(self.edges)), bins_of(values, self.edges)]
+        shares = self.log_shares[np.arange(len(self.edges)), bins_of(X, self.edges)]
         return log_softmax(np.add.reduce(shares, axis=-2) + self.log_priors)
 
 

@@ -82,14 +82,14 @@ def uncalibrated(n_labels: int) -> PairCoupling:
     return PairCoupling(n_labels, np.full(n_pairs, 2.0), np.zeros(n_pairs), 1.0)
 
 
-def fit_coupling(decisions: Array, codes: Codes, n_labels: int) -> PairCoupling:
+def fit_coupling(decisions: Array, y: Codes, n_labels: int) -> PairCoupling:
     """Fit sigmoids and temperature to held-out decision values, (n, n_pairs), and label numbers, (n,).
 
     Parameters
     ----------
     decisions : (n, n_pairs)
         Decision values of held-out examples.
-    codes : (n,)
+    y : (n,)
         Numbers of their labels.
     n_labels
         At least 2.
@@ -100,24 +100,24 @@ def fit_coupling(decisions: Array, codes: Codes, n_labels: int) -> PairCoupling:
         With a temperature that makes the labels most probable.
     """
     pairs = combinations(range(n_labels), 2)
-    sigmoids = np.array([_fit_sigmoid(decisions[:, number], codes, *pair) for number, pair in enumerate(pairs)])
+    sigmoids = np.array([_fit_sigmoid(decisions[:, number], y, *pair) for number, pair in enumerate(pairs)])
     coupling = PairCoupling(n_labels, sigmoids[:, 0], sigmoids[:, 1], 1.0)
     scores = coupling.scores(decisions)
     best = minimize_scalar(
-        lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), codes), bounds=(-2.0, 4.0), method='bounded'
+        lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), y), bounds=(-2.0, 4.0), method='bounded'
     )
     return PairCoupling(n_labels, coupling.slopes, coupling.offsets, float(np.exp(best.x)))
 
 
-def _fit_sigmoid(decisions: Array, codes: Codes, first: int, second: int) -> Array:
+def _fit_sigmoid(decisions: Array, y: Codes, first: int, second: int) -> Array:
     """Return slope and offset of the sigmoid that gives the probability of `first` against `second`.
 
     Newton's method with halved steps (Lin, Lin & Weng 2007).
     """
-    chosen = (codes == first) | (codes == second)
+    chosen = (y == first) | (y == second)
     size = math.sqrt(max(float(np.square(decisions[chosen]).mean()), TINY))
     rows = np.stack([decisions[chosen] / size, np.ones(chosen.sum())])
-    is_first = codes[chosen] == first
+    is_first = y[chosen] == first
     n_first, n_second = int(is_first.sum()), int((~is_first).sum())
     # Platt's targets: never quite 0 or 1, so that separable pairs keep a finite slope.
     targets = np.where(is_first, (n_first + 1.0) / (n_first + 2.0), 1.0 / (n_second + 2.0))

@@ -35,15 +35,15 @@ class PassiveAggressive:
     )
     rounds: int = param(0, 'Sets the number of examples of each label to train on; 0 takes all.', low=0)
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,), in the order given."""
-        order = _in_rounds(codes, self.rounds)
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features) and label numbers `y` 0… (n,) in the order given."""
+        order = _in_rounds(y, self.rounds)
         # Only what was seen may be known: the scale, too, is that of the training examples.
-        mean, scale = standardisation(values[order])
+        mean, scale = standardisation(X[order])
         classifier = find(UPDATES, self.multiclass, 'multi-class form of passive-aggressive learning')
-        online = classifier(np.zeros((int(codes.max()) + 1, values.shape[1] + 1)), self.c)
+        online = classifier(np.zeros((int(y.max()) + 1, X.shape[1] + 1)), self.c)
         for row in order:
-            online.update((values[row] - mean) / scale, int(codes[row]))
+            online.update((X[row] - mean) / scale, int(y[row]))
         return Fitted(
             {'mean': mean, 'scale': scale, 'planes': online.planes}, None, 'not calibrated: distances from the planes'
         )
@@ -157,17 +157,17 @@ class LinearPredictor:
         object.__setattr__(self, '_weights', weights.T.copy())
         object.__setattr__(self, '_bias', self.planes[:, -1].copy())
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log softmax of the distances, (..., n_labels) of (..., n_features)."""
-        scores: Array = (values - self.mean) @ self._weights + self._bias  # type: ignore[attr-defined]
+        scores: Array = (X - self.mean) @ self._weights + self._bias  # type: ignore[attr-defined]
         return log_softmax(scores)
 
 
-def _in_rounds(codes: Codes, rounds: int) -> Codes:
+def _in_rounds(y: Codes, rounds: int) -> Codes:
     """Return the rows in rounds: the first example of each label, then the second of each, and so on."""
-    number = np.empty(len(codes), dtype=np.intp)
-    for code in np.unique(codes):
-        rows = np.flatnonzero(codes == code)
+    number = np.empty(len(y), dtype=np.intp)
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
         number[rows] = np.arange(len(rows))
     order = np.argsort(number, kind='stable')
     return order[number[order] < rounds] if rounds else order

@@ -117,8 +117,8 @@ class SklearnLearner:
         seed = {'random_state': 0} if 'random_state' in known else {}
         return estimator.set_params(**seed, **dict(self.parameters))
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,).
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
         Raises
         ------
@@ -127,17 +127,17 @@ class SklearnLearner:
         """
         from texture_estimation.model_files import check_storable  # noqa: PLC0415  # which imports nothing of learners
 
-        n_labels = int(codes.max()) + 1
-        parameters = self._fit(values, codes, n_labels)
+        n_labels = int(y.max()) + 1
+        parameters = self._fit(X, y, n_labels)
         check_storable(parameters, self.estimator)
-        split = assign_folds(codes, groups, FOLDS)
+        split = assign_folds(y, groups, FOLDS)
         if split is None:
             return Fitted(parameters, None, 'not calibrated, as a label has a single window')
-        held_out = np.empty((len(codes), n_labels))
+        held_out = np.empty((len(y), n_labels))
         for part in np.unique(split[0]):
             held = split[0] == part
-            held_out[held] = self.predictor(self._fit(values[~held], codes[~held], n_labels))(values[held])
-        temperature = _fit_temperature(held_out, codes)
+            held_out[held] = self.predictor(self._fit(X[~held], y[~held], n_labels))(X[held])
+        temperature = _fit_temperature(held_out, y)
         return Fitted(
             {**parameters, 'temperature': temperature},
             log_softmax(held_out / temperature),
@@ -149,10 +149,10 @@ class SklearnLearner:
         """Return the predictor made from the stored parameters."""
         return SklearnPredictor(**parameters)
 
-    def _fit(self, values: Array, codes: Codes, n_labels: int) -> dict[str, Any]:
-        mean, scale = standardisation(values)
+    def _fit(self, X: Array, y: Codes, n_labels: int) -> dict[str, Any]:
+        mean, scale = standardisation(X)
         try:
-            estimator = self.new_estimator().fit((values - mean) / scale, codes)
+            estimator = self.new_estimator().fit((X - mean) / scale, y)
         except (ValueError, TypeError) as error:
             raise InvalidParameter(f"'{self.estimator}' cannot be trained: {error}") from error
         return {'estimator': estimator, 'mean': mean, 'scale': scale, 'n_labels': n_labels, 'temperature': 1.0}
@@ -184,12 +184,12 @@ class SklearnPredictor:
         for tree in _trees(self.estimator, 0):
             _check_tree(tree, len(self.mean))
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log-probabilities, (..., n_labels) of (..., n_features)."""
-        rows = ((values - self.mean) / self.scale).reshape(-1, len(self.mean))
+        rows = ((X - self.mean) / self.scale).reshape(-1, len(self.mean))
         scores = np.full((len(rows), self.n_labels), np.log(FLOOR / self.n_labels))
         scores[:, self.estimator.classes_] = self._scores(rows)
-        result: Array = log_softmax(scores / self.temperature).reshape(*values.shape[:-1], self.n_labels)
+        result: Array = log_softmax(scores / self.temperature).reshape(*X.shape[:-1], self.n_labels)
         return result
 
     def _scores(self, rows: Array) -> Array:
@@ -238,10 +238,10 @@ def _plain(name: str, value: Any) -> Any:
     )
 
 
-def _fit_temperature(scores: Array, codes: Codes) -> float:
+def _fit_temperature(scores: Array, y: Codes) -> float:
     """Return the divisor of scores (n, n_labels) that makes the labels (n,) most probable."""
     best = minimize_scalar(
-        lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), codes), bounds=(-2.0, 4.0), method='bounded'
+        lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), y), bounds=(-2.0, 4.0), method='bounded'
     )
     return float(np.exp(best.x))
 

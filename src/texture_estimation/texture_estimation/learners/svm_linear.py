@@ -45,12 +45,12 @@ class SvmLinear:
     examples: int = param(200, 'Largest number of examples with which C is chosen; more are subsampled evenly.', low=10)
     seed: int = param(0, 'Sets the seed of the random folds; equal seeds give equal models.', low=0)
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
-        mean, scale = standardisation(values)
-        standard = (values - mean) / scale
-        c = self._choose(standard, codes, groups)
-        weights, intercepts = _planes(_svc(standard, codes, c))
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        c = self._choose(standard, y, groups)
+        weights, intercepts = _planes(_svc(standard, y, c))
         folds_of = {'mean': mean, 'scale': scale, 'weights': weights, 'intercepts': intercepts}
         note = f'not calibrated: pairs won; C = {c:.3g} by {self.repeats} times {self.folds}-fold cross-validation'
         return Fitted(folds_of, None, note)
@@ -60,21 +60,20 @@ class SvmLinear:
         """Return the predictor made from the stored parameters."""
         return LinearPairsPredictor(**folds_of)
 
-    def _choose(self, standard: Array, codes: Codes, groups: Codes) -> float:
+    def _choose(self, standard: Array, y: Codes, groups: Codes) -> float:
         """Return the penalty that does best on what is held out; the middle one if nothing can be."""
         tried = np.geomspace(self.least_c, self.most_c, self.candidates)
-        rows = _evenly(codes, self.examples)
+        rows = _evenly(y, self.examples)
         rng = np.random.default_rng(self.seed)
-        assignments = [_divide(codes[rows], groups[rows], self.folds, rng) for _ in range(self.repeats)]
+        assignments = [_divide(y[rows], groups[rows], self.folds, rng) for _ in range(self.repeats)]
         splits = [
             (rows[folds_of != part], rows[folds_of == part]) for folds_of in assignments for part in np.unique(folds_of)
         ]
-        splits = [(training, held) for training, held in splits if len(np.unique(codes[training])) > 1]
+        splits = [(training, held) for training, held in splits if len(np.unique(y[training])) > 1]
         if not splits:
             return float(tried[len(tried) // 2])
         right = [
-            sum(int((_svc(standard[a], codes[a], c).predict(standard[b]) == codes[b]).sum()) for a, b in splits)
-            for c in tried
+            sum(int((_svc(standard[a], y[a], c).predict(standard[b]) == y[b]).sum()) for a, b in splits) for c in tried
         ]
         return float(tried[int(np.argmax(right))])
 
@@ -101,33 +100,33 @@ class LinearPairsPredictor:
         n_pairs = len(self.intercepts)
         object.__setattr__(self, '_votes', PairVotes(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0)))
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self._votes.won_clearly(self.decisions(values)))  # type: ignore[attr-defined]
+        return log_softmax(self._votes.won_clearly(self.decisions(X)))  # type: ignore[attr-defined]
 
-    def decisions(self, values: Array) -> Array:
+    def decisions(self, X: Array) -> Array:
         """Return the decision value of each pair, (..., n_pairs); positive for its first label.
 
         Parameters
         ----------
-        values : (..., n_features)
+        X : (..., n_features)
 
         Returns
         -------
         (..., n_pairs)
             Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
         """
-        decisions: Array = (values - self.mean) @ self._weights + self.intercepts  # type: ignore[attr-defined]
+        decisions: Array = (X - self.mean) @ self._weights + self.intercepts  # type: ignore[attr-defined]
         return decisions
 
 
-def _svc(standard: Array, codes: Codes, c: float) -> Any:
+def _svc(standard: Array, y: Codes, c: float) -> Any:
     from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415  # scikit-learn takes a second to import
     from sklearn.svm import SVC  # noqa: PLC0415
 
     with warnings.catch_warnings():
         warnings.simplefilter('ignore', ConvergenceWarning)  # the limit of iterations is meant
-        return SVC(C=c, kernel='linear', max_iter=ITERATIONS).fit(standard, codes)
+        return SVC(C=c, kernel='linear', max_iter=ITERATIONS).fit(standard, y)
 
 
 def _planes(svc: Any) -> tuple[Array, Array]:
@@ -136,22 +135,22 @@ def _planes(svc: Any) -> tuple[Array, Array]:
     return sign * np.asarray(svc.coef_), sign * np.asarray(svc.intercept_)
 
 
-def _evenly(codes: Codes, count: int) -> NDArray[np.intp]:
+def _evenly(y: Codes, count: int) -> NDArray[np.intp]:
     """Return at most `count` rows, as many of each label, spread over all of its examples; two of each at least."""
-    labels = np.unique(codes)
+    labels = np.unique(y)
     each = max(2, count // len(labels))
     chosen = []
     for label in labels:
-        rows = np.flatnonzero(codes == label)
+        rows = np.flatnonzero(y == label)
         chosen.append(rows[np.unique(np.linspace(0, len(rows) - 1, min(each, len(rows))).astype(np.intp))])
     return np.sort(np.concatenate(chosen))
 
 
-def _divide(codes: Codes, groups: Codes, folds: int, rng: np.random.Generator) -> Codes:
+def _divide(y: Codes, groups: Codes, folds: int, rng: np.random.Generator) -> Codes:
     """Return the part of each example at random: the slides of each label are assigned in turn."""
-    folds_of = np.zeros(len(codes), dtype=np.intp)
-    for code in np.unique(codes):
-        rows = np.flatnonzero(codes == code)
+    folds_of = np.zeros(len(y), dtype=np.intp)
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
         slides = np.unique(groups[rows], return_inverse=True)[1].reshape(-1)
         if slides.max() == 0:  # a single slide: its windows are assigned
             slides = np.arange(len(rows))

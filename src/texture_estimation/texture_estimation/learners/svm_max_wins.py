@@ -53,8 +53,8 @@ class SvmMaxWins:
         1.0, 'Gamma of the kernel exp(-gamma d² / (n_components · variance)); larger is narrower.', low=1e-9, high=1e9
     )
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,).
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
         Raises
         ------
@@ -64,14 +64,14 @@ class SvmMaxWins:
         from sklearn.preprocessing import StandardScaler  # noqa: PLC0415  # scikit-learn takes a second to import
         from sklearn.svm import SVC  # noqa: PLC0415
 
-        mean, components = self._components(values)
-        projected = (values - mean) @ components
+        mean, components = self._components(X)
+        projected = (X - mean) @ components
         # The machine expects a scaler: one that changes the unit of all components alike, or not at all.
         unit = float(projected.std()) or 1.0
         scaler = StandardScaler().fit(projected)
         scaler.mean_, scaler.scale_ = np.zeros(projected.shape[1]), np.full(projected.shape[1], unit)
         gamma = self.gamma / projected.shape[1]
-        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(projected / unit, codes)
+        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(projected / unit, y)
         parameters = {'mean': mean, 'components': components, 'scaler': scaler, 'svc': svc}
         return Fitted(parameters, None, f'not calibrated: pairs won; {components.shape[1]} principal components')
 
@@ -121,9 +121,9 @@ class PcaSvmPredictor:
     svm: SvmPredictor
     votes: PairVotes
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self.votes.won_clearly(self.svm.decisions((values - self.mean) @ self.components)))
+        return log_softmax(self.votes.won_clearly(self.svm.decisions((X - self.mean) @ self.components)))
 
 
 def principal_components(centred: Array, share: float) -> Array:

@@ -48,17 +48,17 @@ class SvmPairs:
         choices=TIES,
     )
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
         # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
         from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
         from sklearn.svm import SVC  # noqa: PLC0415
 
-        scaler = StandardScaler().fit(values)
+        scaler = StandardScaler().fit(X)
         if not self.standardise:
-            scaler.mean_, scaler.scale_ = np.zeros(values.shape[1]), np.ones(values.shape[1])
+            scaler.mean_, scaler.scale_ = np.zeros(X.shape[1]), np.ones(X.shape[1])
         svc = SVC(C=self.box_constraint, kernel='rbf', gamma=self.kernel_scale**-2, cache_size=CACHE_MB)
-        parameters = {'scaler': scaler, 'svc': svc.fit(scaler.transform(values), codes), 'ties': self.ties}
+        parameters = {'scaler': scaler, 'svc': svc.fit(scaler.transform(X), y), 'ties': self.ties}
         return Fitted(parameters, None, NOTE)
 
     @staticmethod
@@ -77,6 +77,6 @@ class SvmPairsPredictor:
     votes: PairVotes
     ties: str
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
-        return log_softmax(self.votes.counted(self.svm.decisions(values), self.ties))
+        return log_softmax(self.votes.counted(self.svm.decisions(X), self.ties))

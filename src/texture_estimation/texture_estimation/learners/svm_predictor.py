@@ -51,23 +51,23 @@ class SvmPredictor:
         object.__setattr__(self, '_first', first * (n_labels - 1) + second - 1)
         object.__setattr__(self, '_second', second * (n_labels - 1) + first)
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
-        return self.coupling(self.decisions(values))
+        return self.coupling(self.decisions(X))
 
-    def decisions(self, values: Array) -> Array:
+    def decisions(self, X: Array) -> Array:
         """Return the decision value of each pair, (..., n_pairs); positive for its first label.
 
         Parameters
         ----------
-        values : (..., n_features)
+        X : (..., n_features)
 
         Returns
         -------
         (..., n_pairs)
             Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
         """
-        standard = (values - self.mean) / self.scale
+        standard = (X - self.mean) / self.scale
         # |x - s|² = |x|² + |s|² - 2 x·s, one product with all support vectors
         squares = self.gamma * np.add.reduce(standard * standard, axis=-1, keepdims=True)
         exponents = self.vectors @ standard if standard.ndim == 1 else standard @ self.vectors.T

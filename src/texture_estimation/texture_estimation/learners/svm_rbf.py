@@ -47,10 +47,10 @@ class SvmRbf:
         high=50,
     )
 
-    def fit(self, values: Array, codes: Codes, groups: Codes) -> Fitted:
-        """Learn from values (n, n_features), label numbers 0… (n,) and slide numbers (n,)."""
-        coupling, held_out, note = self._calibrate(values, codes, groups)
-        scaler, svc = self._fit_svc(values, codes)
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
+        coupling, held_out, note = self._calibrate(X, y, groups)
+        scaler, svc = self._fit_svc(X, y)
         folds_of = {
             'scaler': scaler,
             'svc': svc,
@@ -68,28 +68,28 @@ class SvmRbf:
         )
         return export(folds_of['scaler'], folds_of['svc'], coupling)
 
-    def _calibrate(self, values: Array, codes: Codes, groups: Codes) -> tuple[PairCoupling, Array | None, str]:
-        n_labels = int(codes.max()) + 1
-        split = assign_folds(codes, groups, self.folds)
+    def _calibrate(self, X: Array, y: Codes, groups: Codes) -> tuple[PairCoupling, Array | None, str]:
+        n_labels = int(y.max()) + 1
+        split = assign_folds(y, groups, self.folds)
         if split is None:
             return uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
         folds_of, note = split
-        decisions = np.empty((len(codes), n_labels * (n_labels - 1) // 2))
+        decisions = np.empty((len(y), n_labels * (n_labels - 1) // 2))
         for part in np.unique(folds_of):
             held = folds_of == part
-            svm = export(*self._fit_svc(values[~held], codes[~held]), uncalibrated(n_labels))
-            decisions[held] = svm.decisions(values[held])
-        coupling = fit_coupling(decisions, codes, n_labels)
+            svm = export(*self._fit_svc(X[~held], y[~held]), uncalibrated(n_labels))
+            decisions[held] = svm.decisions(X[held])
+        coupling = fit_coupling(decisions, y, n_labels)
         return coupling, coupling(decisions), note
 
-    def _fit_svc(self, values: Array, codes: Codes) -> tuple[Any, Any]:
+    def _fit_svc(self, X: Array, y: Codes) -> tuple[Any, Any]:
         # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
         from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
         from sklearn.svm import SVC  # noqa: PLC0415
 
-        scaler = StandardScaler().fit(values)
+        scaler = StandardScaler().fit(X)
         if self.common_scale:
-            scaler.scale_ = np.full(values.shape[1], float(np.sqrt(scaler.var_.mean())) or 1.0)
-        gamma = self.gamma or 1.0 / (values.shape[1] * max(float(scaler.transform(values).var()), 1e-12))
-        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(scaler.transform(values), codes)
+            scaler.scale_ = np.full(X.shape[1], float(np.sqrt(scaler.var_.mean())) or 1.0)
+        gamma = self.gamma or 1.0 / (X.shape[1] * max(float(scaler.transform(X).var()), 1e-12))
+        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(scaler.transform(X), y)
         return scaler, svc

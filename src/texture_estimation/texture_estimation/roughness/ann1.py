@@ -42,9 +42,9 @@ class Ann1:
         choices=tuple(TRANSFERS),
     )
 
-    def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
-        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,)."""
-        return fit_networks(values, [grades], textures, **asdict(self))
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,)."""
+        return fit_networks(X, [y], groups, **asdict(self))
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> NetworkRegressorPredictor:
@@ -58,7 +58,7 @@ class NetworkRegressorPredictor:
 
     networks: RegressionNetworks
 
-    def __call__(self, values: Array) -> tuple[Array, Array]:
+    def __call__(self, X: Array) -> tuple[Array, Array]:
         """Return grade and standard deviation, the latter not known."""
-        grade = np.clip(self.networks(values)[..., 0], SMOOTH, ROUGH)
+        grade = np.clip(self.networks(X)[..., 0], SMOOTH, ROUGH)
         return grade, np.zeros_like(grade)

@@ -42,10 +42,10 @@ class Ann5:
         choices=tuple(TRANSFERS),
     )
 
-    def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
-        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,)."""
-        targets = grade_membership(grades).T.astype(np.float64)
-        return fit_networks(values, list(targets), textures, **asdict(self))
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,)."""
+        targets = grade_membership(y).T.astype(np.float64)
+        return fit_networks(X, list(targets), groups, **asdict(self))
 
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> VotingNetworksPredictor:
@@ -59,7 +59,7 @@ class VotingNetworksPredictor:
 
     networks: RegressionNetworks
 
-    def __call__(self, values: Array) -> tuple[Array, Array]:
+    def __call__(self, X: Array) -> tuple[Array, Array]:
         """Return grade and standard deviation, the latter not known."""
-        grade = mean_of_votes(self.networks(values) >= VOTE_THRESHOLD)
+        grade = mean_of_votes(self.networks(X) >= VOTE_THRESHOLD)
         return grade, np.zeros_like(grade)

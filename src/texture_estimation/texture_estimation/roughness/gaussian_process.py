@@ -37,8 +37,8 @@ class GaussianProcess:
 
     curved: bool = param(True, 'Whether a nonlinear (RBF) term is added; false: Bayesian linear regression.')
 
-    def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
-        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,).
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,).
 
         Raises
         ------
@@ -47,11 +47,11 @@ class GaussianProcess:
         """
         from scipy.optimize import minimize  # noqa: PLC0415
 
-        codes = np.unique(textures)
+        codes = np.unique(groups)
         if len(codes) < 2:
             raise InvalidData('all graded windows are of one texture; two or more are needed')
-        points = np.stack([values[textures == code].mean(axis=0) for code in codes])
-        targets = np.array([grades[textures == code].mean() for code in codes]) - MIDDLE
+        points = np.stack([X[groups == code].mean(axis=0) for code in codes])
+        targets = np.array([y[groups == code].mean() for code in codes]) - MIDDLE
         mean, scale = standardisation(points)
         # One unit is the distance of two typical textures, however many features tell of it.
         places = (points - mean) / (scale * np.sqrt(points.shape[1]))
@@ -109,9 +109,9 @@ class GaussianProcessPredictor:
     precision: Array
     hyper: Array
 
-    def __call__(self, values: Array) -> tuple[Array, Array]:
+    def __call__(self, X: Array) -> tuple[Array, Array]:
         """Return grade, within 1 and 5, and standard deviation, noise between textures included."""
-        place = (values - self.mean) / self.scale
+        place = (X - self.mean) / self.scale
         grade, variance = self._curved(place) if self.hyper[1] else self._straight(place)
         return np.minimum(np.maximum(MIDDLE + grade, SMOOTH), ROUGH), np.sqrt(np.maximum(variance, 0.0))
 

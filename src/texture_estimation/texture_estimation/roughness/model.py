@@ -119,12 +119,12 @@ class RoughnessModel:
     def _columns(self) -> NDArray[np.intp]:
         return graded_columns(self.names)
 
-    def grade(self, values: Array) -> tuple[Array, Array]:
+    def grade(self, X: Array) -> tuple[Array, Array]:
         """Return grade and the regressor's own standard deviation, (...) each, of (..., n_features).
 
         Parameters
         ----------
-        values : (..., n_features)
+        X : (..., n_features)
 
         Returns
         -------
@@ -133,7 +133,7 @@ class RoughnessModel:
         (...)
             Standard deviation, grades.
         """
-        return self.predictor(values.take(self._columns, axis=-1))
+        return self.predictor(X.take(self._columns, axis=-1))
 
     @property
     def card(self) -> dict[str, Any]:

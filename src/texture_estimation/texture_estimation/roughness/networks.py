@@ -40,10 +40,10 @@ class RegressionNetworks:
     out_bias: Array
     linear: Array = field(default_factory=lambda: np.array(False))
 
-    def __call__(self, values: Array) -> Array:
+    def __call__(self, X: Array) -> Array:
         """Return the outputs, (..., n_networks) of (..., n_features)."""
         active = TRANSFERS[LINEAR if self.linear else SIGMOID](
-            (values - self.mean) / self.scale @ self.hidden.T + self.hidden_bias
+            (X - self.mean) / self.scale @ self.hidden.T + self.hidden_bias
         )
         by_network = active.reshape(*active.shape[:-1], *self.out.shape)
         outputs: Array = (by_network * self.out).sum(axis=-1) + self.out_bias
@@ -51,7 +51,7 @@ class RegressionNetworks:
 
 
 def fit_networks(
-    values: Array, targets: Sequence[Array], textures: Codes, *, hidden: int, iterations: int, seed: int, transfer: str
+    values: Array, targets: Sequence[Array], groups: Codes, *, hidden: int, iterations: int, seed: int, transfer: str
 ) -> Mapping[str, Any]:
     """Return the fields of `RegressionNetworks`, one network for each target, (n,), of values (n, n_features).
 
@@ -61,7 +61,7 @@ def fit_networks(
         Features of windows.
     targets : of each network (n,)
         What it is to answer.
-    textures : (n,)
+    groups : (n,)
         Number of the texture of each window; whole textures are held out to stop early.
     hidden
         Neurons of the hidden layer.
@@ -80,7 +80,7 @@ def fit_networks(
     mean, scale = standardisation(values)
     standard = (values - mean) / scale
     rng = np.random.default_rng(seed)
-    held = _held_out(textures)
+    held = _held_out(groups)
     fitted = [
         fit_network(Network.random(hidden, values.shape[1], rng, transfer), standard, target, held, iterations)
         for target in targets

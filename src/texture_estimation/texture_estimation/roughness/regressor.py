@@ -17,7 +17,7 @@ SMOOTH, ROUGH = 1.0, 5.0
 class RegressorPredictor(Protocol):
     """Predict grades of windows, as plain arrays."""
 
-    def __call__(self, values: Array) -> tuple[Array, Array]:
+    def __call__(self, X: Array) -> tuple[Array, Array]:
         """Return grade and its standard deviation, (...,) each, of (..., n_features).
 
         The grade is NaN where the regressor has no answer; the standard deviation is 0 if the regressor does not know
@@ -30,16 +30,16 @@ class RoughnessRegressor(Protocol):
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
-    def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
-        """Learn from values (n, n_features), grades (n,) and numbers of the textures (n,); return plain arrays.
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X`, grades `y` and texture numbers `groups`; return plain arrays.
 
         Parameters
         ----------
-        values : (n, n_features)
+        X : (n, n_features)
             Features of windows; finite.
-        grades : (n,)
+        y : (n,)
             Mean grade of the texture of each, 1 to 5.
-        textures : (n,)
+        groups : (n,)
             Number of the texture of each.
 
         Returns

@@ -36,16 +36,16 @@ class Svm5:
         high=1e9,
     )
 
-    def fit(self, values: Array, grades: Array, textures: Codes) -> Mapping[str, Any]:
-        """Learn from values (n, n_features) and grades (n,)."""
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X` (n, n_features) and grades `y` (n,)."""
         from sklearn.svm import SVC  # noqa: PLC0415  # takes a second, and a node that only grades has no need of it
 
-        mean, scale = standardisation(values)
-        standard = (values - mean) / scale
-        weights = np.zeros((len(values), len(GRADES)))
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        weights = np.zeros((len(X), len(GRADES)))
         # A grade that no texture has never fires.
         offsets = np.full(len(GRADES), -1.0)
-        for number, member in enumerate(grade_membership(grades).T):
+        for number, member in enumerate(grade_membership(y).T):
             if member.all():
                 offsets[number] = 1.0
             elif member.any():
@@ -90,9 +90,9 @@ class VotingSvmsPredictor:
     offsets: Array
     gamma: float
 
-    def __call__(self, values: Array) -> tuple[Array, Array]:
+    def __call__(self, X: Array) -> tuple[Array, Array]:
         """Return grade and standard deviation, the latter not known."""
-        standard = (values - self.mean) / self.scale
+        standard = (X - self.mean) / self.scale
         squares = (standard**2).sum(axis=-1)[..., None] + (self.vectors**2).sum(axis=1)
         distances = squares - 2.0 * standard @ self.vectors.T
         grade = mean_of_votes(np.exp(-self.gamma * distances) @ self.weights + self.offsets > 0.0)

@@ -40,7 +40,7 @@ class ChronologicalSplit:
             raise InvalidParameter(f'train_size is {train_size}; a fraction above 0 and below 1 is needed')
         self.train_size = train_size
 
-    def get_n_splits(self, X: object = None, y: object = None, groups: object = None) -> int:  # noqa: N803
+    def get_n_splits(self, X: object = None, y: object = None, groups: object = None) -> int:
         """Return 1.
 
         Parameters
@@ -56,7 +56,7 @@ class ChronologicalSplit:
 
     def split(  # X is there because scikit-learn's splitters have it
         self,
-        X: object,  # noqa: N803
+        X: object,
         y: AnyArray,
         groups: AnyArray | None = None,
     ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:

@@ -22,7 +22,7 @@ TEST_SIZE = 0.25  # of a random split
 class Splitter(Protocol):
     """Interface of scikit-learn's splitters."""
 
-    def split(self, X: Any, y: Any, groups: Any) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:  # noqa: N803
+    def split(self, X: Any, y: Any, groups: Any) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
         """Yield train and test rows.
 
         Parameters

@@ -17,7 +17,7 @@ from texture_estimation.search.surrogates.surrogate import ScoresOfHalf
 EXAMPLES = 200
 
 
-def ann_pairs(learner: AnnPairs, values: Array, codes: Codes, groups: Codes) -> ScoresOfHalf:
+def ann_pairs(learner: AnnPairs, X: Array, y: Codes, groups: Codes) -> ScoresOfHalf:
     """Return a scorer of one half split by the pairs won.
 
     Each network sees the examples of its pair, of 200 that are drawn from all labels, and makes ten steps of the
@@ -28,9 +28,9 @@ def ann_pairs(learner: AnnPairs, values: Array, codes: Codes, groups: Codes) -> 
     ----------
     learner
         Learner of the recipe.
-    values : (n, n_features)
+    X : (n, n_features)
         Features of all examples.
-    codes, groups : (n,)
+    y, groups : (n,)
         Number of the label and of the slide of each.
 
     Returns
@@ -38,15 +38,15 @@ def ann_pairs(learner: AnnPairs, values: Array, codes: Codes, groups: Codes) -> 
     callable
         Takes which examples are used for training, (n,), returns scores (n, n_labels).
     """
-    mean, scale = standardisation(values)
-    standard = np.ascontiguousarray((values - mean) / scale)
-    n_labels = int(codes.max()) + 1
+    mean, scale = standardisation(X)
+    standard = np.ascontiguousarray((X - mean) / scale)
+    n_labels = int(y.max()) + 1
     first, second = np.triu_indices(n_labels, k=1)
     votes = PairVotes(n_labels)
 
     def scores(training: Mask) -> Array:
         rng = np.random.default_rng(learner.seed)
-        rows = sample_rows(codes, training, EXAMPLES // n_labels, rng)
+        rows = sample_rows(y, training, EXAMPLES // n_labels, rng)
         of_pairs = standard[np.concatenate([rows[first], rows[second]], axis=1)]
         # 1 for the first label of a pair, 0 for the second
         targets = np.tile(np.repeat([1.0, 0.0], rows.shape[1]), (len(first), 1))

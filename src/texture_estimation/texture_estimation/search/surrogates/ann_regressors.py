@@ -21,16 +21,16 @@ from texture_estimation.search.surrogates.regressor_surrogate import GradesOfHal
 EXAMPLES = 16
 
 
-def ann1(regressor: Ann1, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
+def ann1(regressor: Ann1, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
     """Return a scorer of one half split by one network whose output is the grade.
 
     Parameters
     ----------
     regressor
         Regressor of the recipe.
-    values : (n, n_features)
+    X : (n, n_features)
         Features of all examples.
-    grades, textures : (n,)
+    y, groups : (n,)
         Grade and number of the texture of each.
 
     Returns
@@ -38,19 +38,19 @@ def ann1(regressor: Ann1, values: Array, grades: Array, textures: Codes) -> Grad
     callable
         Takes which examples are used for training, (n,), returns grades (n,).
     """
-    return _surrogate(regressor, values, grades[None], textures, lambda outputs: np.clip(outputs[:, 0], SMOOTH, ROUGH))
+    return _surrogate(regressor, X, y[None], groups, lambda outputs: np.clip(outputs[:, 0], SMOOTH, ROUGH))
 
 
-def ann5(regressor: Ann5, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
+def ann5(regressor: Ann5, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
     """Return a scorer of one half split by a network for each grade.
 
     Parameters
     ----------
     regressor
         Regressor of the recipe.
-    values : (n, n_features)
+    X : (n, n_features)
         Features of all examples.
-    grades, textures : (n,)
+    y, groups : (n,)
         Grade and number of the texture of each.
 
     Returns
@@ -58,19 +58,19 @@ def ann5(regressor: Ann5, values: Array, grades: Array, textures: Codes) -> Grad
     callable
         Takes which examples are used for training, (n,), returns grades (n,).
     """
-    wanted = grade_membership(grades).T.astype(np.float64)
-    return _surrogate(regressor, values, wanted, textures, lambda outputs: mean_of_votes(outputs >= VOTE_THRESHOLD))
+    wanted = grade_membership(y).T.astype(np.float64)
+    return _surrogate(regressor, X, wanted, groups, lambda outputs: mean_of_votes(outputs >= VOTE_THRESHOLD))
 
 
 def _surrogate(
-    regressor: Ann1 | Ann5, values: Array, targets: Array, textures: Codes, grade: Callable[[Array], Array]
+    regressor: Ann1 | Ann5, values: Array, targets: Array, groups: Codes, grade: Callable[[Array], Array]
 ) -> GradesOfHalf:
     mean, scale = standardisation(values)
     standard = np.ascontiguousarray((values - mean) / scale)
 
     def graded(training: Mask) -> Array:
         rng = np.random.default_rng(regressor.seed)
-        rows = sample_rows(textures, training, EXAMPLES, rng).ravel()
+        rows = sample_rows(groups, training, EXAMPLES, rng).ravel()
         networks = SurrogateNetworks.fitted(
             standard[None, rows], targets[:, rows], regressor.hidden, rng, regressor.transfer
         )

@@ -8,16 +8,16 @@ from texture_estimation.search.halves import Mask
 from texture_estimation.search.surrogates.surrogate import ScoresOfHalf
 
 
-def exact(learner: Learner, values: Array, codes: Codes, groups: Codes) -> ScoresOfHalf:
+def exact(learner: Learner, X: Array, y: Codes, groups: Codes) -> ScoresOfHalf:
     """Return what fits the learner to a half, standardisation included, and lets its exported predictor evaluate.
 
     Parameters
     ----------
     learner
         Learner of the recipe.
-    values : (n, n_features)
+    X : (n, n_features)
         Features of all examples.
-    codes, groups : (n,)
+    y, groups : (n,)
         Number of the label and of the slide of each.
 
     Returns
@@ -27,7 +27,7 @@ def exact(learner: Learner, values: Array, codes: Codes, groups: Codes) -> Score
     """
 
     def scores(training: Mask) -> Array:
-        fitted = learner.fit(values[training], codes[training], groups[training])
-        return learner.predictor(fitted.parameters)(values)
+        fitted = learner.fit(X[training], y[training], groups[training])
+        return learner.predictor(fitted.parameters)(X)
 
     return scores

@@ -9,16 +9,16 @@ from texture_estimation.search.halves import Mask
 from texture_estimation.search.surrogates.regressor_surrogate import GradesOfHalf
 
 
-def exact_grades(regressor: RoughnessRegressor, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
+def exact_grades(regressor: RoughnessRegressor, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
     """Return what fits the head to a half, standardisation included, and lets its exported predictor grade.
 
     Parameters
     ----------
     regressor
         Regressor of the recipe.
-    values : (n, n_features)
+    X : (n, n_features)
         Features of all examples.
-    grades, textures : (n,)
+    y, groups : (n,)
         Grade and number of the texture of each.
 
     Returns
@@ -28,7 +28,7 @@ def exact_grades(regressor: RoughnessRegressor, values: Array, grades: Array, te
     """
 
     def graded(training: Mask) -> Array:
-        parameters = regressor.fit(values[training], grades[training], textures[training])
-        return regressor.predictor(parameters)(values)[0]
+        parameters = regressor.fit(X[training], y[training], groups[training])
+        return regressor.predictor(parameters)(X)[0]
 
     return graded

@@ -162,12 +162,12 @@ class SurrogateNetworks:
             getattr(self, name)[which] = getattr(other, name)[which]
 
 
-def sample_rows(codes: Codes, training: Mask, most: int, rng: np.random.Generator) -> NDArray[np.intp]:
+def sample_rows(y: Codes, training: Mask, most: int, rng: np.random.Generator) -> NDArray[np.intp]:
     """Return the rows of `most` training examples of each label, of the rarest one all, (n_labels, count).
 
     Parameters
     ----------
-    codes : (n,)
+    y : (n,)
         Number of the label of each example.
     training : (n,) bool
         Which examples may be drawn.
@@ -181,6 +181,6 @@ def sample_rows(codes: Codes, training: Mask, most: int, rng: np.random.Generato
     (n_labels, count)
         Indices; as many of each label.
     """
-    members = [np.flatnonzero(training & (codes == label)) for label in np.unique(codes)]
+    members = [np.flatnonzero(training & (y == label)) for label in np.unique(y)]
     count = min(most, *map(len, members))
     return np.array([rng.choice(of_label, count, replace=False) for of_label in members])

@@ -16,14 +16,14 @@ GradesOfHalf = Callable[[Mask], Array]
 class RegressorSurrogate(Protocol):
     """Prepare what all half splits share, and then score each."""
 
-    def __call__(self, regressor: Any, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
+    def __call__(self, regressor: Any, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
         """Return a scorer of one half split.
 
         Parameters
         ----------
         regressor
             Parameters of the regressor that is stood for.
-        values : (n, n_features)
-        grades, textures : (n,)
+        X : (n, n_features)
+        y, groups : (n,)
             Grade that people gave, and number of the texture.
         """

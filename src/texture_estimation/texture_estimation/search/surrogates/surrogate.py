@@ -17,14 +17,14 @@ ScoresOfHalf = Callable[[Mask], Array]
 class Surrogate(Protocol):
     """Prepare what all half splits share, and then score each."""
 
-    def __call__(self, learner: Any, values: Array, codes: Codes, groups: Codes) -> ScoresOfHalf:
+    def __call__(self, learner: Any, X: Array, y: Codes, groups: Codes) -> ScoresOfHalf:
         """Return a scorer of one half split.
 
         Parameters
         ----------
         learner
             Parameters of the learner that is stood for.
-        values : (n, n_features)
-        codes, groups : (n,)
+        X : (n, n_features)
+        y, groups : (n,)
             Number of each example's label and slide.
         """

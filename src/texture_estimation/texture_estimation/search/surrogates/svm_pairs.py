@@ -24,7 +24,7 @@ ROWS = 64
 Kernel = NDArray[np.float32]
 
 
-def svm_pairs(learner: SvmPairs, values: Array, codes: Codes, groups: Codes) -> ScoresOfHalf:
+def svm_pairs(learner: SvmPairs, X: Array, y: Codes, groups: Codes) -> ScoresOfHalf:
     """Return a scorer of one half split by the pairs won.
 
     The kernel is computed once for all halves. So the features are standardised by all examples, not by the half
@@ -34,9 +34,9 @@ def svm_pairs(learner: SvmPairs, values: Array, codes: Codes, groups: Codes) -> 
     ----------
     learner
         Learner of the recipe.
-    values : (n, n_features)
+    X : (n, n_features)
         Features of all examples.
-    codes, groups : (n,)
+    y, groups : (n,)
         Number of the label and of the slide of each.
 
     Returns
@@ -44,11 +44,11 @@ def svm_pairs(learner: SvmPairs, values: Array, codes: Codes, groups: Codes) -> 
     callable
         Takes which examples are used for training, (n,), returns scores (n, n_labels).
     """
-    kernel = kernel_of(values, learner.kernel_scale, standardise=learner.standardise)
-    votes = PairVotes(int(codes.max()) + 1)
+    kernel = kernel_of(X, learner.kernel_scale, standardise=learner.standardise)
+    votes = PairVotes(int(y.max()) + 1)
 
     def scores(training: Mask) -> Array:
-        decisions = pair_decisions(kernel, codes, training, learner.box_constraint)
+        decisions = pair_decisions(kernel, y, training, learner.box_constraint)
         return votes.counted(decisions, learner.ties)
 
     return scores
@@ -87,14 +87,14 @@ def kernel_of(values: Array, scale: float, *, standardise: bool = True) -> Kerne
     return kernel
 
 
-def pair_decisions(kernel: Kernel, codes: Codes, training: Mask, box_constraint: float) -> NDArray[np.float32]:
+def pair_decisions(kernel: Kernel, y: Codes, training: Mask, box_constraint: float) -> NDArray[np.float32]:
     """Return the decision value of each pair for every example, (n, n_pairs); positive for the pair's first label.
 
     Parameters
     ----------
     kernel : (n, n)
         As `kernel_of` gives it.
-    codes : (n,)
+    y : (n,)
         Number of the label of each example.
     training : (n,) bool
         Which examples are trained on.
@@ -114,7 +114,7 @@ def pair_decisions(kernel: Kernel, codes: Codes, training: Mask, box_constraint:
     known = kernel.take(rows, axis=0)
     svc = SVC(C=box_constraint, kernel='precomputed', tol=TOLERANCE, cache_size=CACHE_MB)
     with config_context(assume_finite=True, skip_parameter_validation=True):  # a tenth of the time
-        svc.fit(known.take(rows, axis=1).astype(np.float64), codes[rows])
+        svc.fit(known.take(rows, axis=1).astype(np.float64), y[rows])
     coefficients, intercepts = _pair_coefficients(svc)
     # Zeros for what is no support vector: leaving rows of the kernel out would take longer.
     every = np.zeros((len(rows), coefficients.shape[1]), dtype=np.float32)

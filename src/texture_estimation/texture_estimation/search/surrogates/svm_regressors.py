@@ -13,16 +13,16 @@ from texture_estimation.search.surrogates.regressor_surrogate import GradesOfHal
 from texture_estimation.search.surrogates.svm_pairs import CACHE_MB, TOLERANCE, kernel_of
 
 
-def svm5(regressor: Svm5, values: Array, grades: Array, textures: Codes) -> GradesOfHalf:
+def svm5(regressor: Svm5, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
     """Return a scorer with one SVM per grade, standardised over all examples as in `svm_pairs`.
 
     Parameters
     ----------
     regressor
         Regressor of the recipe.
-    values : (n, n_features)
+    X : (n, n_features)
         Features of all examples.
-    grades, textures : (n,)
+    y, groups : (n,)
         Grade and number of the texture of each.
 
     Returns
@@ -32,8 +32,8 @@ def svm5(regressor: Svm5, values: Array, grades: Array, textures: Codes) -> Grad
     """
     from sklearn.svm import SVC  # noqa: PLC0415  # takes a second
 
-    kernel = kernel_of(values, regressor.kernel_scale)
-    members = grade_membership(grades).T
+    kernel = kernel_of(X, regressor.kernel_scale)
+    members = grade_membership(y).T
 
     def graded(training: Mask) -> Array:
         rows = np.flatnonzero(training)
