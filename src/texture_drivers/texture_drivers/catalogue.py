@@ -7,6 +7,7 @@ from functools import partial
 from typing import Protocol
 
 from texture_core.protocols import Sensor
+from texture_drivers.anyskin.sensor import anyskin
 from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.biotac.tables import LAYOUTS as BIOTACS
 from texture_drivers.daq.sensor import daq
@@ -34,5 +35,6 @@ SENSORS: Mapping[str, MakeSensor] = {
     'biotac_hand': partial(BioTac, fingers=(0, 1, 2)),  # all places of a board; topics finger0/signal and so on
     'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
     'pvdf': Pvdf,  # PVDF film and force sensor, Hu et al. 2014
+    'anyskin': anyskin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
     'file': FilePlayer,  # a recording: CSV, WAV, NumPy
 }

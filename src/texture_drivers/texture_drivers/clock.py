@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 NANOSECONDS = 1_000_000_000
+PPM = 1e6
+SLOW_CLOCK = 'device clock slow by [ppm]'  # name of the drift among the details of a sensor
 BINS = 64
 FIRST_BIN_NS = 20e6
 

@@ -18,7 +18,7 @@ from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecoder
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.block_counter import BlockCounter
-from texture_drivers.clock import StreamClock
+from texture_drivers.clock import PPM, SLOW_CLOCK, StreamClock
 
 VERSION = 1
 SAMPLE = np.dtype('<i2')
@@ -104,6 +104,36 @@ class StreamDecoder:
         self._time = CounterUnwrapper(TIME_BITS)
         self._latest_us: dict[int, int] = {}  # time of the last block of each kind
         self._newest_us = 0
+
+    @property
+    def valid_frames(self) -> int:
+        """Frames that passed the checksum, of any kind."""
+        return self.deframer.frames
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals: samples published and lost, frames refused or passed over, and new beginnings."""
+        trackers = self.trackers.values()
+        return {
+            'samples': sum(tracker.samples for tracker in trackers),
+            'lost': sum(tracker.lost for tracker in trackers),
+            'left out by the device': sum(tracker.overrun for tracker in trackers),
+            'bogus': self.deframer.bad_frames + self.malformed,
+            'repeated frames': self.deframer.repeated,
+            'other frames': self.other_frames,
+            'device restarts': self.restarts,
+            'clock_steps': self.clock.steps,
+        }
+
+    @property
+    def details(self) -> Mapping[str, float]:
+        """How much the device's clock is slow."""
+        return {SLOW_CLOCK: PPM * self.clock.drift}
+
+    @property
+    def rates_hz(self) -> Mapping[str, float]:
+        """Nominal rate of each topic."""
+        return {tracker.stream.topic: tracker.stream.rate_hz for tracker in self.trackers.values()}
 
     def restart(self) -> None:
         """Go on after an interruption, with the index that the host's clock will tell."""

@@ -14,6 +14,7 @@ from texture_core.signal import NANOSECONDS
 from texture_drivers.biotac.tables import LAYOUTS
 from texture_drivers.tsf85.tables import LAYOUTS as TSF85S
 from texture_drivers.tsf85.tables import RATE_HZ
+from texture_simulation.devices.anyskin import EmulatedAnySkin
 from texture_simulation.devices.biotac import EmulatedBioTac
 from texture_simulation.devices.daq import EmulatedDaq
 from texture_simulation.devices.device import EmulatedDevice
@@ -21,7 +22,7 @@ from texture_simulation.devices.pvdf import EmulatedPvdf
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 from texture_simulation.finger_track import FingerTrack
 from texture_simulation.scene import Scene
-from texture_simulation.sensors import biotac, daq, pvdf, tsf85
+from texture_simulation.sensors import anyskin, biotac, daq, pvdf, tsf85
 from texture_simulation.skin_contact import SkinContact
 from texture_simulation.surfaces.surface import Surface
 from texture_simulation.trajectory import Trajectory
@@ -236,6 +237,31 @@ def live_pvdf(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Gen
     )
 
 
+def live_anyskin(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return an AnySkin.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    """
+    model, device = anyskin.AnySkinModel(scene, surface, rng), EmulatedAnySkin(link, rng)
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.sample(model.advance(path)),
+        device.skip,
+        rate_hz=anyskin.RATE_HZ,
+        points=anyskin.OVERSAMPLING,
+    )
+
+
 MakeLiveSensor = Callable[[Scene, Surface, FilePath, np.random.Generator], LiveSensor]
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'tsf85': live_tsf85,
@@ -243,4 +269,5 @@ LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'biotac': live_biotac,
     'daq': live_daq,
     'pvdf': live_pvdf,
+    'anyskin': live_anyskin,
 }

@@ -100,6 +100,12 @@ def feed_pvdf(device: Any, first: int, ticks: int) -> None:
     device.sample((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16))
 
 
+def feed_anyskin(device: Any, first: int, ticks: int) -> None:
+    """Feed all axes alike."""
+    numbers = np.arange(first, first + ticks) % 30_000
+    device.sample(np.outer(numbers, np.ones(15)))
+
+
 def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
     """Return how a TSF-85 is fed."""
     imu = ('m/s²',) * 3 + ('rad/s',) * 3
@@ -128,6 +134,10 @@ CASES: Mapping[str, RigCase] = {
     'pvdf': RigCase(
         'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
         config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
+    ),
+    'anyskin': RigCase(
+        'signal', 250.0, 1, feed_anyskin, {'signal': 'µT', 'temperature': '°C'}, 30_000,
+        config='{rate_hz: 250.0, temperature: true}',
     ),
 }  # fmt: skip
 

@@ -18,7 +18,14 @@ from texture_simulation.scene import Scene
 FORCE_N = 2.0
 # What the vibration channel of a sensor model measures; see
 # `texture_features.segmentation.cell_power.MEASURED_QUANTITIES`.
-MEASURED_QUANTITIES = {'tsf85': 'change', 'tsf85_3x4': 'change', 'biotac': 'force', 'daq': 'force', 'pvdf': 'force'}
+MEASURED_QUANTITIES = {
+    'tsf85': 'change',
+    'tsf85_3x4': 'change',
+    'biotac': 'force',
+    'daq': 'force',
+    'pvdf': 'force',
+    'anyskin': 'force',
+}
 
 
 @dataclass(frozen=True)

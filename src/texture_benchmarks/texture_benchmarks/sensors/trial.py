@@ -11,8 +11,9 @@ import numpy as np
 
 from texture_core.catalogue import find
 from texture_core.framing import Frame, FrameDecoder
+from texture_drivers.anyskin.protocol import FrameParser
 from texture_drivers.tsf85.protocol import Packet, PacketParser
-from texture_simulation.devices import daq, pvdf
+from texture_simulation.devices import anyskin, daq, pvdf
 from texture_simulation.devices.biotac_encoder import encode_replies, reply_frame
 from texture_simulation.devices.faults import ByteFaults
 from texture_simulation.devices.sampler import MICROSECONDS, SampledStream, encode
@@ -20,6 +21,7 @@ from texture_simulation.devices.tsf85_encoder import TAXELS, Tsf85Encoder
 
 MILLISECONDS_PER_IMAGE = 16
 BIOTAC_SLOTS, BIOTAC_FRAME_US = 44, 10_000
+FIELD_UT = 1000.0  # spread of the field of an AnySkin
 CHUNK_BYTES = 512  # as a driver reads: the parser sees no more at once
 
 
@@ -27,9 +29,9 @@ CHUNK_BYTES = 512  # as a driver reads: the parser sees no more at once
 class LinkStatistics:
     """What came of the packets that were sent.
 
-    `false_packets` are accepted packets that were never sent. A checksum refuses them all. The TSF-85 has none: with
-    bytes lost or added, the strict walk can refuse them; a changed value byte inside an intact packet cannot be seen by
-    anyone.
+    `false_packets` are accepted packets that were never sent. A checksum refuses them all. The TSF-85 and the AnySkin
+    have none: with bytes lost or added, strict parsers can refuse them; a changed value byte inside an intact packet
+    cannot be seen by anyone, unless it leaves the range.
     """
 
     sent: int
@@ -84,6 +86,22 @@ class FrameReceiver:
     def refused(self) -> int:
         """Frames that failed the check."""
         return self._deframer.bad_frames
+
+
+class AnySkinReceiver:
+    """The AnySkin's parser."""
+
+    def __init__(self) -> None:
+        self._parser = FrameParser()
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Return the values of each frame, as bytes."""
+        return [values.tobytes() for run in self._parser.feed(data) for values in run.values]
+
+    @property
+    def refused(self) -> int:
+        """Frames that did not fit while it was certain where they begin."""
+        return self._parser.refused
 
 
 @dataclass(frozen=True)
@@ -143,6 +161,12 @@ def _biotac(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
         yield reply_frame(number, number * BIOTAC_FRAME_US, values[number], reply.tobytes())
 
 
+def _anyskin(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
+    """Yield frames of five magnetometers."""
+    axes = 3 * anyskin.MAGNETOMETERS
+    yield from anyskin.encode(rng.normal(0.0, FIELD_UT, (n_packets, axes)))
+
+
 def _sampled(stream: SampledStream) -> Callable[[np.random.Generator, int], Iterator[bytes]]:
     """Return what yields frames of a stream."""
 
@@ -160,5 +184,6 @@ PROTOCOLS: Mapping[str, ProtocolUnderTest] = {
     'biotac': ProtocolUnderTest(_biotac, FrameReceiver),
     'daq': ProtocolUnderTest(_sampled(daq.STREAM), FrameReceiver),
     'pvdf': ProtocolUnderTest(_sampled(pvdf.FILM), FrameReceiver),
+    'anyskin': ProtocolUnderTest(_anyskin, AnySkinReceiver),
 }
 CHECKSUMMED = frozenset({'biotac', 'daq', 'pvdf'})  # lines with a checksum

@@ -12,10 +12,10 @@ from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
 from texture_core.plain_data import safe_repr
 from texture_drivers.daq import tables
-from texture_drivers.framed_sensor import FramedSensor
 from texture_drivers.params import SensorParams
+from texture_drivers.serial_sensor import SerialSensor
 from texture_drivers.settings import read_settings
-from texture_drivers.stream_decoder import FramedStream
+from texture_drivers.stream_decoder import FramedStream, StreamDecoder
 
 DEFAULT_SETTINGS = 'daq'
 
@@ -49,10 +49,11 @@ class DaqSettings:
     )
 
 
-def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> FramedSensor:
+def daq(params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> SerialSensor:
     """Return the sensor; its settings are `config/sensors/daq.yaml` unless `params.config` says otherwise."""
     settings, channels = load_daq(params.config or DEFAULT_SETTINGS)
-    return FramedSensor(params, now_ns, [stream(settings.rate_hz, channels)], settings.baud)
+    decoder = StreamDecoder([stream(settings.rate_hz, channels)], params.frame_id)
+    return SerialSensor(params, now_ns, decoder, baud=settings.baud)
 
 
 def load_daq(config: str) -> tuple[DaqSettings, list[DaqChannel]]:

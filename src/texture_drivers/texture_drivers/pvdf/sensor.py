@@ -10,12 +10,12 @@ import numpy as np
 
 from texture_core.parameters import param
 from texture_core.signal import TactileSignal
-from texture_drivers.framed_sensor import FramedSensor
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf import tables
 from texture_drivers.pvdf.charge_leak import ChargeLeak, ForceReconstructor
+from texture_drivers.serial_sensor import SerialSensor
 from texture_drivers.settings import load_settings
-from texture_drivers.stream_decoder import FramedStream
+from texture_drivers.stream_decoder import FramedStream, StreamDecoder
 
 COULOMB_PC = 1e12
 
@@ -126,7 +126,8 @@ class Pvdf:
 
     def __init__(self, params: SensorParams, now_ns: Callable[[], int] = time.time_ns) -> None:
         settings = load_settings(PvdfSettings, params.config)
-        self._line = FramedSensor(params, now_ns, settings.streams(), settings.baud)
+        decoder = StreamDecoder(settings.streams(), params.frame_id)
+        self._line = SerialSensor(params, now_ns, decoder, baud=settings.baud)
         self._reconstructor = settings.reconstructor()
         self._next_sample = 0
 
@@ -148,7 +149,7 @@ class Pvdf:
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """Totals; see `FramedSensor.counts`."""
+        """Totals; see `StreamDecoder.counts`."""
         return self._line.counts
 
     @property

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from texture_simulation.devices.anyskin import EmulatedAnySkin
 from texture_simulation.devices.biotac import EmulatedBioTac
 from texture_simulation.devices.daq import EmulatedDaq
 from texture_simulation.devices.device import EmulatedDevice
@@ -23,4 +24,5 @@ DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
     'biotac_hand': partial(EmulatedBioTac, serials=('BT-0', 'BT-1', 'BT-2')),
     'daq': EmulatedDaq,
     'pvdf': EmulatedPvdf,
+    'anyskin': EmulatedAnySkin,
 }

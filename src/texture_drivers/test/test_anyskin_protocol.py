@@ -1,0 +1,122 @@
+"""The AnySkin's frames, which have neither header nor checksum."""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from texture_drivers.anyskin.protocol import FrameParser
+
+SIZE = 82
+
+
+def frame(number: float, temperature_c: float = 30.0) -> bytes:
+    """A frame whose first axis holds a number."""
+    values = [temperature_c, 100.0 + number, -200.0, 300.0]
+    return struct.pack('<4f', *values) + struct.pack('<4f', temperature_c, 5.0, 6.0, 7.0) * 4 + b'\r\n'
+
+
+def stream(numbers: range) -> bytes:
+    return b''.join(frame(number) for number in numbers)
+
+
+def parsed(*pieces: bytes) -> tuple[list[float], list[int], FrameParser]:
+    """Return the numbers of all frames, what is missing before each run, and the parser."""
+    parser = FrameParser()
+    runs = [run for piece in pieces for run in parser.feed(piece)]
+    numbers = [float(value) - 100.0 for run in runs for value in run.values[:, 0, 1]]
+    return numbers, [run.missing for run in runs], parser
+
+
+def test_a_frame_of_the_manual_s_layout_gives_its_values() -> None:
+    assert len(frame(0)) == SIZE
+    runs = FrameParser().feed(stream(range(3)))
+    assert runs[0].values.shape == (3, 5, 4)
+    np.testing.assert_allclose(runs[0].values[0, 0], [30.0, 100.0, -200.0, 300.0])
+    np.testing.assert_allclose(runs[0].values[0, 4], [30.0, 5.0, 6.0, 7.0])
+
+
+@pytest.mark.parametrize('first', [0, 1, 40, 80, 81])
+def test_opened_within_a_frame_it_begins_with_the_next(first: int) -> None:
+    numbers, _, parser = parsed(stream(range(10))[first:])
+    assert numbers == list(range(1 if first else 0, 10))
+    assert parser.refused_bytes == (SIZE - first if first else 0)
+
+
+def test_nothing_is_believed_before_three_frames_in_a_row() -> None:
+    parser = FrameParser()
+    assert parser.feed(stream(range(2))) == []
+    assert len(parser.feed(stream(range(2, 3)))[0].values) == 3
+
+
+@given(st.lists(st.integers(1, 200), max_size=30))
+@settings(deadline=None)
+def test_it_does_not_matter_how_the_bytes_are_cut(lengths: list[int]) -> None:
+    whole = stream(range(12))[17:]
+    cuts = np.cumsum([0, *lengths])
+    pieces = [whole[a:b] for a, b in zip(cuts, [*cuts[1:], None], strict=True)]
+    assert parsed(*pieces)[0] == parsed(whole)[0] == list(range(1, 12))
+
+
+@pytest.mark.parametrize('at', [*range(0, SIZE, 7), 80, 81])
+def test_a_lost_byte_costs_its_frame_and_is_counted(at: int) -> None:
+    damaged = frame(4)[:at] + frame(4)[at + 1 :]
+    numbers, missing, parser = parsed(stream(range(4)) + damaged + stream(range(5, 12)))
+    assert len(numbers) == 11
+    assert set(range(12)) - set(numbers) <= {4, 5}  # a lost end may leave the values of its frame whole
+    assert sum(missing) == 1
+    assert parser.refused == 1
+
+
+@pytest.mark.parametrize('at', [0, 3, 50, 80, 81])
+@pytest.mark.parametrize('more', [b'\x00', b'\xff\r', b'\r\n'])
+def test_added_bytes_cost_their_frame_and_are_counted(at: int, more: bytes) -> None:
+    damaged = frame(4)[:at] + more + frame(4)[at:]
+    numbers, missing, _ = parsed(stream(range(4)) + damaged + stream(range(5, 12)))
+    assert set(range(12)) - set(numbers) <= {4, 5}
+    assert set(numbers) <= set(range(12))
+    assert len(numbers) + sum(missing) == 12
+
+
+@pytest.mark.parametrize('value', [float('nan'), float('inf'), 60_000.0, 1e-20])
+def test_a_value_that_no_magnetometer_measures_refuses_its_frame(value: float) -> None:
+    impossible = frame(4)[:4] + struct.pack('<f', value) + frame(4)[8:]
+    numbers, missing, parser = parsed(stream(range(4)) + impossible + stream(range(5, 9)))
+    assert numbers == [0, 1, 2, 3, 5, 6, 7, 8]
+    assert (sum(missing), parser.refused) == (1, 1)
+
+
+def test_an_impossible_temperature_refuses_its_frame() -> None:
+    assert 4 not in parsed(stream(range(4)) + frame(4, 120.0) + stream(range(5, 9)))[0]
+
+
+def test_line_ends_within_the_values_do_not_begin_a_frame() -> None:
+    """Shifted by whole values, all but the one that holds the real end of the frame would be possible."""
+    tricky = struct.unpack('<f', b'\r\n\xc8\x41')[0]
+    one = struct.pack('<4f', 30.0, tricky, tricky, tricky) * 5 + b'\r\n'
+    for first in range(SIZE):
+        parser = FrameParser()
+        runs = parser.feed((one * 12)[first:])
+        assert {value.tobytes() + b'\r\n' for run in runs for value in run.values} == {one}
+
+
+def test_noise_yields_nothing_and_is_not_kept() -> None:
+    parser = FrameParser()
+    noise = np.random.default_rng(0).integers(0, 256, 200_000, dtype=np.uint8).tobytes()
+    assert parser.feed(noise) == []
+    assert len(parser._buffer) < 3 * SIZE
+
+
+def test_after_a_restart_what_was_missing_is_not_told() -> None:
+    parser = FrameParser()
+    parser.feed(stream(range(5)))
+    parser.restart()
+    assert [run.missing for run in parser.feed(stream(range(50, 55))[10:])] == [0]
+
+
+def test_a_board_with_other_magnetometers_is_not_understood() -> None:
+    assert FrameParser(4).feed(stream(range(20))) == []

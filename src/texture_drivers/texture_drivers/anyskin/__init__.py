@@ -1,0 +1,1 @@
+"""AnySkin and ReSkin, magnetic skins over magnetometers."""
