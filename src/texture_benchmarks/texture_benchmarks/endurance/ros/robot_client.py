@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
-from types import TracebackType
 
-from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
+from texture_benchmarks.endurance.ros.listener import Listener
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.ros.conversions import from_msg
 from texture_core.ros.qos import STATE_QOS
@@ -20,7 +16,7 @@ from texture_core.ros.qos import STATE_QOS
 POLL_S = 0.01
 
 
-class RobotClient:
+class RobotClient(Listener):
     """Listen to the states of the explorer in a thread of its own, and call its services; use it in a `with` block.
 
     Parameters
@@ -32,25 +28,10 @@ class RobotClient:
     def __init__(self, domain_id: int) -> None:
         self._slides_ns: dict[str, tuple[int, int]] = {}  # first and last stamp of the phase SLIDE, by exploration
         self._sliding = threading.Event()
-        self._context = Context()
-        self._context.init(domain_id=domain_id)
-        node = self._node = Node('robot_client', context=self._context, enable_rosout=False)
+        super().__init__('robot_client', domain_id, enable_rosout=False)
+        node = self.node
         node.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         self._services = {name: node.create_client(Trigger, name) for name in ('recover', 'reboot')}
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(node)
-        self._thread = threading.Thread(target=self._spin, name='robot client', daemon=True)
-
-    def __enter__(self) -> RobotClient:
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._context.try_shutdown()
-        self._thread.join()
-        self._node.destroy_node()
 
     def begin(self) -> None:
         """Wait for the next slide from now on."""
@@ -81,10 +62,6 @@ class RobotClient:
             time.sleep(POLL_S)
         answer = future.result()
         return bool(answer.success), str(answer.message)
-
-    def _spin(self) -> None:
-        with contextlib.suppress(ExternalShutdownException):
-            self._executor.spin()
 
     def _on_state(self, message: msg.ExplorationState) -> None:
         state: ExplorationState = from_msg(message)

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
-import threading
 import time
 from collections import Counter, defaultdict
-from types import TracebackType
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Log
-from rclpy.context import Context
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from texture_msgs import msg
 
 from texture_benchmarks.endurance.accounting import COUNTERS, AnswerAccount, SampleAccount, Totals
+from texture_benchmarks.endurance.ros.listener import Listener
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS
 from texture_core.ros.time import to_ns
 
@@ -28,7 +23,7 @@ SIGNAL_QOS = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
 LOG_QOS = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
-class Watcher:
+class Watcher(Listener):
     """Keep books about the nodes of one domain, in a thread of its own; use it in a `with` block.
 
     Attributes
@@ -48,32 +43,13 @@ class Watcher:
         self.totals: defaultdict[str, Totals] = defaultdict(Totals)
         self.said: Counter[tuple[str, str, str]] = Counter()
         self.received_s: dict[str, float] = {}
-        self._context = Context()
-        self._context.init(domain_id=domain_id)
-        node = self._node = Node('watcher', context=self._context)
+        super().__init__('watcher', domain_id)
+        node = self.node
         node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 100)
         node.create_subscription(Log, '/rosout', self._on_log, LOG_QOS)
         node.create_subscription(msg.TactileSignal, 'signal', self._on_signal, SIGNAL_QOS)
         node.create_subscription(msg.FeatureVector, 'features', self._on_vector, FEATURE_QOS)
         node.create_subscription(msg.TextureEstimate, 'texture', self._on_estimate, ESTIMATE_QOS)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(node)
-        self._thread = threading.Thread(target=self._spin, name='watcher', daemon=True)
-
-    def __enter__(self) -> Watcher:
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._context.try_shutdown()
-        self._thread.join()
-        self._node.destroy_node()
-
-    def _spin(self) -> None:
-        with contextlib.suppress(ExternalShutdownException):
-            self._executor.spin()
 
     def _on_diagnostics(self, array: DiagnosticArray) -> None:
         for status in array.status:
