@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.genetic_search import Generation, SearchParams
-from texture_estimation.search.labelled_windows import LabelledWindows
+from texture_estimation.search.labelled_windows import Cut, LabelledWindows
 from texture_estimation.search.optimise import Finalist, SearchResult, optimise
 from texture_estimation.search.pairs import PairSearchResult, beside, optimise_pairs
 from texture_estimation.search.parallel import ParallelMap, dask_map, threaded_map
@@ -95,27 +96,22 @@ class Written:
     lines: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class BagSlides:
-    """The labelled slides of a data set; called with window parameters it gives their windows."""
+def cut_of(dataset: SlideDataset, feature_set: FeatureSet) -> Cut:
+    """Return what gives the windows of all slides, by window parameters; each length is cut once."""
 
-    dataset: SlideDataset
-    feature_set: FeatureSet
-    _known: dict[WindowParams, LabelledWindows] = field(default_factory=dict, repr=False)
+    @cache
+    def cut(windows: WindowParams) -> LabelledWindows:
+        plan = replace(feature_set, windows=windows, _layouts={})
+        # Unlike ids of explorations, names of slides are unique over all bags.
+        named = (
+            replace(event, exploration_id=slide.name)
+            for slide, events in dataset.windows(plan)
+            for event in events
+            if isinstance(event, CutWindow)
+        )
+        return LabelledWindows.from_events(named, feature_set.topics)
 
-    def __call__(self, windows: WindowParams) -> LabelledWindows:
-        """Return the windows of all slides; each length is cut once."""
-        if windows not in self._known:
-            self._known[windows] = LabelledWindows.from_events(self._events(windows), self.feature_set.topics)
-        return self._known[windows]
-
-    def _events(self, windows: WindowParams) -> Iterator[CutWindow]:
-        plan = replace(self.feature_set, windows=windows, _layouts={})
-        for slide, events in self.dataset.windows(plan):
-            for event in events:
-                if isinstance(event, CutWindow):
-                    # unlike ids of explorations, names of slides are unique over all bags
-                    yield replace(event, exploration_id=slide.name)
+    return cut
 
 
 def optimise_from_bags(
@@ -164,7 +160,7 @@ def optimise_from_bags(
     space = _space(wanted)
     feature_set = space.base.feature_set
     dataset = SlideDataset.from_bags(wanted.bags, wanted.slides, topics=feature_set.topics)
-    search_slides = SearchSlides(BagSlides(dataset, feature_set), params.halves, params.seed)
+    search_slides = SearchSlides(cut_of(dataset, feature_set), params.halves, params.seed)
     checkpoint = checkpoint_of(target)
     if resume and not _checkpoints(checkpoint):
         raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to start again")

@@ -7,7 +7,7 @@ from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_recordings.bag_writer import BagWriter
-from texture_recordings.slides import find_slides, parse_selection, read_labelled_slides
+from texture_recordings.slides import STREAMS, find_slides, parse_selection
 
 
 def write(path: Path, surfaces: list[str], start_s: int) -> Path:
@@ -53,7 +53,7 @@ def test_slides_are_counted_for_each_surface_in_the_order_recorded_over_all_bags
 
 def test_a_slide_yields_its_own_messages_only(tmp_path: Path) -> None:
     bags = [write(tmp_path / name, ['cork', 'felt', 'cork'], start_s=0) for name in 'ab']
-    read = read_labelled_slides(bags, '1,3')
+    read = find_slides(bags, '1,3', topics=STREAMS)
     assert len(read) == 3
     for slide in read:
         assert list(slide.signals) == ['signal']

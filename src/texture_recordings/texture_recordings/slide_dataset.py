@@ -21,7 +21,7 @@ from texture_features.labelled_features import LabelledFeatures
 from texture_features.windowing.windows import WindowEvent, WindowParams, cut_recording
 from texture_recordings.motion_of_states import motion_made
 from texture_recordings.slide_samples import SlideSamples
-from texture_recordings.slides import STREAMS, LabelledSlide, number_slides, parse_selection, read_labelled_slides
+from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, number_slides, parse_selection
 
 if TYPE_CHECKING:  # which needs scipy: reading, selecting and exporting do not
     from texture_features.augmentation.augmentation import Augmentation
@@ -76,30 +76,8 @@ class SlideDataset:
         namespace: str | None = None,
         topics: Sequence[str] = STREAMS,
     ) -> SlideDataset:
-        """Read the labelled slides of bags; each bag is read once.
-
-        Parameters
-        ----------
-        bags
-            Bags, or folders of bags.
-        slides
-            Slides of each surface to keep, such as '1-30', counted from 1 in the order recorded; '' keeps all.
-        namespace
-            Namespace of the finger, if bags hold several.
-        topics
-            Signals to read.
-
-        Returns
-        -------
-        SlideDataset
-            By bag and time.
-
-        Raises
-        ------
-        InvalidData
-            If a bag cannot be read, no slide is labelled, or none has a number asked for.
-        """
-        return cls(tuple(read_labelled_slides(bags, slides, namespace, topics)))
+        """Read the labelled slides of bags with their signals; see `find_slides` for the arguments and errors."""
+        return cls(tuple(find_slides(bags, slides, namespace, topics)))
 
     @classmethod
     def from_arrays(

@@ -130,37 +130,12 @@ def parse_selection(text: str) -> frozenset[int] | None:
     return frozenset(numbers)
 
 
-def find_slides(bags: Iterable[str | Path], slides: str = '', namespace: str | None = None) -> list[LabelledSlide]:
-    """Return the labelled slides in bags that `slides` names ('' for all), by bag and time, without signals.
+def find_slides(
+    bags: Iterable[str | Path], slides: str = '', namespace: str | None = None, topics: Sequence[str] = ()
+) -> list[LabelledSlide]:
+    """Return the labelled slides in bags, by bag and time, with the signals of topics; each bag is read once.
 
     Slides are counted for each surface by itself, over all the bags, in the order in which they were recorded.
-
-    Parameters
-    ----------
-    bags
-        Bags, or folders of bags.
-    slides
-        Slides of each surface to keep, such as '1-30'; '' keeps all.
-    namespace
-        Namespace of the finger, if bags hold several.
-
-    Returns
-    -------
-    list of LabelledSlide
-        With empty signals.
-
-    Raises
-    ------
-    InvalidData
-        If a bag cannot be read, no slide is labelled, or none has a number asked for.
-    """
-    return read_labelled_slides(bags, slides, namespace, ())
-
-
-def read_labelled_slides(
-    bags: Iterable[str | Path], slides: str = '', namespace: str | None = None, topics: Sequence[str] = STREAMS
-) -> list[LabelledSlide]:
-    """Return the labelled slides in bags with their states and signals; each bag is read once.
 
     Parameters
     ----------
@@ -171,12 +146,7 @@ def read_labelled_slides(
     namespace
         Namespace of the finger, if bags hold several.
     topics
-        Signals to read.
-
-    Returns
-    -------
-    list of LabelledSlide
-        By bag and time.
+        Signals to read; none by default.
 
     Raises
     ------
