@@ -21,6 +21,7 @@ lint: setup
 	@$(RUN) ruff format --check .
 	@$(RUN) mypy
 	@$(RUN) python tools/check_terms.py
+	@$(RUN) python tools/check_docstrings.py
 
 test: setup lint
 	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile -m "not realtime" --doctest-modules

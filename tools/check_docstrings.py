@@ -226,8 +226,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument('folder', type=Path, nargs='?', default=ROOT / 'src', help='source tree to check')
     folder = parser.parse_args().folder
-    found = check(folder) + check_examples(folder)
-    print('\n'.join(found) or 'all docstrings and examples are there')
+    found = check(folder)
+    print('\n'.join(found) or 'all docstrings say what a caller needs')
     return 1 if found else 0
 
 

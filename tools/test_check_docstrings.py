@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from check_docstrings import check, classes_without_example
+from check_docstrings import ROOT, check, classes_without_example
 
 HEAD = 'from numpy.typing import NDArray\n\n'
 
@@ -67,3 +67,7 @@ def test_a_class_without_a_doctest_is_found_unless_another_one_shows_it(tmp_path
         'class _Own:\n    """One."""\n'
     )
     assert classes_without_example(module) == ['Named']
+
+
+def test_every_docstring_of_the_repository_says_what_a_caller_needs() -> None:
+    assert not check(ROOT / 'src')

@@ -19,6 +19,22 @@ def imported(
 ) -> Iterator[list[Path]]:
     """Give the bags of a data set, or of a part of it, to a `with` block.
 
+    Parameters
+    ----------
+    options
+        Where the data sets lie.
+    name
+        Name of the data set.
+    slides
+        Slides of each surface, such as '1-30'; '' for all.
+    materials
+        Surfaces; none for all.
+
+    Yields
+    ------
+    list of Path
+        Bags that are removed afterwards.
+
     Raises
     ------
     InvalidData

@@ -51,7 +51,22 @@ def run_all(names: Sequence[str], act: Act) -> dict[str, int]:
 
 
 def in_processes(names: Sequence[str], act: Act, at_once: int) -> dict[str, int]:
-    """Run the act for each name in a process, so many at once; return the exit codes, below 0 of what was killed."""
+    """Run the act for each name in a process, so many at once; return the exit codes, below 0 of what was killed.
+
+    Parameters
+    ----------
+    names
+        Names of the benchmarks.
+    act
+        What each process does.
+    at_once
+        Number of processes at one time.
+
+    Returns
+    -------
+    dict
+        Exit code of each name.
+    """
     context = multiprocessing.get_context('fork')  # nothing is imported again
     waiting, codes = list(names), {}
     running: dict[object, tuple[str, BaseProcess]] = {}

@@ -73,6 +73,6 @@ def make_drag(friction: Any, rate_hz: float, rng: np.random.Generator, batch_sha
     Returns
     -------
     Drag
-        At rest before the first point.
+        Follows the path from its first point on.
     """
     return DRAGS[type(friction)](friction, rate_hz, rng, batch_shape)

@@ -185,7 +185,7 @@ def lines_hz(surface: Surface, speed_m_s: float, direction_rad: float) -> list[f
     Returns
     -------
     list of float
-        Hz, one for each term with ridges.
+        Hz, rising, each once.
     """
     waves = [wave for term in surface.terms for wave in WAVES.get(type(term), _no_waves)(term)]
     lines = [speed_m_s * abs(math.cos(angle - direction_rad)) / pitch for pitch, angle in waves]

@@ -34,7 +34,28 @@ def simulate_clock_errors(
     drift: float = 50e-6,
     jitter_s: float = 5e-3,
 ) -> ClockErrors:
-    """Return the errors of stamping a stream whose batches arrive late by an exponential delay of mean `jitter_s`."""
+    """Return the errors of stamping a stream whose batches arrive late by an exponential delay of mean `jitter_s`.
+
+    Parameters
+    ----------
+    rng
+        Random numbers of the delays.
+    duration_s
+        Length of the stream.
+    rate_hz
+        Sampling rate.
+    batch
+        Samples of a batch.
+    drift
+        Relative error of the rate of the sensor's clock.
+    jitter_s
+        Mean delay of a batch.
+
+    Returns
+    -------
+    ClockErrors
+        Errors of the stamps over time, s.
+    """
     last: AnyArray = np.arange(1, int(duration_s * rate_hz / batch) + 1) * batch - 1
     period_s = (1 + drift) / rate_hz
     # A line delivers in order: who is late holds up all behind.

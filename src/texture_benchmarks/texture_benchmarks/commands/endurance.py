@@ -38,7 +38,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run, report, and return 1 if something did not hold."""
+    """Run, report, and return 1 if something did not hold.
+
+    Raises
+    ------
+    InvalidData
+        If the folder of the report cannot be used.
+    """
     try:
         options.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -62,7 +62,19 @@ class SampleAccount:
         self._end_ns = 0
 
     def update(self, first_sample: int, count: int, stamp_ns: int, rate_hz: float) -> None:
-        """Take note of a batch."""
+        """Take note of a batch.
+
+        Parameters
+        ----------
+        first_sample
+            Running index of the first sample.
+        count
+            Number of samples.
+        stamp_ns
+            Time of the first sample.
+        rate_hz
+            Sampling rate.
+        """
         if self._first is not None and first_sample < self._next_sample:
             self.restarts += 1
             self.away_s += (stamp_ns - self._end_ns) / NANOSECONDS

@@ -90,7 +90,20 @@ class FaultEvent:
 
 
 def in_force(fault_events: Sequence[FaultEvent], begin_s: float, end_s: float) -> tuple[str, ...]:
-    """Return the faults that were measured in a stretch of time."""
+    """Return the faults that were measured in a stretch of time.
+
+    Parameters
+    ----------
+    fault_events
+        Faults with their times.
+    begin_s, end_s
+        Limits of the stretch, on the clock of the faults.
+
+    Returns
+    -------
+    tuple of str
+        Name of each fault.
+    """
     return tuple(
         item.name
         for item in fault_events

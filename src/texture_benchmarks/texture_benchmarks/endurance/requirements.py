@@ -77,7 +77,18 @@ def lives(usages: Sequence[ProcessUsage]) -> list[ProcessMemory]:
 
 
 def cpu_shares(usages: Sequence[ProcessUsage]) -> Mapping[str, tuple[Array, Array]]:
-    """Return of each node times (s) and shares of a core used between two looks at the same process."""
+    """Return of each node times (s) and shares of a core used between two looks at the same process.
+
+    Parameters
+    ----------
+    usages
+        What each process used, in the order of time.
+
+    Returns
+    -------
+    mapping
+        Node → (n,) s and (n,) shares, 0 to 1 of a core.
+    """
     points: dict[str, list[tuple[float, float]]] = {}
     for (node, _), own in by_process(usages).items():
         for before, after in pairwise(own):

@@ -240,6 +240,11 @@ def endure_robots(
         These sessions instead of random ones; the run ends with them.
     keep
         Is given what happened so far after each session, so that nothing is lost with this process.
+
+    Returns
+    -------
+    RobotRecord
+        All sessions.
     """
     begin_s = time.monotonic()
     explorations: list[RobotExploration] = []

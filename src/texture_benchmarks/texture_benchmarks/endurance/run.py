@@ -176,6 +176,11 @@ def endure(
         Is told now and then how it goes.
     faults
         These faults instead of random ones; the run ends when they are over.
+
+    Returns
+    -------
+    EnduranceRecord
+        Explorations, faults and usage.
     """
     with tempfile.TemporaryDirectory(prefix='texture_endurance_') as name, ExitStack() as stack:
         folder = Path(name)

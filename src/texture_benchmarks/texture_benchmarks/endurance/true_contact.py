@@ -52,6 +52,11 @@ def true_contact(fingers: Sequence[FingerState], slide_ns: tuple[int, int] | Non
         First and last time of the phase SLIDE on CLOCK_MONOTONIC; None if it was not reached.
     min_contact_n
         A lower true force is no contact.
+
+    Returns
+    -------
+    TrueContact
+        Force in N and the times without contact.
     """
     if not fingers:
         return NO_CONTACT

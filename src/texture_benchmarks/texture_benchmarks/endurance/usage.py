@@ -42,7 +42,21 @@ class ProcessUsage:
 
 
 def read_usage(node: str, pid: int, time_s: float) -> ProcessUsage | None:
-    """Return what a process uses now; None if it has ended."""
+    """Return what a process uses now; None if it has ended.
+
+    Parameters
+    ----------
+    node
+        Name that the usage bears.
+    pid
+        Number of the process.
+    time_s
+        Time that the usage bears.
+
+    Returns
+    -------
+    ProcessUsage or None
+    """
     folder = Path('/proc') / str(pid)
     try:
         status = (folder / 'status').read_text(encoding='ascii', errors='replace')

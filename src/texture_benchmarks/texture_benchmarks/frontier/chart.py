@@ -26,6 +26,15 @@ def early_chart(
         Mean seconds and shares at rising confidences, by name.
     rule
         Mean seconds and share of the stopping rule fitted with the model.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     with chart(path, (7.0, 4.6)) as figure:
         axes = figure.subplots()
@@ -49,6 +58,13 @@ def size_chart(
         What grows, 'windows' or 'labels' → learner → costs by size.
     fixed
         What is fixed meanwhile, in words.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     with chart(path, (10.0, 7.6)) as figure:
         figure.suptitle('What a training costs as it grows (made-up examples)', x=0.02, ha='left', fontweight='bold')

@@ -38,7 +38,24 @@ class Cost:
 
 
 def costs(learner: str, sizes: Sequence[TrainingSize], limit_s: float, seed: int) -> Mapping[TrainingSize, Cost]:
-    """Return the costs of rising sizes, up to the first that would take longer than the limit, in proportion."""
+    """Return the costs of rising sizes, up to the first that would take longer than the limit, in proportion.
+
+    Parameters
+    ----------
+    learner
+        Name of the learner.
+    sizes
+        Windows and labels of each training, rising.
+    limit_s
+        Longest training that is made.
+    seed
+        Seed of the examples.
+
+    Returns
+    -------
+    mapping
+        Cost of each training that was made.
+    """
     found: dict[TrainingSize, Cost] = {}
     before: TrainingSize | None = None
     for size in sizes:
@@ -50,7 +67,22 @@ def costs(learner: str, sizes: Sequence[TrainingSize], limit_s: float, seed: int
 
 
 def cost(learner: Learner, size: TrainingSize, seed: int) -> Cost:
-    """Return what one training on made-up examples costs."""
+    """Return what one training on made-up examples costs.
+
+    Parameters
+    ----------
+    learner
+        What is trained.
+    size
+        Windows and labels.
+    seed
+        Seed of the examples.
+
+    Returns
+    -------
+    Cost
+        Time in s and memory in MiB.
+    """
     context = multiprocessing.get_context('fork')
     here, there = context.Pipe()
     process = context.Process(target=_measure, args=(learner, size, seed, there))

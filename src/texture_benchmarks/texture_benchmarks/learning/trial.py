@@ -65,6 +65,15 @@ def run_incremental(
         Numbers of slides of each new label after which is tested, rising.
     path
         Where the model is saved, and its added slides with it.
+    new
+        Labels that are added.
+    last_training
+        Number of the last slide of a label that may be trained on.
+
+    Returns
+    -------
+    IncrementalRun
+        Accuracies at each stage.
     """
     numbers = np.array([int(group.rsplit('/', 1)[1].removeprefix('slide')) for group in examples.groups])
     is_new = np.isin(examples.labels, list(new))

@@ -89,13 +89,33 @@ def feed_biotac(slots: int, fingers: int) -> Feed:
 
 
 def feed_daq(device: Any, first: int, ticks: int) -> None:
-    """Feed all channels alike."""
+    """Feed all channels alike.
+
+    Parameters
+    ----------
+    device
+        Emulated device.
+    first
+        Number of the first tick.
+    ticks
+        How many.
+    """
     numbers = np.arange(first, first + ticks) % 30_000
     device.sample(np.outer(numbers, np.ones(8)).astype(np.int16))
 
 
 def feed_pvdf(device: Any, first: int, ticks: int) -> None:
-    """Feed the film, and the force with every 64th tick."""
+    """Feed the film, and the force with every 64th tick.
+
+    Parameters
+    ----------
+    device
+        Emulated device.
+    first
+        Number of the first tick.
+    ticks
+        How many.
+    """
     numbers = np.arange(first, first + ticks)
     device.sample((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16))
 
@@ -118,7 +138,21 @@ def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
 
 
 def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
-    """Return how a BioTac is fed."""
+    """Return how a BioTac is fed.
+
+    Parameters
+    ----------
+    prefix
+        What the topics begin with.
+    slots
+        Slots of a frame.
+    fingers
+        Number of BioTacs.
+
+    Returns
+    -------
+    RigCase
+    """
     units: dict[str, str | tuple[str, ...]] = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
     return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, slope=2)
 
@@ -226,7 +260,13 @@ class Rig:
             action()
 
     def read_s(self, seconds: float) -> dict[str, list[TactileSignal]]:
-        """Return, by topic, what comes until so many seconds of samples have; a device that is gone is opened again."""
+        """Return, by topic, what comes until so many seconds of samples have; a device that is gone is opened again.
+
+        Raises
+        ------
+        TimeoutError
+            If they do not come in time.
+        """
         topics: dict[str, list[TactileSignal]] = {}
         deadline_s = time.monotonic() + DEADLINE_S
         while sum(len(batch.samples) for batch in topics.get(self.case.topic, [])) < seconds * self.case.rate_hz:
@@ -250,7 +290,13 @@ class Rig:
         return {}
 
     def fault(self) -> str:
-        """Return the sentence with which reading ends."""
+        """Return the sentence with which reading ends.
+
+        Raises
+        ------
+        TimeoutError
+            If reading goes on.
+        """
         deadline_s = time.monotonic() + DEADLINE_S
         try:
             while time.monotonic() < deadline_s:
@@ -260,7 +306,18 @@ class Rig:
         raise TimeoutError(f'{self._name}: no error came')
 
     def offsets(self, batches: Sequence[TactileSignal]) -> AnyArray:
-        """Return what each finite sample holds less what its index asks for: constant if each is in its place."""
+        """Return what each finite sample holds less what its index asks for: constant if each is in its place.
+
+        Parameters
+        ----------
+        batches
+            Batches of one topic.
+
+        Returns
+        -------
+        (n,)
+            In counts.
+        """
         values = np.concatenate([batch.samples[:, 0] for batch in batches])
         indices = np.concatenate([np.arange(batch.first_sample, batch.next_sample) for batch in batches])
         offsets: AnyArray = (values - self.case.slope * indices) % self.case.modulus

@@ -79,7 +79,24 @@ def hazard_chart(
     targets: Mapping[str, float],
     path: str | Path,
 ) -> Path:
-    """Draw the overshoot over the stiffness, a line for each undeclared lag, and the highest force of each hazard."""
+    """Draw the overshoot over the stiffness, a line for each undeclared lag, and the highest force of each hazard.
+
+    Parameters
+    ----------
+    lags
+        Undeclared lag in s → stiffness in N/m → what came out.
+    hazards
+        Hazard → stiffness in N/m → what came out.
+    targets
+        Limits that are drawn, by their names.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(
         path, (11.0, 5.2), 'An arm without a force mode, 1 N at 0.05 m/s: undeclared lag, and hazards'
     ) as figure:
@@ -103,7 +120,22 @@ def hazard_chart(
 
 
 def robot_chart(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, float], path: str | Path) -> Path:
-    """Draw how each robot kept force, speed and circle over the stiffness; `robots` is as in the JSON of the bench."""
+    """Draw how each robot kept force, speed and circle over the stiffness; `robots` is as in the JSON of the bench.
+
+    Parameters
+    ----------
+    robots
+        Robot → figures by stiffness.
+    targets
+        Limits that are drawn, by their names.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(
         path, (9.0, 6.4), 'Flat surfaces, 1 N: straight at 0.05 m/s (the hand 0.02), circle of 20 mm at 0.1 m/s'
     ) as figure:
@@ -125,7 +157,22 @@ def robot_chart(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, f
 def surface_chart(
     surfaces: Mapping[str, Mapping[float, ForceControlMetrics]], targets: Mapping[str, float], path: str | Path
 ) -> Path:
-    """Draw force and speed errors over stiffness, a line for each surface."""
+    """Draw force and speed errors over stiffness, a line for each surface.
+
+    Parameters
+    ----------
+    surfaces
+        Surface → stiffness in N/m → what came out.
+    targets
+        Limits that are drawn, by their names.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (9.0, 4.4), 'An arm without a force mode over simulated surfaces: 1 N, 0.05 m/s') as figure:
         force, speed = figure.subplots(1, 2)
         for (name, trials), colour, marker in zip(surfaces.items(), COLOURS, MARKERS, strict=False):
@@ -155,6 +202,13 @@ def border_chart(border: Mapping[str, Array], chosen: Array, path: str | Path) -
         See `texture_exploration.stability.stability_chart`.
     chosen : (n_stiffnesses, n_delays)
         Gains in m/s/N.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     with chart(path, (8.0, 5.0)) as figure:
         axes = figure.subplots()

@@ -129,7 +129,23 @@ ROBOTS: Mapping[str, RobotUnderTest] = {
 
 
 def typical_trial(name: str, stiffness_n_m: float, request: ExplorationRequest, repeats: int) -> ForceControlMetrics:
-    """Return the median of each number of several trials, or one that failed: the machine may have been busy once."""
+    """Return the median of each number of several trials, or one that failed: the machine may have been busy once.
+
+    Parameters
+    ----------
+    name
+        Name of the robot in `ROBOTS`.
+    stiffness_n_m
+        Stiffness of the surface.
+    request
+        What is explored.
+    repeats
+        Number of trials.
+
+    Returns
+    -------
+    ForceControlMetrics
+    """
     trials = [robot_trial(name, stiffness_n_m, request) for _ in range(repeats)]
     failed = [trial for trial in trials if not trial.success]
     if failed:
@@ -140,7 +156,21 @@ def typical_trial(name: str, stiffness_n_m: float, request: ExplorationRequest, 
 
 
 def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) -> ForceControlMetrics:
-    """Explore once with one of `ROBOTS`, over a surface of that stiffness."""
+    """Explore once with one of `ROBOTS`, over a surface of that stiffness.
+
+    Parameters
+    ----------
+    name
+        Name of the robot in `ROBOTS`.
+    stiffness_n_m
+        Stiffness of the surface.
+    request
+        What is explored.
+
+    Returns
+    -------
+    ForceControlMetrics
+    """
     robot = ROBOTS[name]
     states: list[ExplorationState] = []
     with ExitStack() as stack:

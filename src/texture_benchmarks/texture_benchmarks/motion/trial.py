@@ -70,7 +70,23 @@ def simulate_force_controlled_slide(
     touch: TouchParams = TOUCH,
     injection: Injection | None = None,
 ) -> ForceControlMetrics:
-    """Explore once with a simulated arm, under the real exploration loop; evaluated by the true force."""
+    """Explore once with a simulated arm, under the real exploration loop; evaluated by the true force.
+
+    Parameters
+    ----------
+    arm
+        Arm and surface.
+    request
+        What is explored.
+    touch
+        How the finger approaches, presses and lifts.
+    injection
+        Changes states on their way to the controller; None for no fault.
+
+    Returns
+    -------
+    ForceControlMetrics
+    """
     log: list[tuple[Phase, ArmState]] = []
     now_ns = due_ns = 0
     injected_ns: int | None = None
@@ -114,7 +130,22 @@ def _noticed_s(log: Log, begin_ns: int | None) -> float:
 
 
 def force_control_metrics(log: Log, request: ExplorationRequest, outcome: ExplorationOutcome) -> ForceControlMetrics:
-    """Return how an exploration went, from the states of the arm in each phase."""
+    """Return how an exploration went, from the states of the arm in each phase.
+
+    Parameters
+    ----------
+    log
+        States of the arm by phase.
+    request
+        What was explored.
+    outcome
+        How it ended.
+
+    Returns
+    -------
+    ForceControlMetrics
+        In SI units.
+    """
     before = [state.force_n for phase, state in log if phase in (Phase.APPROACH, Phase.CONTACT)]
     sliding = [state for phase, state in log if phase is Phase.SLIDE]
     peak_n = max((state.force_n for _, state in log), default=math.nan)
@@ -137,7 +168,15 @@ def force_control_metrics(log: Log, request: ExplorationRequest, outcome: Explor
 
 
 def mean_speed_m_s(times_s: Array, places: Array) -> float:
-    """Return the way through places, (n, 3), over the time it took; pairs further apart than `APART_S` do not count."""
+    """Return the way through places, (n, 3), over the time it took; pairs further apart than `APART_S` do not count.
+
+    Parameters
+    ----------
+    times_s : (n,)
+        Rising.
+    places : (n, 3)
+        m.
+    """
     took_s = np.diff(times_s)
     ways = np.linalg.norm(np.diff(places, axis=0), axis=1)
     near = took_s < APART_S
@@ -149,6 +188,13 @@ def radius_error_m(places: Array, radius_m: float) -> float:
 
     NaN if the radius is 0, for another path. The middle is that of the circle that fits best, by least squares
     (Kåsa 1976).
+
+    Parameters
+    ----------
+    places : (n, 2)
+        m.
+    radius_m
+        Wanted radius.
     """
     if not radius_m:
         return math.nan

@@ -20,6 +20,13 @@ def slides_chart(right: Mapping[str, Array], wanted: Sequence[float], path: str 
         Share of trials that are right, by the way to choose.
     wanted
         Shares that are drawn as lines.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     with chart(path, (6.4, 4.0), 'Textures recognised after several slides (simulated)') as figure:
         axes = figure.subplots()

@@ -68,7 +68,25 @@ CHOICES: Mapping[str, Callable[[NextTouchModel, Sequence[SlideMotion], np.random
 def extracted(
     scene: Scene, motions: Sequence[SlideMotion], count: int, features: FeatureSet, rng: np.random.Generator
 ) -> Array:
-    """Return the features of slides, each one window long: (n_motions, n_textures, count, n_features)."""
+    """Return the features of slides, each one window long: (n_motions, n_textures, count, n_features).
+
+    Parameters
+    ----------
+    scene
+        What is explored.
+    motions
+        How.
+    count
+        Slides of each motion over each texture.
+    features
+        What is computed of them.
+    rng
+        Places, effects and noise.
+
+    Returns
+    -------
+    (n_motions, n_textures, count, n_features)
+    """
     return np.stack(
         [
             np.stack([_values(scene, texture, motion, count, features=features, rng=rng) for texture in scene.surfaces])
@@ -78,7 +96,21 @@ def extracted(
 
 
 def training(scene: Scene, motions: Sequence[SlideMotion], values: Array) -> NextTouchModel:
-    """Learn from what `extracted` gave; the textures keep the order of their names."""
+    """Learn from what `extracted` gave; the textures keep the order of their names.
+
+    Parameters
+    ----------
+    scene
+        Names the textures.
+    motions
+        How the slides were made.
+    values : (n_motions, n_textures, count, n_features)
+        Features of slides.
+
+    Returns
+    -------
+    NextTouchModel
+    """
     n_motions, n_textures, count, n_features = values.shape
     return NextTouchModel.fit(
         values.reshape(-1, n_features),
@@ -121,6 +153,13 @@ def explored(
         Test slides: a trial over a texture has `n_slides` of its own for each motion, the same for any choice.
     choose
         Which motion is next.
+    n_slides
+        Slides of a trial.
+
+    Returns
+    -------
+    Trials
+        What each trial decided after each slide.
     """
     places = {motion: number for number, motion in enumerate(motions)}
     right, probability = [], []

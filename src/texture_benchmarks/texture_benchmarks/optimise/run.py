@@ -125,7 +125,22 @@ def _searched(
 def run_case(
     case: SearchCase, measured: SlideArrays, options: BenchmarkOptions
 ) -> tuple[dict[str, Any], SearchResult[Any]]:
-    """Search once; return the figures and what was found."""
+    """Search once; return the figures and what was found.
+
+    Parameters
+    ----------
+    case
+        Recipe, search space and task.
+    measured
+        Slides that the search may use.
+    options
+        Seed, and whether it must be quick.
+
+    Returns
+    -------
+    (dict, SearchResult)
+        Figures as plain values, and all else.
+    """
     params = replace(QUICK, objective=case.params.objective, race=case.params.race) if options.quick else case.params
     params = replace(params, seed=options.seed)
     space, task = _space_and_task(case)

@@ -15,20 +15,61 @@ Pair = tuple[str, str]
 
 
 def higher(claim: str, first: MethodResult, second: MethodResult) -> Finding:
-    """Check that one method recognises more than another, slide by slide."""
+    """Check that one method recognises more than another, slide by slide.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    first, second
+        Results on the same slides.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
     both = first.tested & second.tested
     gain = mean(first.right(both) - second.right(both))
     return Finding(claim, f'{percent(first.test)} against {percent(second.test)}', gain, gain.above())
 
 
 def higher_elsewhere(claim: str, first: MethodResult, second: MethodResult) -> Finding:
-    """Check that more slides of one kind are recognised than of another kind."""
+    """Check that more slides of one kind are recognised than of another kind.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    first, second
+        Results on different slides.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
     gain = apart(first.right(), second.right())
     return Finding(claim, f'{percent(first.test)} against {percent(second.test)}', gain, gain.above())
 
 
 def lower_in(claim: str, outcome: MethodResult, condition: str) -> Finding:
-    """Check that slides of one condition are recognised less often than all others."""
+    """Check that slides of one condition are recognised less often than all others.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    condition
+        Name of the condition.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
     here = outcome.conditions == condition
     loss = apart(outcome.right(~here), outcome.right(here))
     names = dict.fromkeys(outcome.conditions.tolist())
@@ -38,14 +79,44 @@ def lower_in(claim: str, outcome: MethodResult, condition: str) -> Finding:
 
 
 def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
-    """Check that the share of test slides recognised is not below a figure: the interval reaches it."""
+    """Check that the share of test slides recognised is not below a figure: the interval reaches it.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    border
+        Share, 0 to 1.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
     test = outcome.test
     over = Interval(test.value - border, test.low - border, test.high - border)
     return Finding(claim, percent(test), over, over.high >= 0.0)
 
 
 def most_errors(claim: str, outcome: MethodResult, pairs: Sequence[Pair]) -> Finding:
-    """Check that a surface is taken for the other of these pairs more often than for that of the next most confused."""
+    """Check that a surface is taken for the other of these pairs more often than for that of the next most confused.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    pairs
+        Pairs of surfaces.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here.
+    """
     own = sum((outcome.taken_for(*pair) for pair in pairs), start=np.zeros(1))
     others = [pair for pair in outcome.pairs() if frozenset(pair) not in {frozenset(one) for one in pairs}]
     rivals = sum((outcome.taken_for(*pair) for pair in others[: len(pairs)]), start=np.zeros(1))
@@ -56,7 +127,22 @@ def most_errors(claim: str, outcome: MethodResult, pairs: Sequence[Pair]) -> Fin
 
 
 def better_on(claim: str, outcome: MethodResult, surface: str) -> Finding:
-    """Check that one surface is recognised more often than the others together."""
+    """Check that one surface is recognised more often than the others together.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    surface
+        Label of the surface.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
     here = outcome.codes == outcome.surfaces.index(surface)
     gain = apart(outcome.right(here), outcome.right(~here))
     reported = (
@@ -66,7 +152,24 @@ def better_on(claim: str, outcome: MethodResult, surface: str) -> Finding:
 
 
 def seldom(claim: str, outcome: MethodResult, pair: Pair, border: float) -> Finding:
-    """Check that two surfaces are taken for each other in fewer than a share of their slides."""
+    """Check that two surfaces are taken for each other in fewer than a share of their slides.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    pair
+        Two surfaces.
+    border
+        Share, 0 to 1.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
     of_pair = np.isin(outcome.codes, [outcome.surfaces.index(name) for name in pair])
     taken = share(outcome.taken_for(*pair, of=of_pair))
     below = Interval(border - taken.value, border - taken.high, border - taken.low)
@@ -76,7 +179,22 @@ def seldom(claim: str, outcome: MethodResult, pair: Pair, border: float) -> Find
 
 
 def more_spread(claim: str, first: MethodResult, second: MethodResult, alike: Sequence[Pair]) -> Finding:
-    """Check that by the first method more slides are taken for a surface that is not alike than by the second."""
+    """Check that by the first method more slides are taken for a surface that is not alike than by the second.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    first, second
+        Results on the same slides.
+    alike
+        Pairs of surfaces that are alike.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
     novel = [one.wrong() - sum((one.taken_for(*pair) for pair in alike), start=np.zeros(1)) for one in (first, second)]
     more = mean(novel[0] - novel[1])
     reported = ' against '.join(f'{100 * part.mean():.1f} %' for part in novel)
@@ -84,7 +202,22 @@ def more_spread(claim: str, first: MethodResult, second: MethodResult, alike: Se
 
 
 def no_lower(claim: str, first: MethodResult, second: MethodResult, margin: float = 0.05) -> Finding:
-    """Check that slides of one kind are recognised at most a margin less often than those of another kind."""
+    """Check that slides of one kind are recognised at most a margin less often than those of another kind.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    first, second
+        Results on different slides.
+    margin
+        Largest difference that counts as none, 0 to 1.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
     gain = apart(first.right(), second.right())
     gain = Interval(gain.value + margin, gain.low + margin, gain.high + margin)
     here = f'{percent(first.test)} against {percent(second.test)}, {100 * margin:g} points granted'

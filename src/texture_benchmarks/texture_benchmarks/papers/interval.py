@@ -50,14 +50,28 @@ def share(right: Array) -> Interval:
 
 
 def mean(values: Array) -> Interval:
-    """Return the mean over slides, such as that of differences between two methods on the same slides."""
+    """Return the mean over slides, such as that of differences between two methods on the same slides.
+
+    Parameters
+    ----------
+    values : (n,)
+        One number a slide.
+    """
     centre = float(np.mean(values))
     reach = NORMAL_95 * math.sqrt(_uncertainty(values))
     return Interval(centre, centre - reach, centre + reach)
 
 
 def apart(first: Array, second: Array) -> Interval:
-    """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,)."""
+    """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,).
+
+    Parameters
+    ----------
+    first : (n,)
+        One number a slide.
+    second : (m,)
+        One number a slide.
+    """
     centre = float(np.mean(first) - np.mean(second))
     reach = NORMAL_95 * math.sqrt(_uncertainty(first) + _uncertainty(second))
     return Interval(centre, centre - reach, centre + reach)

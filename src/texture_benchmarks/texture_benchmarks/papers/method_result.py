@@ -74,21 +74,57 @@ class MethodResult:
         return shares
 
     def right(self, of: NDArray[np.bool_] | None = None) -> Array:
-        """Return how often each slide was recognised when held out, (n_tested,); `of` (n_slides,) chooses."""
+        """Return how often each slide was recognised when held out, (n_tested,); `of` (n_slides,) chooses.
+
+        Parameters
+        ----------
+        of : (n_slides,) bool
+            Which slides count; None for all.
+
+        Returns
+        -------
+        (n_tested,)
+            0 to 1.
+        """
         return self._tested(self.decided == self.codes, of)
 
     def taken_for(self, first: str, second: str, of: NDArray[np.bool_] | None = None) -> Array:
-        """Return how often each slide was taken for the other one of two surfaces, (n_tested,)."""
+        """Return how often each slide was taken for the other one of two surfaces, (n_tested,).
+
+        Parameters
+        ----------
+        first, second
+            Labels of the two surfaces.
+        of : (n_slides,) bool
+            Which slides count; None for all.
+
+        Returns
+        -------
+        (n_tested,)
+            0 to 1.
+        """
         pair = [self.surfaces.index(first), self.surfaces.index(second)]
         other = np.select([self.codes == pair[0], self.codes == pair[1]], [pair[1], pair[0]], default=UNDECIDED - 1)
         return self._tested(self.decided == other, of)
 
     def wrong(self) -> Array:
-        """Return how often each slide was taken for another surface, (n_tested,); what is unclassified is not."""
+        """Return how often each slide was taken for another surface, (n_tested,); what is unclassified is not.
+
+        Returns
+        -------
+        (n_tested,)
+            0 to 1.
+        """
         return self._tested((self.decided != self.codes) & (self.decided != UNDECIDED))
 
     def nothing(self) -> Array:
-        """Return how often each slide was taken for nothing, (n_tested,)."""
+        """Return how often each slide was taken for nothing, (n_tested,).
+
+        Returns
+        -------
+        (n_tested,)
+            0 to 1.
+        """
         return self._tested(self.decided == UNDECIDED)
 
     def pairs(self) -> list[tuple[str, str]]:

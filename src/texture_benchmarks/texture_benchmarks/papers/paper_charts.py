@@ -22,6 +22,15 @@ def accuracy_chart(
     ----------
     panels
         Task → method → the paper's share, if it tells, and the simulated one.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     heights = [len(methods) + 1 for methods in panels.values()]
     with chart(path, (7.0, 1.2 + 0.3 * sum(heights)), title) as figure:
@@ -43,6 +52,15 @@ def confusions_chart(
     ----------
     tables
         Method → surfaces, and two tables of shares with a last column for what is unclassified.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     side = 2.2 + 0.3 * max(len(surfaces) for surfaces, _, _ in tables.values())
     with chart(path, (2.0 * side + 1.5, side * len(tables)), title) as figure:

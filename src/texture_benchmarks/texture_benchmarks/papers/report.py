@@ -178,7 +178,18 @@ def _confusion_lines(task: RecognitionTask, method: Method, outcome: MethodResul
 
 
 def shares_of(table: Table | None) -> AnyArray:
-    """Return a paper's table as shares of each row, with a last column for what is unclassified."""
+    """Return a paper's table as shares of each row, with a last column for what is unclassified.
+
+    Parameters
+    ----------
+    table
+        Counts or per cents as printed; None if the paper has none.
+
+    Returns
+    -------
+    (n_labels, n_labels + 1)
+        0 to 1.
+    """
     counts = np.asarray(table, dtype=np.float64)
     if counts.shape[1] == counts.shape[0]:
         counts = np.column_stack((counts, np.zeros(len(counts))))

@@ -39,6 +39,22 @@ def grades_chart(
     """Draw the estimates of each texture beside its human grade, a panel for each head (the paper's Fig. 7).
 
     The thick bar is one standard deviation over the windows, the thin one the 90 % interval of a window.
+
+    Parameters
+    ----------
+    panels
+        Regressor → name of the series → its estimates.
+    textures
+        Labels, in the order of their human grades.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     human = {name: grade for series in panels.values() for s in series.values()
              for name, grade in zip(s.textures, s.human, strict=True)}  # fmt: skip
@@ -59,7 +75,22 @@ def grades_chart(
 
 
 def coverage_chart(nominal: Array, covered: Array, title: str, path: str | Path) -> Path:
-    """Draw the share of grades within the intervals over the share claimed."""
+    """Draw the share of grades within the intervals over the share claimed.
+
+    Parameters
+    ----------
+    nominal, covered : (n,)
+        Share claimed and share found, 0 to 1.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (5.2, 4.6)) as figure:
         axes = figure.subplots()
         axes.plot([45, 100], [45, 100], color=COLOURS[6], linewidth=0.8, linestyle='--', label='honest')

@@ -47,13 +47,49 @@ class SimulatedTextures:
     def extract(
         self, features: FeatureSet, textures: Sequence[str], count: int, speed_m_s: float, force_n: float
     ) -> LabelledFeatures:
-        """Return one window of so many scans over each texture."""
+        """Return one window of so many scans over each texture.
+
+        Parameters
+        ----------
+        features
+            What is computed of the windows.
+        textures
+            Labels.
+        count
+            Slides over each.
+        speed_m_s
+            Speed of the finger.
+        force_n
+            Normal force.
+
+        Returns
+        -------
+        LabelledFeatures
+            One window a slide.
+        """
         events = [event for texture in textures for event in self.events(texture, count, speed_m_s, force_n)]
         vectors = features.extract_many(events)
         return LabelledFeatures.from_vectors(vectors, {event.exploration_id: event.surface for event in events})
 
     def events(self, texture: str, count: int, speed_m_s: float, force_n: float) -> Iterator[CutWindow]:
-        """Yield the window of each scan, USED_S long."""
+        """Yield the window of each scan, USED_S long.
+
+        Parameters
+        ----------
+        texture
+            Label.
+        count
+            Number of slides.
+        speed_m_s
+            Speed of the finger.
+        force_n
+            Normal force.
+
+        Yields
+        ------
+        CutWindow
+            One for each slide.
+        """
         for number, samples in enumerate(self._measured(texture, count, speed_m_s, force_n)):
             window = Window(samples, self._rate_hz, self._channels, 0, speed_m_s, force_n)
             yield CutWindow(0, f'{texture}/{number}', USED_S, USED_S, {'signal': window}, speed_m_s, force_n, texture)
@@ -68,7 +104,23 @@ class SimulatedTextures:
         return self._scans[key]
 
     def scans(self, textures: Sequence[str], count: int, speed_m_s: float, force_n: float) -> SlideArrays:
-        """Return the same scans as plain arrays, for a search."""
+        """Return the same scans as plain arrays, for a search.
+
+        Parameters
+        ----------
+        textures
+            Labels.
+        count
+            Slides over each.
+        speed_m_s
+            Speed of the finger.
+        force_n
+            Normal force.
+
+        Returns
+        -------
+        SlideArrays
+        """
         samples = np.concatenate([self._measured(texture, count, speed_m_s, force_n) for texture in textures])
         same = np.ones(len(samples))
         streams = {'signal': ArrayStream(samples, self._rate_hz)}
@@ -95,7 +147,23 @@ class Setup:
     def examples(
         self, recipe: RoughnessRecipe, textures: Sequence[str], speed_m_s: float = SPEED_M_S, force_n: float = FORCE_N
     ) -> LabelledFeatures:
-        """Return scans described for a recipe; fewer at other speeds and forces than the trained ones."""
+        """Return scans described for a recipe; fewer at other speeds and forces than the trained ones.
+
+        Parameters
+        ----------
+        recipe
+            Names the features.
+        textures
+            Labels.
+        speed_m_s
+            Speed of the finger.
+        force_n
+            Normal force.
+
+        Returns
+        -------
+        LabelledFeatures
+        """
         trained = (speed_m_s, force_n) == (SPEED_M_S, FORCE_N)
         count = self.scans if trained else self.other_scans
         return self.simulated.extract(recipe.feature_set, textures, count, speed_m_s, force_n)

@@ -29,6 +29,23 @@ def tune(recipe: RoughnessRecipe, scans: SlideArrays, grades: Grades, seed: int,
     """Return the best recipe of the search space that is named like this one.
 
     As in the paper, each half holds windows of every texture: the search is not told how a texture never touched fares.
+
+    Parameters
+    ----------
+    recipe
+        Recipe whose search space is searched.
+    scans
+        Slides that the search may use.
+    grades
+        Grade of each texture.
+    seed
+        Seed of the search.
+    quick
+        Whether a short search will do.
+
+    Returns
+    -------
+    TunedRegressor
     """
     found = tuning.tune(RecipeSpace.load(recipe.name, recipe), scans, RoughnessTask(grades), seed, quick=quick)
     return TunedRegressor(found.found, found.seconds, found.cpu_seconds, found.scans)

@@ -51,7 +51,22 @@ class Slides:
         return tuple(FeatureCache(view) for view in self.views)
 
     def extract(self, feature_set: FeatureSet, views: Sequence[int] = ()) -> tuple[Array, Codes]:
-        """Return the features of all windows, of some or all views, (n, n_features), and their slides, (n,)."""
+        """Return the features of all windows, of some or all views, (n, n_features), and their slides, (n,).
+
+        Parameters
+        ----------
+        feature_set
+            Windows and features.
+        views
+            Numbers of the views; () for all.
+
+        Returns
+        -------
+        (n, n_features)
+            Features of windows.
+        (n,)
+            Number of the slide of each.
+        """
         chosen = [self._caches[number] for number in views or range(len(self.views))]
         values = np.concatenate([cache.values(feature_set) for cache in chosen], axis=1)
         return values, self.views[0](feature_set.windows).slides
@@ -72,6 +87,10 @@ def gather(scene: Scene, task: RecognitionTask, seed: int, *, slow: bool) -> Sli
         Of everything random.
     slow
         Whether the slow stream is needed.
+
+    Returns
+    -------
+    Slides
     """
     surfaces = task.surfaces or tuple(scene.surfaces)
     kinds = [(surface, visits) for surface in surfaces for visits in task.visits]

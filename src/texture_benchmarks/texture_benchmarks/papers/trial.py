@@ -30,7 +30,26 @@ NONE: TunedRecipes = {}
 
 
 def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE) -> MethodResults:
-    """Return what comes out of each method in each task."""
+    """Return what comes out of each method in each task.
+
+    Parameters
+    ----------
+    protocol
+        Methods and tasks of the paper.
+    scene
+        Surfaces, sensor and effects.
+    seed
+        Of everything random.
+    quick
+        Whether fewer slides will do.
+    tuned
+        Recipes that were searched for.
+
+    Returns
+    -------
+    MethodResults
+        By task and method.
+    """
     return {
         (task.name, method): outcome
         for task in protocol.tasks
@@ -45,6 +64,26 @@ def of_task(
 
     One with a recipe that was searched for is tried on the first split alone: in the others it would be tested on
     slides that the search has seen.
+
+    Parameters
+    ----------
+    protocol
+        Methods and tasks of the paper.
+    task
+        The task.
+    scene
+        Surfaces, sensor and effects.
+    seed
+        Of everything random.
+    quick
+        Whether fewer slides will do.
+    tuned
+        Recipes that were searched for.
+
+    Yields
+    ------
+    (str, MethodResult)
+        Name of the method, and its result.
     """
     slides, trained_on = _measured(protocol, task, scene, seed, quick=quick)
     for method in task.methods:
@@ -56,6 +95,21 @@ def of_task(
 
 def searched(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> TunedRecipes:
     """Return the recipes for which the paper has a genetic search, found on what the first split is trained on.
+
+    Parameters
+    ----------
+    protocol
+        Methods and tasks of the paper.
+    scene
+        Surfaces, sensor and effects.
+    seed
+        Of everything random.
+    quick
+        Whether a short search will do.
+
+    Returns
+    -------
+    TunedRecipes
 
     Raises
     ------
@@ -143,6 +197,11 @@ def evaluate_method(
         Which views of the slides are used; () for all.
     singly
         See `Method`.
+
+    Returns
+    -------
+    MethodResult
+        Of all splits together.
     """
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
     trained, owner = slides.extract(to_learn, views)

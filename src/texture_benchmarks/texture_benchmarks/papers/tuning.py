@@ -51,7 +51,13 @@ class TunedRecipe(Generic[R]):
         }
 
     def write(self, path: Path) -> Path:
-        """Write the recipe as a file that training reads; return its path."""
+        """Write the recipe as a file that training reads; return its path.
+
+        Raises
+        ------
+        InvalidParameter
+            If the file cannot be written.
+        """
         text = yaml.safe_dump(self.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -62,7 +68,25 @@ class TunedRecipe(Generic[R]):
 
 
 def tune(space: RecipeSpace[R], scans: SlideArrays, task: SearchTask[R], seed: int, *, quick: bool) -> TunedRecipe[R]:
-    """Return the best recipe of a space on these scans, and what it took to find it."""
+    """Return the best recipe of a space on these scans, and what it took to find it.
+
+    Parameters
+    ----------
+    space
+        The recipe, and what of it is varied.
+    scans
+        Slides that the search may use.
+    task
+        Classification or roughness.
+    seed
+        Seed of the search.
+    quick
+        Whether a short search will do.
+
+    Returns
+    -------
+    TunedRecipe
+    """
     params = replace(QUICK if quick else FULL, seed=seed)
     began, cpu_began = time.perf_counter(), time.process_time()
     with threaded_map() as parallel_map:

@@ -55,6 +55,11 @@ def try_minirocket(
     every
         Of the windows of the slides for training, every so many-th is used for training: the time grows with the
         square.
+
+    Returns
+    -------
+    dict
+        Figures as plain values.
     """
     transform = import_module('aeon.transformations.collection.convolution_based').MiniRocket
     windows = _cut(dataset, length_s)

@@ -190,7 +190,21 @@ def _numbers(settings: Mapping[str, Setting], names: Sequence[str], options: Ben
 
 
 def result_of(name: str, numbers: Mapping[str, Any], options: BenchmarkOptions) -> BenchmarkResult:
-    """Draw the chart of the figures by setting, split and recipe, and return all as a result."""
+    """Draw the chart of the figures by setting, split and recipe, and return all as a result.
+
+    Parameters
+    ----------
+    name
+        Name of the chart and of the figures.
+    numbers
+        Figures as plain values.
+    options
+        Where files are written.
+
+    Returns
+    -------
+    BenchmarkResult
+    """
     sets = {setting.partition(',')[0] for setting in numbers}
     splits = {split for of_setting in numbers.values() for split in of_setting}
     return BenchmarkResult(

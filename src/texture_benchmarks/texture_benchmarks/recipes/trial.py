@@ -51,7 +51,23 @@ def figures_of(result: CrossValidation) -> dict[str, Any]:
 
 
 def in_random_folds(name: str, dataset: SlideDataset, count: int, seed: int) -> Split:
-    """Return a split in which each slide is tested once; slides of each surface are assigned to folds at random."""
+    """Return a split in which each slide is tested once; slides of each surface are assigned to folds at random.
+
+    Parameters
+    ----------
+    name
+        Name of the split.
+    dataset
+        The slides.
+    count
+        Number of folds.
+    seed
+        Seed of the assignment.
+
+    Returns
+    -------
+    Split
+    """
     rng, folds = np.random.default_rng(seed), np.empty(len(dataset), dtype=np.intp)
     for label in np.unique(dataset.labels):
         rows = np.flatnonzero(dataset.labels == label)
@@ -60,12 +76,40 @@ def in_random_folds(name: str, dataset: SlideDataset, count: int, seed: int) -> 
 
 
 def at_rate(slide: LabelledSlide, topic: str, rate_hz: float) -> LabelledSlide:
-    """Return the slide with one topic alone, brought to another rate, stretch by stretch between losses."""
+    """Return the slide with one topic alone, brought to another rate, stretch by stretch between losses.
+
+    Parameters
+    ----------
+    slide
+        Slide with its signals.
+    topic
+        Signal that is kept.
+    rate_hz
+        Its new sampling rate.
+
+    Returns
+    -------
+    LabelledSlide
+    """
     return dataclasses.replace(slide, signals={topic: _at_rate(slide.signals[topic], rate_hz)})
 
 
 def all_at_rate(dataset: SlideDataset, topic: str, rate_hz: float) -> SlideDataset:
-    """Return the slides with one topic alone, brought to another rate."""
+    """Return the slides with one topic alone, brought to another rate.
+
+    Parameters
+    ----------
+    dataset
+        Slides with their signals.
+    topic
+        Signal that is kept.
+    rate_hz
+        Its new sampling rate.
+
+    Returns
+    -------
+    SlideDataset
+    """
     return SlideDataset(tuple(at_rate(slide, topic, rate_hz) for slide in dataset))
 
 
@@ -82,6 +126,10 @@ def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: flo
         Whether speed and force may be used. Where they belong to the recording session, they betray the surface.
     length_s
         Of all windows, if given; they begin so far apart, or LENGTH_S if they are longer.
+
+    Returns
+    -------
+    Recipe
     """
     windows = recipe.feature_set.windows
     if length_s is not None:
@@ -113,6 +161,20 @@ def latency_us(recipe: Recipe, model: TextureModel, dataset: SlideDataset) -> di
     """Return median and 99th percentile of the computing time of windows one by one; the first slide warms up.
 
     By the clock of the processor, which other work on the machine lengthens little.
+
+    Parameters
+    ----------
+    recipe
+        Names windows and features.
+    model
+        Trained with it.
+    dataset
+        Slides whose windows are classified.
+
+    Returns
+    -------
+    dict
+        'median' and 'p99', µs.
     """
     timed = dataset.slides[:: max(1, len(dataset) // TIMED_SLIDES)]
     cut = [cut_slide(slide, recipe.feature_set) for slide in timed]

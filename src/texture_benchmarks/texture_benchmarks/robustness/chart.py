@@ -51,6 +51,22 @@ def robustness_chart(effect: str, panel: Panel, families: Mapping[str, Sequence[
     """Draw one effect, from nothing at the left to worst at the right, the recipes of each family beside each other.
 
     A curve ends in a ring where it breaks down; what comes after is drawn faintly.
+
+    Parameters
+    ----------
+    effect
+        Name of the effect.
+    panel
+        Curves of all recipes.
+    families
+        Family → recipes that are drawn beside each other.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     title = f'{effect.capitalize()}: single windows recognised as it grows, {panel.slides} slides'
     with chart(path, (3.9 * len(families), 4.4)) as figure:

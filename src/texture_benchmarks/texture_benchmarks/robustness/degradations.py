@@ -53,7 +53,17 @@ class Degradation:
 
 
 def rms(samples: Array) -> Array:
-    """Return the root mean square of each channel about its mean, (n_channels,)."""
+    """Return the root mean square of each channel about its mean, (n_channels,).
+
+    Parameters
+    ----------
+    samples : (n_samples, n_channels)
+
+    Returns
+    -------
+    (n_channels,)
+        In the unit of the samples.
+    """
     spread: Array = samples.std(axis=0)
     return spread
 
@@ -145,6 +155,20 @@ def breakdown(strengths: Sequence[float], shares: Sequence[float], kept: float) 
     """Return the strength at which a curve first falls below so much of its start; None if it never does.
 
     Between two strengths it is taken for a straight line; after an infinite one, the next strength is returned.
+
+    Parameters
+    ----------
+    strengths : (n,)
+        Rising; the first is no disturbance.
+    shares : (n,)
+        Share recognised at each.
+    kept
+        Fraction of the first share.
+
+    Returns
+    -------
+    float or None
+        In the unit of the strengths.
     """
     limit = kept * shares[0]
     below = next((index for index, share in enumerate(shares) if share < limit), 0)

@@ -114,7 +114,21 @@ CONDITIONS: Mapping[str, ShiftedCondition] = {
 def simulate_slide_signals(
     touch_conditions: TouchConditions, count: int, rng: np.random.Generator
 ) -> list[LabelledSlide]:
-    """Return `count` slides over each surface, assigned to the fingers, at the rate of the sensor."""
+    """Return `count` slides over each surface, assigned to the fingers, at the rate of the sensor.
+
+    Parameters
+    ----------
+    touch_conditions
+        Scene, speed, force and fingers.
+    count
+        Slides over each surface.
+    rng
+        Places, effects and noise.
+
+    Returns
+    -------
+    list of LabelledSlide
+    """
     stream = find(SENSORS, touch_conditions.scene.sensor, 'sensor model').fast
     each = max(1, count // len(touch_conditions.fingers))
     slides = []

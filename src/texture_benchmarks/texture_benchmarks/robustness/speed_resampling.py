@@ -15,6 +15,19 @@ def at_other_speed(samples: Array, speed_m_s: float, wanted_m_s: float) -> Array
     """Return samples (n, n_channels) taken at one speed as they would be at another, at the same rate.
 
     What frequency does to the sensor and to friction stays that of the speed they were taken at.
+
+    Parameters
+    ----------
+    samples : (n, n_channels)
+    speed_m_s
+        Speed at which they were taken.
+    wanted_m_s
+        The other speed.
+
+    Returns
+    -------
+    (n · speed_m_s / wanted_m_s, n_channels)
+        In the unit of the samples.
     """
     ratio = Fraction(speed_m_s / wanted_m_s).limit_denominator(FINEST)
     values: Array = resample_poly(samples, ratio.numerator, ratio.denominator, axis=0, padtype='line')

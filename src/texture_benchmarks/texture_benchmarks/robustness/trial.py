@@ -70,7 +70,25 @@ def with_windows(recipe: Recipe, length: float) -> Recipe:
 def degraded(
     item: LabelledSlide, degradation: Degradation, strength: float, rate_hz: float, rng: np.random.Generator
 ) -> LabelledSlide:
-    """Return the vibration of a slide at a rate, as bad as the strength says."""
+    """Return the vibration of a slide at a rate, as bad as the strength says.
+
+    Parameters
+    ----------
+    item
+        Slide with its vibration.
+    degradation
+        What becomes worse.
+    strength
+        In the unit of the degradation.
+    rate_hz
+        Sampling rate of the result.
+    rng
+        Random numbers of the degradation.
+
+    Returns
+    -------
+    LabelledSlide
+    """
     whole = at_rate(item, TOPIC, _native_hz(item) if degradation.of_the_world else rate_hz)
     signals = [_changed(run, degradation, strength, rng) for run in whole.signals[TOPIC]]
     return at_rate(dataclasses.replace(item, signals={TOPIC: signals}), TOPIC, rate_hz)

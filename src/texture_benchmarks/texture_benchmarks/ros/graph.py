@@ -59,6 +59,15 @@ class Graph:
     def wait_until(self, condition: Callable[[], bool], deadline_s: float, what: str) -> None:
         """Take messages until the condition holds.
 
+        Parameters
+        ----------
+        condition
+            Called after each message.
+        deadline_s
+            Longest time to wait.
+        what
+            What is waited for, for the sentence of the error.
+
         Raises
         ------
         DeviceError

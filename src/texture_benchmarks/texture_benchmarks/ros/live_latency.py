@@ -65,7 +65,22 @@ class LiveLatency:
 
 
 def measure(model_path: Path, seed: int, slide_s: float) -> LiveLatency:
-    """Stream one long simulated slide through feature extractor and classifier, and time the estimates."""
+    """Stream one long simulated slide through feature extractor and classifier, and time the estimates.
+
+    Parameters
+    ----------
+    model_path
+        Path of the model.
+    seed
+        Seed of the simulated slide.
+    slide_s
+        Length of the slide.
+
+    Returns
+    -------
+    LiveLatency
+        Times from the last sample of a window to its estimate.
+    """
     model = load_model(model_path)
     states, signals = simulate_exploration(
         load_scene('twelve_textures'), SURFACE, SPEED_M_S, FORCE_N, slide_s,

@@ -60,6 +60,11 @@ def measure(rigs: Mapping[str, Rig], sensors: Mapping[str, str], seconds: float)
         Which sensor each of them is.
     seconds
         How long to measure.
+
+    Returns
+    -------
+    mapping
+        Load of each node, by its namespace.
     """
     received = {name: _SensorReports() for name in rigs}
     with Graph(DOMAIN) as graph, ExitStack() as stack:

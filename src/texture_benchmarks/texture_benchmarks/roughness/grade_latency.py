@@ -19,6 +19,20 @@ def times_us(model: RoughnessModel, windows: Sequence[CutWindow], count: int) ->
     """Return the computing time of each of `count` windows, taken from `windows` in turn, one by one, (count,) µs.
 
     It is the time of the core, not of the clock: what other programs take does not count.
+
+    Parameters
+    ----------
+    model
+        Trained model.
+    windows
+        Windows to choose from.
+    count
+        Number of measurements.
+
+    Returns
+    -------
+    (count,)
+        µs.
     """
     evidence, taken_us = RoughnessAccumulator(model), []
     for number in range(WARM_UP + count):

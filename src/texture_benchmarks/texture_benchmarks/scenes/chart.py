@@ -39,7 +39,26 @@ def cost_chart(
     target_cpu: float,
     path: str | Path,
 ) -> Path:
-    """Draw the time of a slide by scene, with what is allowed, and the load of emulated devices."""
+    """Draw the time of a slide by scene, with what is allowed, and the load of emulated devices.
+
+    Parameters
+    ----------
+    costs
+        Scene and whether many slides are made at once → time of a slide.
+    target_ms
+        Allowed time of a single slide, and of one of many.
+    loads
+        Scene → load of its emulated device.
+    target_cpu
+        Allowed share of a core.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (11.0, 4.6)) as figure:
         scans, live = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
         places = np.arange(len(costs))

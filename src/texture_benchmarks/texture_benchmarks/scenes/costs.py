@@ -65,7 +65,24 @@ class DeviceLoad:
 
 
 def scan_cost(scene: Scene, surfaces: Sequence[str], repeats: int, many: int = MANY) -> ScanCost:
-    """Return what slides over some surfaces of a scene cost; `repeats` is that of single slides."""
+    """Return what slides over some surfaces of a scene cost; `repeats` is that of single slides.
+
+    Parameters
+    ----------
+    scene
+        Surfaces, sensor and effects.
+    surfaces
+        Names of the surfaces.
+    repeats
+        Number of single slides over each surface.
+    many
+        Number of slides made at once.
+
+    Returns
+    -------
+    ScanCost
+        Times in ms.
+    """
     alone = [_scan_ms(scene, name, 1, repeats) for name in surfaces]
     together = [_scan_ms(scene, name, many, max(1, repeats // 5)) for name in surfaces]
     return ScanCost(float(np.median(alone)), float(np.median(together)), max(together))
@@ -78,7 +95,22 @@ def stuck_surfaces(scene: Scene) -> Mapping[bool, list[str]]:
 
 
 def live_load(name: str, surface: str, seconds: float) -> DeviceLoad:
-    """Return what the emulated device of a scene costs while a finger slides over a surface in real time."""
+    """Return what the emulated device of a scene costs while a finger slides over a surface in real time.
+
+    Parameters
+    ----------
+    name
+        Name of the scene.
+    surface
+        Name of the surface.
+    seconds
+        How long to measure.
+
+    Returns
+    -------
+    DeviceLoad
+        Share of a core.
+    """
     scene = load_scene(name)
     stream = SENSORS[scene.sensor].fast
     with tempfile.TemporaryDirectory() as folder:

@@ -30,7 +30,23 @@ PAPERS: Mapping[str, Paper] = {
 
 
 def with_paper(ablation: Ablation, repeats: int, seed: int, *, quick: bool = False) -> Ablation:
-    """Return the same with the change of accuracy of the paper's method, if there is one, without each effect."""
+    """Return the same with the change of accuracy of the paper's method, if there is one, without each effect.
+
+    Parameters
+    ----------
+    ablation
+        Effects of the terms.
+    repeats
+        Number of repetitions.
+    seed
+        Of everything random.
+    quick
+        Whether fewer slides will do.
+
+    Returns
+    -------
+    Ablation
+    """
     paper = PAPERS.get(ablation.scene)
     if not paper:
         return ablation

@@ -11,7 +11,22 @@ from texture_benchmarks.scenes.trial import Ablation, MeanDifference
 def cost_table(
     costs: Mapping[tuple[str, bool], ScanCost], target_ms: Mapping[bool, float], loads: Mapping[str, DeviceLoad]
 ) -> str:
-    """Return what a slide of each scene costs, and its emulated device."""
+    """Return what a slide of each scene costs, and its emulated device.
+
+    Parameters
+    ----------
+    costs
+        Scene and whether many slides are made at once → time of a slide.
+    target_ms
+        Allowed time of a single slide, and of one of many.
+    loads
+        Scene → load of its emulated device.
+
+    Returns
+    -------
+    str
+        Table in Markdown.
+    """
     rows = []
     for (name, sticks), cost in costs.items():
         of_load = loads.get(name) if sticks or (name, True) not in costs else None

@@ -265,6 +265,11 @@ def ablate(
         Of everything random.
     terms
         Those to remove, one at a time; all if empty.
+
+    Returns
+    -------
+    Ablation
+        Change of accuracy and of features by each term.
     """
     others = {term: other for term, other in variants(scene, touch_protocol).items() if not terms or term in terms}
     rows = [_repeat(scene, others, touch_protocol, slides, [seed, number]) for number in range(repeats)]
@@ -274,7 +279,22 @@ def ablate(
 
 
 def scan_s(scene: Scene, touch_protocol: TouchProtocol, count: int) -> float:
-    """Return the computing time of a slide, mean over all surfaces, `count` slides of each at once."""
+    """Return the computing time of a slide, mean over all surfaces, `count` slides of each at once.
+
+    Parameters
+    ----------
+    scene
+        Surfaces, sensor and effects.
+    touch_protocol
+        Speed, force and duration.
+    count
+        Slides over each surface.
+
+    Returns
+    -------
+    float
+        s.
+    """
     rng = np.random.default_rng(0)
     began = time.thread_time()
     for surface in scene.surfaces:
@@ -283,7 +303,25 @@ def scan_s(scene: Scene, touch_protocol: TouchProtocol, count: int) -> float:
 
 
 def timed(ablation: Ablation, scene: Scene, touch_protocol: TouchProtocol, count: int, repeats: int) -> Ablation:
-    """Return the same with the time that each term takes: medians of measurements taken in turn."""
+    """Return the same with the time that each term takes: medians of measurements taken in turn.
+
+    Parameters
+    ----------
+    ablation
+        Effects of the terms.
+    scene
+        Surfaces, sensor and effects.
+    touch_protocol
+        Speed, force and duration.
+    count
+        Slides over each surface.
+    repeats
+        Number of measurements.
+
+    Returns
+    -------
+    Ablation
+    """
     others = variants(scene, touch_protocol)
     compared = [scene, *(others[term_effect.term] for term_effect in ablation.term_effects)]
     for made in compared:
@@ -300,7 +338,25 @@ def timed(ablation: Ablation, scene: Scene, touch_protocol: TouchProtocol, count
 def simulate_features(
     scene: Scene, touch_protocol: TouchProtocol, count: int, seed: Sequence[int], fingers: Sequence[int]
 ) -> SlideFeatures:
-    """Return `count` slides over each surface, assigned to the fingers; their randomness follows from the seed."""
+    """Return `count` slides over each surface, assigned to the fingers; their randomness follows from the seed.
+
+    Parameters
+    ----------
+    scene
+        Surfaces, sensor and effects.
+    touch_protocol
+        Speed, force and duration.
+    count
+        Slides over each surface.
+    seed
+        Of everything random.
+    fingers
+        Individuals of the sensor, taken in turn.
+
+    Returns
+    -------
+    SlideFeatures
+    """
     values = [
         np.concatenate(
             [_extracted(scene, name, touch_protocol, count, ([*seed, finger], finger)) for finger in fingers]
@@ -312,7 +368,18 @@ def simulate_features(
 
 
 def extract_features(samples: Samples, rate_hz: float) -> Array:
-    """Return the logarithm of the power in bands of each channel, (n, n_channels · BANDS)."""
+    """Return the logarithm of the power in bands of each channel, (n, n_channels · BANDS).
+
+    Parameters
+    ----------
+    samples : (n, n_samples, n_channels)
+    rate_hz
+        Sampling rate.
+
+    Returns
+    -------
+    (n, n_channels · BANDS)
+    """
     n_samples = samples.shape[1]
     spectrum = np.fft.rfft(samples * np.hanning(n_samples)[:, None], axis=1)
     edges_hz = np.geomspace(LOWEST_HZ, rate_hz / 2, BANDS + 1)
@@ -371,7 +438,12 @@ def _term_effect(term: str, rows: Sequence[_Row]) -> TermEffect:
 
 
 def difference(values: Sequence[float] | Array) -> MeanDifference:
-    """Return the mean of differences, one of each repetition, with its interval."""
+    """Return the mean of differences, one of each repetition, with its interval.
+
+    Parameters
+    ----------
+    values : (n_repetitions,)
+    """
     mean = float(np.mean(values))
     if len(values) < 2:
         return MeanDifference(mean, np.inf)

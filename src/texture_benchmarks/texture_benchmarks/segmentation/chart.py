@@ -24,7 +24,22 @@ class DetectedSlides:
 
 
 def error_strength_chart(trials: Mapping[str, Sequence[SegmentationTrial]], target_s: float, path: str | Path) -> Path:
-    """Draw the errors of start and end against how much stronger the vibration is than the noise, a colour a scene."""
+    """Draw the errors of start and end against how much stronger the vibration is than the noise, a colour a scene.
+
+    Parameters
+    ----------
+    trials
+        Scene → slides.
+    target_s
+        Allowed error.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (9.0, 4.2), 'Start and end of sliding, found from the signal alone (simulated)') as figure:
         for axes, name in zip(figure.subplots(1, 2, sharex=True, sharey=True), ('start', 'end'), strict=True):
             for colour, (scene, listed) in zip(COLOURS, trials.items(), strict=False):
@@ -39,7 +54,22 @@ def error_strength_chart(trials: Mapping[str, Sequence[SegmentationTrial]], targ
 
 
 def found_chart(recordings: Mapping[str, DetectedSlides], title: str, path: str | Path) -> Path:
-    """Draw recordings below each other, with the stretches of sliding shaded."""
+    """Draw recordings below each other, with the stretches of sliding shaded.
+
+    Parameters
+    ----------
+    recordings
+        Name of the recording → its signal and the slides in it.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (9.0, 0.6 + 1.1 * len(recordings)), title) as figure:
         rows = figure.subplots(len(recordings), 1, sharex=True, squeeze=False)[:, 0]
         for axes, (name, found) in zip(rows, recordings.items(), strict=True):

@@ -46,7 +46,26 @@ class SegmentationTrial:
 def try_slide(
     scene: Scene, surface: str, speed_m_s: float, slide_s: float, rng: np.random.Generator
 ) -> SegmentationTrial:
-    """Return how well one slide is found from its signals alone."""
+    """Return how well one slide is found from its signals alone.
+
+    Parameters
+    ----------
+    scene
+        Surfaces, sensor and effects.
+    surface
+        Name of the surface.
+    speed_m_s
+        Speed of the finger.
+    slide_s
+        Length of the steady part.
+    rng
+        Places, effects and noise.
+
+    Returns
+    -------
+    SegmentationTrial
+        Errors of start and end, s.
+    """
     states, signals = simulate_exploration(
         scene, surface, speed_m_s, FORCE_N, slide_s, start_ns=0, exploration_id='trial', rng=rng
     )

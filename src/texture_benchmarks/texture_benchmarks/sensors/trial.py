@@ -125,6 +125,22 @@ def link_statistics(
 ) -> LinkStatistics:
     """Send packets of random content over a bad line and parse what arrives.
 
+    Parameters
+    ----------
+    faults
+        Probabilities of faults for each byte.
+    rng
+        Content of the packets, and the faults.
+    n_packets
+        Number of packets.
+    sensor
+        Name of the sensor.
+
+    Returns
+    -------
+    LinkStatistics
+        Packets sent, recovered and false.
+
     Raises
     ------
     UnknownName

@@ -39,7 +39,22 @@ def held_out_chart(panels: Mapping[str, tuple[Methods, Mapping[str, float]]], pa
 
 
 def window_chart(outcomes: Mapping[str, HeldOutResult], goal: float, path: str | Path) -> Path:
-    """Draw the share of single windows recognised by the speed left out, a line for each way of adding examples."""
+    """Draw the share of single windows recognised by the speed left out, a line for each way of adding examples.
+
+    Parameters
+    ----------
+    outcomes
+        Way of adding examples → shares by speed.
+    goal
+        Share that is drawn as a line, 0 to 1.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
     with chart(path, (7.0, 4.2)) as figure:
         axes = figure.subplots()
         for (trained, outcome), colour, marker in zip(outcomes.items(), COLOURS, MARKERS, strict=False):

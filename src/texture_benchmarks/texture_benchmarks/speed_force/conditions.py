@@ -14,7 +14,13 @@ from texture_recordings.slide_dataset import SlideDataset
 
 
 def speed_mm_s(dataset: SlideDataset) -> Array:
-    """Return the speed of each slide, mm/s, (n_slides,)."""
+    """Return the speed of each slide, mm/s, (n_slides,).
+
+    Returns
+    -------
+    (n_slides,)
+        mm/s.
+    """
     return np.round(1000.0 * dataset.condition('speed'), 3)
 
 
@@ -33,6 +39,11 @@ def slide_trial(
         Features of each slide.
     tested_values : (n_slides, n_features)
         Features of the slides that are tested, if they are others.
+
+    Returns
+    -------
+    callable
+        Takes training and test slides, returns which test slides are recognised.
     """
     surfaces, names = dataset.labels, dataset.names
     tested = values if tested_values is None else tested_values
@@ -44,7 +55,19 @@ def slide_trial(
 
 
 def extracted(features: Sequence[Feature], windows: Sequence[WindowBatch]) -> Array:
-    """Return the values of features, one row for each window there is, (n, n_features)."""
+    """Return the values of features, one row for each window there is, (n, n_features).
+
+    Parameters
+    ----------
+    features
+        Features, one after the other.
+    windows
+        Batches of windows.
+
+    Returns
+    -------
+    (n, n_features)
+    """
     return np.concatenate([_rows(features, window) for window in windows])
 
 

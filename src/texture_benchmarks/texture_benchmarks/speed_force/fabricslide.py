@@ -62,7 +62,13 @@ class Fabricslide:
         return self.dataset.samples('signal_static')
 
     def splits(self) -> dict[str, dict[str, tuple[Mask, Mask]]]:
-        """Return train and test slides by protocol and by what is left out."""
+        """Return train and test slides by protocol and by what is left out.
+
+        Returns
+        -------
+        dict
+            Protocol → what is left out → train and test slides, (n_slides,) bool each.
+        """
         return {
             'one force out': one_out(self.dataset.condition('force')),
             'one speed out': one_out(speed_mm_s(self.dataset)),

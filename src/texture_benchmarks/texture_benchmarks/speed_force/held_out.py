@@ -51,7 +51,20 @@ class HeldOutResult:
 
 
 def one_out(conditions: AnyArray, within: Mask | None = None) -> dict[str, tuple[Mask, Mask]]:
-    """Return train and test slides of each condition left out in turn, by its name, among the slides `within`."""
+    """Return train and test slides of each condition left out in turn, by its name, among the slides `within`.
+
+    Parameters
+    ----------
+    conditions : (n_slides,)
+        Condition of each slide.
+    within : (n_slides,) bool
+        Slides that take part; None for all.
+
+    Returns
+    -------
+    dict
+        Condition → train and test slides, (n_slides,) bool each.
+    """
     among = np.ones(len(conditions), dtype=bool) if within is None else within
     return {
         f'{value:g}': (among & (conditions != value), among & (conditions == value))
@@ -60,7 +73,15 @@ def one_out(conditions: AnyArray, within: Mask | None = None) -> dict[str, tuple
 
 
 def run(trial: EvaluateSplit, parts: Mapping[str, tuple[Mask, Mask]]) -> HeldOutResult:
-    """Test each part."""
+    """Test each part.
+
+    Parameters
+    ----------
+    trial
+        Trains and tests.
+    parts
+        What is left out → train and test slides, (n_slides,) bool each.
+    """
     return HeldOutResult({name: trial(train, test) for name, (train, test) in parts.items()})
 
 
@@ -84,6 +105,10 @@ def run_chosen(
         What is left out in turn within the training.
     inner_trials
         Trials of the same names that evaluate the candidates there, if something else is to be tested than at the end.
+
+    Returns
+    -------
+    HeldOutResult
     """
     evaluations = candidates if inner_trials is None else inner_trials
     right, chosen = {}, {}
@@ -106,6 +131,10 @@ def recognised(learner: Learner, trained: tuple[Array, AnyArray, AnyArray], test
         Values (n, n_features), surfaces (n,) and slides (n,).
     tested
         Values (m, n_features) and surfaces (m,).
+
+    Returns
+    -------
+    (m,) bool
     """
     values, surfaces, slides = trained
     labels, codes = np.unique(surfaces, return_inverse=True)

@@ -72,7 +72,13 @@ class Ntp21:
         return self.dataset.samples('signal')
 
     def splits(self) -> dict[str, dict[str, tuple[Mask, Mask]]]:
-        """Return train and test slides by protocol and by what is left out."""
+        """Return train and test slides by protocol and by what is left out.
+
+        Returns
+        -------
+        dict
+            Protocol → what is left out → train and test slides, (n_slides,) bool each.
+        """
         speed, force = speed_mm_s(self.dataset), self.dataset.condition('force')
         slow = speed <= SLOW_MM_S
         return {

@@ -39,6 +39,10 @@ class NuisanceProjection:
             The load, as `centred_log_ratio` gives it, when the finger is about to slide and while it slides.
         energy
             As many directions are taken out as hold this share of the squared differences; none for 0.
+
+        Returns
+        -------
+        NuisanceProjection
         """
         _, strength, directions = np.linalg.svd(steady - starts, full_matrices=False)
         held = np.cumsum(strength**2) / np.sum(strength**2)

@@ -29,6 +29,11 @@ def explicit_euler(friction: StickSlip, step_s: float, exp: Any = math.exp) -> S
         Length of an integration step.
     exp
         `math.exp` for one slide in floats, `numpy.exp` for arrays.
+
+    Returns
+    -------
+    callable
+        Takes a Tip, speed and force at the end of the step, returns the next Tip.
     """
 
     def step(stretch: Value, slip: Value, bend: Value, speed: Value, force: Value) -> State:
@@ -49,6 +54,11 @@ def runge_kutta_4(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
         Length of an integration step.
     exp
         `math.exp` for one slide in floats, `numpy.exp` for arrays.
+
+    Returns
+    -------
+    callable
+        Takes a Tip, speed and force at the end of the step, returns the next Tip.
     """
 
     def ahead(tip: Tip, slope: Tip, by_s: float) -> Tip:
@@ -77,6 +87,11 @@ def exponential(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step
         Length of an integration step.
     exp
         `math.exp` for one slide in floats, `numpy.exp` for arrays.
+
+    Returns
+    -------
+    callable
+        Takes a Tip, speed and force at the end of the step, returns the next Tip.
     """
     f = friction
 
@@ -106,6 +121,11 @@ def euler_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) -> float
         Speed of the tip over the surface; 0 if it sticks.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    float
+        s; inf if every step is stable.
     """
     return min(-2 * root.real / abs(root) ** 2 for root in _decaying(friction, slip_m_s, force_n))
 
@@ -121,6 +141,11 @@ def runge_kutta_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) ->
         Speed of the tip over the surface; 0 if it sticks.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    float
+        s; inf if every step is stable.
     """
 
     def growth(size: float, direction: complex) -> float:
@@ -146,6 +171,11 @@ def exponential_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) ->
         Speed of the tip over the surface; 0 if it sticks.
     force_n
         Normal force, at least 0.
+
+    Returns
+    -------
+    float
+        s; inf if every step is stable.
     """
     f = friction
     sticking = slip_m_s == 0.0

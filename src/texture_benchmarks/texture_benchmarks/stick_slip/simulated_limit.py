@@ -51,6 +51,11 @@ def simulated_max_stable_step_s(
         Speed of the tip over the surface; 0 if it sticks.
     between_s
         Steps between which the limit is sought.
+
+    Returns
+    -------
+    float
+        s.
     """
     base_m_s = 0.0 if regime is ContactRegime.STICK else slip_m_s
     low, high = between_s

@@ -22,6 +22,20 @@ def trust_chart(recipes: Outcomes, title: str, path: str | Path) -> Path:
     """Draw, by recipe and disturbance, which slides were right, undecided or unknown, and wrong but taken for known.
 
     Each pair of columns shows the first certain estimate at the left and the end of the slide at the right.
+
+    Parameters
+    ----------
+    recipes
+        Recipe → disturbance → outcomes of the slides.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
     """
     rows = list(next(iter(recipes.values())))
     places = _places(rows)

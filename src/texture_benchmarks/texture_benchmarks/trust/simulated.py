@@ -65,6 +65,10 @@ def simulate(condition: Condition, count: int, rng: np.random.Generator, *, told
         Chooses places, effects and noise.
     told
         Whether the slides tell motion, speed, force and direction, as those of a robot do.
+
+    Returns
+    -------
+    SlideDataset
     """
     scene = load_scene(SCENE)
     parts = {

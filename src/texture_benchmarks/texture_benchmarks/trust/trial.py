@@ -151,7 +151,23 @@ class Outcome:
 
 
 def disturbed(item: LabelledSlide, row: Row, strength: float, rng: np.random.Generator) -> LabelledSlide:
-    """Return a slide under a disturbance of this strength."""
+    """Return a slide under a disturbance of this strength.
+
+    Parameters
+    ----------
+    item
+        Slide with its signals.
+    row
+        Kind of the disturbance.
+    strength
+        In the unit of the disturbance.
+    rng
+        Random numbers of the disturbance.
+
+    Returns
+    -------
+    LabelledSlide
+    """
     signals = {topic: _changed(item, topic, row, strength, rng) for topic in item.signals}
     return dataclasses.replace(item, signals=signals)
 
@@ -163,7 +179,21 @@ def evaluate_slides(model: TextureModel, slides: Sequence[LabelledSlide]) -> lis
 
 
 def evaluate_vectors(model: TextureModel, surface: str, vectors: Sequence[FeatureVector]) -> SlideResult:
-    """Return what a model says of the windows of one slide."""
+    """Return what a model says of the windows of one slide.
+
+    Parameters
+    ----------
+    model
+        Trained model.
+    surface
+        True label of the slide.
+    vectors
+        Its windows and its end.
+
+    Returns
+    -------
+    SlideResult
+    """
     evidence = EvidenceAccumulator(model)
     estimates = [evidence.update(vector) for vector in vectors]
     alone = model.decide(np.stack([vector.values for vector in vectors])) if vectors else []

@@ -47,7 +47,7 @@ def slow_drag(friction: StickSlip, speed_m_s: float, force_n: float) -> LimitCyc
     Returns
     -------
     LimitCycle
-        Period in s and amplitudes.
+        Times in s, and the swing of the force in N.
     """
     drop_n = (friction.static - friction.kinetic) * force_n
     natural_1_s = math.sqrt(friction.skin_n_m / friction.mass_kg)
