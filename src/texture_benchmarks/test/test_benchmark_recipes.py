@@ -70,7 +70,7 @@ def test_recipes_are_compared_on_windows_of_one_length_without_what_the_session_
     vote = comparable(load_recipe('ets-linear-svm-vote'), 1000.0, of_motion=True)
     assert vote.feature_set.windows.length_s == 0.1
     assert vote.feature_set.as_mapping()['inputs']['signal']['stretch_to_m_s'] == 0.15
-    spectrum = comparable(load_recipe('hu-pca-svm'), 1000.0, of_motion=False).feature_set
+    spectrum = comparable(load_recipe('hu-log-pca-svm'), 1000.0, of_motion=False).feature_set
     assert (spectrum.windows.length_s, spectrum.inputs[0].features[0][1].points) == (0.5, 250)
 
 

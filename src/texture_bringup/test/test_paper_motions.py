@@ -44,7 +44,7 @@ PAIRS = {
         'jamali-symbols',
     ),
     'kaboli': ('kaboli-svm', 'kaboli-pa', 'kaboli-pa-ovr', 'kaboli-em', 'kaboli-svm-rbf'),
-    'hu': ('hu-pca-svm',),
+    'hu': ('hu-pca-svm', 'hu-log-pca-svm'),
 }
 
 

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from texture_core.features import FeatureVector
-from texture_estimation.classification.evidence_rules import MajorityVote
+from texture_estimation.classification.evidence_rules import GroupedEvidence, MajorityVote
 from texture_estimation.classification.training import train
-from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.open_set.domain import Domain
 from texture_estimation.recipe import load_recipe
+from texture_estimation.search.fitness import decided_by_slide
 
 
 def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):
@@ -190,3 +191,41 @@ def test_a_slide_whose_windows_disagree_is_unclassified_until_enough_of_them_agr
     assert [(estimate.label, estimate.known) for estimate in estimates[2:]] == [('felt', True)] * 7
     assert estimates[0].probabilities == pytest.approx([0.25] * 4)
     assert estimates[-1].confidence == pytest.approx(1.0, abs=1e-3)
+
+
+def voted(votes, group=5):
+    """Return what is decided after each window, given for which of two labels it votes; None for undecided."""
+    rule, evidence, decided = MajorityVote(windows=group), GroupedEvidence(2, group), []
+    for vote in votes:
+        evidence.add(np.eye(2)[vote], 0.1)
+        posterior = rule.posterior(evidence.mean, evidence.time_s / 0.1, 1.0)
+        decided.append(int(posterior.argmax()) if np.ptp(posterior) > 1e-9 else None)
+    return decided
+
+
+def test_five_windows_vote_together_and_then_the_next_five():
+    # Roberge et al.: three equal answers of five decide, on 0.5 s; what came before does not count.
+    assert voted([0, 0, 0, 0, 0, 1, 1, 1, 1, 1])[4:] == [0, 0, 0, 0, 0, 1]
+    assert voted([0, 0, 0, 1, 1]) == [None, None, 0, 0, 0]
+    assert voted([0, 0, 0, 0, 0, 1, 1, 1, 1, 1], group=0)[-1] is None  # five against five of all ten
+
+
+def test_the_live_vote_is_that_of_the_search():
+    rng = np.random.default_rng(0)
+    scores = rng.normal(size=(12, 2))
+    rule = MajorityVote()
+    decided, _ = decided_by_slide(scores, np.zeros(12, dtype=int), rule, 1.0)
+    votes = scores.argmax(axis=1)[5:10]  # the second complete group of five
+    assert decided.tolist() == [int(votes.mean() > 0.5)]
+    assert voted(scores.argmax(axis=1))[-1] == decided[0]
+
+
+def test_a_decision_alone_is_that_of_five_windows_where_five_vote(model, examples):
+    voting = dataclasses.replace(model, recipe=dataclasses.replace(model.recipe, evidence=MajorityVote()))
+    rows = np.flatnonzero(examples.groups == examples.groups[0])
+    values = np.concatenate([examples.values[rows]] * 5)[:12]
+    assert len(single_decisions(model, values)) == 12
+    assert len(single_decisions(voting, values)) == 2
+    assert single_decisions(voting, values) == [examples.labels[0]] * 2
+    assert len(single_decisions(voting, values[:3])) == 1
+    assert single_decisions(voting, values[:0]) == []

@@ -10,13 +10,38 @@ from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
+from texture_estimation.classification.evidence_rules import GroupedEvidence
 from texture_estimation.fingerprint import fingerprint_difference
+from texture_estimation.log_probabilities import is_tied
 from texture_estimation.model import TextureModel
 from texture_estimation.open_set.novelty import SlideNovelty
 from texture_features.slide_conditions import RunningConditions
 
+UNTEMPERED = 1.0
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
 NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
+
+
+def single_decisions(model: TextureModel, values: Array) -> list[str]:
+    """Return what each window of a slide decides alone or, where windows vote together, what each complete group does.
+
+    A slide that is shorter than a group gives one decision.
+
+    Parameters
+    ----------
+    values : (n_windows, n_features)
+        Of the consecutive windows of one slide.
+    """
+    rule = model.recipe.evidence
+    if not rule.group or not len(values):
+        return model.decide(values) if len(values) else []
+    evidence = rule.window_evidence(model.predict_log_proba(values))
+    complete = len(values) // rule.group
+    groups = evidence[: complete * rule.group].reshape(complete, rule.group, -1) if complete else evidence[None]
+    posteriors = rule.log_posterior(groups.mean(axis=1), float(groups.shape[1]), UNTEMPERED)
+    tied = is_tied(posteriors).tolist()
+    best = posteriors.argmax(axis=-1).tolist()
+    return ['' if none else model.labels[index] for index, none in zip(best, tied, strict=True)]
 
 
 class EvidenceAccumulator:
@@ -59,10 +84,12 @@ class EvidenceAccumulator:
         self._window_ns = 0
         self._end_ns = 0
         self._message = '' if self.model else NO_MODEL
-        self._sum = np.zeros(len(self.model.labels) if self.model else 0)
+        self._evidence = GroupedEvidence(
+            len(self.model.labels) if self.model else 0, self.model.recipe.evidence.group if self.model else 0
+        )
         self._zeros = np.zeros(len(self.model.names) if self.model else 0)
         detector = self.model.active_novelty_detector if self.model else None
-        self._novelty = SlideNovelty(detector.distances, len(self._sum)) if detector else None
+        self._novelty = SlideNovelty(detector.distances, len(self.model.labels)) if self.model and detector else None
         self._conditions = RunningConditions()
         self._deviation = ''  # of these conditions from those of the training
 
@@ -88,11 +115,12 @@ class EvidenceAccumulator:
         self._conditions.update(vector)
         self._deviation = model.active_domain.deviation(self._conditions.get())
         window_evidence = model.recipe.evidence.window_evidence(model.predictor(vector.values))
-        self._sum += window_evidence
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns
-        self._evidence_ns += max(0, end - max(vector.start_ns, self._end_ns))
+        new_ns = max(0, end - max(vector.start_ns, self._end_ns))
+        self._evidence.add(window_evidence, new_ns / NANOSECONDS)
+        self._evidence_ns += new_ns
         self._end_ns = max(end, self._end_ns)
         if self._novelty is not None:
             best = int(window_evidence.argmax())
@@ -112,8 +140,9 @@ class EvidenceAccumulator:
             )
         # All windows have the same weight; their effective number follows from the sliding time that they cover.
         effective_windows = self._evidence_ns / self._window_ns
-        mean = self._sum / self._windows
-        probabilities = model.recipe.evidence.posterior(mean, effective_windows, model.tempering_exponent)
+        mean = self._evidence.mean
+        deciding = self._evidence.time_s * NANOSECONDS / self._window_ns
+        probabilities = model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent)
         listed = probabilities.tolist()
         confidence = max(listed)
         best, decided = listed.index(confidence), listed.count(confidence) == 1

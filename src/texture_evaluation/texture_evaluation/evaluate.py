@@ -15,7 +15,7 @@ from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
-from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.model import TextureModel, load_model
 from texture_evaluation import metrics
@@ -222,6 +222,6 @@ def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEven
             used.append(vector.values)
             received.append(estimate)
         before = estimate.windows
-    alone = model.decide(np.stack(used)) if used else []
+    alone = single_decisions(model, np.stack(used)) if used else []
     final = next((estimate for estimate in reversed(estimates) if estimate.final), None)
     return SlideResult(slide.surface, alone, received, final), taken_us

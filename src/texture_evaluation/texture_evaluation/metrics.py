@@ -24,7 +24,7 @@ class SlideResult:
     surface
         The true label.
     window_labels : (n_windows,)
-        What each window alone looks like; '' if it cannot be told.
+        What each window alone looks like, or each complete group of windows that vote together; '' if undecided.
     estimates : (n_windows,)
         The estimate after each window, from all evidence so far.
     final

@@ -52,7 +52,7 @@ SCALING = {
     'low_fft_bins': SHIFTED,
     'log_variance': SHIFTED,
     'log_difference_variance': SHIFTED,
-    'log_spectrum': SHIFTED,
+    'spectrum': SHIFTED,
     'short_time_fourier': SHIFTED,
     'wavelet_energy': SHIFTED,
     'mean_amplitude': TIMES,

@@ -11,13 +11,13 @@ from texture_features.catalogue import FEATURES
 from texture_features.feature import WindowBatch
 from texture_features.feature_set import FeatureSet
 from texture_features.features.correlation import Correlation, cell_means, ranks
-from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.mean_amplitude import MeanAmplitude
 from texture_features.features.mean_hjorth import MeanHjorth
 from texture_features.features.ordinal_patterns import OrdinalPatterns
 from texture_features.features.region_peaks import RegionPeaks, region_peaks
 from texture_features.features.short_time_fourier import ShortTimeFourier
 from texture_features.features.spectral_peaks import SpectralPeaks
+from texture_features.features.spectrum import Spectrum
 from texture_features.features.wavelet_energy import DB4, WaveletEnergy, wavelet_energies
 from texture_features.spectra.spectrum import hann, long_densities
 
@@ -141,10 +141,24 @@ def test_mean_hjorth_is_the_mean_of_hjorth():
     np.testing.assert_allclose(mean[0], each.mean(axis=0))
 
 
-def test_log_spectrum_is_scipys_periodogram():
+def test_the_log_spectrum_is_scipys_periodogram():
     samples = noise(500, 2)
     _, expected = scipy_signal.periodogram(samples, RATE_HZ, window=hann(500), nfft=2048, axis=0)
-    np.testing.assert_allclose(np.exp(LogSpectrum(points=1024)(windows(samples))), expected[1:].T, rtol=1e-8)
+    np.testing.assert_allclose(np.exp(Spectrum(points=1024)(windows(samples))), expected[1:].T, rtol=1e-8)
+
+
+def test_the_spectrum_is_given_as_power_or_magnitude_by_name():
+    samples = noise(500, 2)
+    _, density = scipy_signal.periodogram(samples, RATE_HZ, window=hann(500), nfft=2048, axis=0)
+    for scale, expected in (('power', density), ('magnitude', np.sqrt(density))):
+        np.testing.assert_allclose(Spectrum(points=1024, scale=scale)(windows(samples)), expected[1:].T, rtol=1e-8)
+
+
+def test_twice_the_signal_is_four_times_the_power_and_twice_the_magnitude():
+    samples = noise(500, 1)
+    for scale, factor in (('power', 4.0), ('magnitude', 2.0)):
+        once, twice = (Spectrum(points=64, scale=scale)(windows(gain * samples)) for gain in (1.0, 2.0))
+        np.testing.assert_allclose(twice, factor * once)
 
 
 def test_long_windows_are_averaged_over_half_overlapping_segments():

@@ -12,7 +12,6 @@ from texture_features.features.force import Force
 from texture_features.features.hjorth import Hjorth
 from texture_features.features.log_bands import LogBands
 from texture_features.features.log_difference_variance import LogDifferenceVariance
-from texture_features.features.log_spectrum import LogSpectrum
 from texture_features.features.log_variance import LogVariance
 from texture_features.features.low_fft_bins import LowFftBins
 from texture_features.features.mean import ChannelMean
@@ -34,6 +33,7 @@ from texture_features.features.spatial_bands import SpatialBands
 from texture_features.features.spatial_variation import SpatialVariation
 from texture_features.features.spectral_exponent import SpectralExponent
 from texture_features.features.spectral_peaks import SpectralPeaks
+from texture_features.features.spectrum import Spectrum
 from texture_features.features.speed import Speed
 from texture_features.features.temporal_variation import TemporalVariation
 from texture_features.features.wavelet_energy import WaveletEnergy
@@ -50,7 +50,7 @@ FEATURES: Mapping[str, type[Feature]] = {
     'mean_amplitude': MeanAmplitude,  # Jamali & Sammut 2010
     'mean_hjorth': MeanHjorth,  # Kaboli et al. 2015
     'correlation': Correlation,  # Kaboli et al. 2015
-    'log_spectrum': LogSpectrum,  # Hu et al. 2014
+    'spectrum': Spectrum,  # Hu et al. 2014
     'short_time_fourier': ShortTimeFourier,
     'wavelet_energy': WaveletEnergy,  # Daubechies 1992
     'moments': Moments,

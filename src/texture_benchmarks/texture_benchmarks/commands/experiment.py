@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from texture_benchmarks.papers import EXPERIMENTS, Experiment, run_experiment
+from texture_benchmarks.papers import EXPERIMENTS, Experiment, run_experiment, run_over_seeds
 from texture_core.command_options import add_seed
 
 
@@ -17,12 +17,19 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--tune', action='store_true', help="search the recipe's parameters first, as the paper does, if it can"
     )
+    parser.add_argument(
+        '--seeds', type=int, default=1, metavar='N', help='so many seeds from --seed on: mean and interval over them'
+    )
     add_seed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run one experiment, print its table and name the files."""
-    result, path = run_experiment(options.name, Experiment(options.out, options.seed, options.quick, options.tune))
+    experiment = Experiment(options.out, options.seed, options.quick, options.tune)
+    if options.seeds == 1:
+        result, path = run_experiment(options.name, experiment)
+    else:
+        result, path = run_over_seeds(options.name, experiment, options.seeds)
     print(f'{result.name}: {result.measured}')
     print(f'data: {result.data}; split: {result.split}')
     for line in result.lines:

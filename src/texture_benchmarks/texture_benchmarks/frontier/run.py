@@ -34,7 +34,7 @@ LENGTHS_S, FEW_LENGTHS_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0), (0.1, 0.5, 2.0)
 RECIPES: Mapping[str, Sequence[float]] = {
     'default': LENGTHS_S,
     'fast': LENGTHS_S,
-    'hu-pca-svm': FEW_LENGTHS_S,
+    'hu-log-pca-svm': FEW_LENGTHS_S,
     'ets-linear-svm': FEW_LENGTHS_S,
     'kaboli-svm-rbf': FEW_LENGTHS_S,
     'jamali-naive-bayes-5': FEW_LENGTHS_S,

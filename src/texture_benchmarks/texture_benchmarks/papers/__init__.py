@@ -9,6 +9,7 @@ from pathlib import Path
 from texture_benchmarks.papers import ets_circular, ets_fine, ets_linear, hu, jamali, kaboli, roughness
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult, Run
 from texture_benchmarks.papers.report import run
+from texture_benchmarks.papers.seeds import over_seeds
 from texture_core.catalogue import find
 
 PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fine, jamali, kaboli, hu))
@@ -18,7 +19,7 @@ EXPERIMENTS: Mapping[str, Run] = {
     'roughness': roughness.run,  # Rispal et al.: grades of textures never touched
 }
 
-__all__ = ['EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment']
+__all__ = ['EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment', 'run_over_seeds']
 
 
 def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
@@ -30,4 +31,16 @@ def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult,
         If there is no such experiment or it cannot be run.
     """
     result = find(EXPERIMENTS, name, 'experiment')(experiment)
+    return result, result.write(experiment.out)
+
+
+def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[ExperimentResult, Path]:
+    """Run one experiment with so many seeds from its own on; return what `run_experiment` does.
+
+    Raises
+    ------
+    TextureError
+        If there is no such experiment, it cannot be run, or there are fewer than two seeds.
+    """
+    result = over_seeds(find(EXPERIMENTS, name, 'experiment'), name, experiment, count)
     return result, result.write(experiment.out)

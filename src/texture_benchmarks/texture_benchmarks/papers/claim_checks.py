@@ -97,7 +97,7 @@ def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
     """
     test = outcome.test
     over = Interval(test.value - border, test.low - border, test.high - border)
-    return Finding(claim, percent(test), over, over.high >= 0.0)
+    return Finding(claim, percent(test), over, over.high >= 0.0, reaches=True)
 
 
 def most_errors(claim: str, outcome: MethodResult, pairs: Sequence[Pair]) -> Finding:

@@ -40,7 +40,6 @@ def findings(outcomes: MethodResults) -> list[Finding]:
     """Check what section V tells."""
     ann, svm = outcomes[TASK, ANN], outcomes[TASK, SVM]
     return [
-        at_least('fine textures are recognised, SVM (95.8 %)', svm, 0.958),
         at_least('fine textures are recognised, ANN (94.9 %)', ann, 0.949),
         most_errors('most errors: protruding with sunken motifs (22 of 84)', svm, [('pm_plastic', 'sm_plastic')]),
         most_errors('as many: smooth plastic with paper (30 of 84)', svm, [('smooth_plastic', 'sheet_of_paper')]),

@@ -23,12 +23,18 @@ class Experiment:
         Fewer slides, for tests; such numbers are not for publishing.
     tune
         Search the parameters first, as the paper does; refused where the paper has no search.
+    splits
+        Try each method on at most so many of the splits; 0 for all.
+    papers_only
+        Leave our own recipes out.
     """
 
     out: Path
     seed: int = 0
     quick: bool = False
     tune: bool = False
+    splits: int = 0
+    papers_only: bool = False
 
 
 @dataclass(frozen=True)

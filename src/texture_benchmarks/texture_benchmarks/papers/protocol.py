@@ -8,11 +8,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.model_selection import (
+    BaseCrossValidator,
+    RepeatedStratifiedKFold,
+    ShuffleSplit,
+    StratifiedShuffleSplit,
+)
 
 from texture_benchmarks.papers.interval import Interval
 from texture_benchmarks.papers.method_result import MethodResult
 from texture_estimation.learners.learner import Codes
-from texture_estimation.search.halves import random_halves
 from texture_features.windowing.windows import WindowParams
 from texture_simulation.simulated_slide import SimulatedSlide
 
@@ -152,12 +157,15 @@ class Finding:
         What decides, with 95 %.
     holds
         None if the interval does not decide.
+    reaches
+        Whether the claim is that a figure is reached: it holds where the interval does not lie below 0 as a whole.
     """
 
     claim: str
     here: str
     interval: Interval
     holds: bool | None
+    reaches: bool = False
 
 
 MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what came out
@@ -221,9 +229,18 @@ class Protocol:
 
 def halves(count: int) -> Splitter:
     """Return what draws random halves, each surface halved."""
+    return _of(lambda quick, seed: StratifiedShuffleSplit(2 if quick else count, train_size=0.5, random_state=seed))
+
+
+def _of(make: Callable[[bool, int], BaseCrossValidator]) -> Splitter:
+    """Return the splits of one of scikit-learn's splitters, as which slides each trains on."""
 
     def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
-        return random_halves(codes, np.arange(len(codes)), 2 if quick else count, rng)
+        parts = list(make(quick, int(rng.integers(2**31))).split(codes, codes))
+        trained_on = np.zeros((len(parts), len(codes)), dtype=bool)
+        for row, (training, _) in zip(trained_on, parts, strict=True):
+            row[training] = True
+        return trained_on
 
     return divide
 
@@ -231,28 +248,18 @@ def halves(count: int) -> Splitter:
 def folds(count: int, repeats: int) -> Splitter:
     """Return what holds out each part of the slides in turn, each surface assigned at random, several times."""
 
-    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
-        trained_on = []
-        for _ in range(1 if quick else repeats):
-            part = np.empty(len(codes), dtype=np.intp)
-            for code in np.unique(codes):
-                rows = np.flatnonzero(codes == code)
-                part[rows] = rng.permutation(len(rows)) % count
-            trained_on += [part != held for held in range(2 if quick else count)]
-        return np.stack(trained_on)
+    def splitter(quick: bool, seed: int) -> BaseCrossValidator:
+        of_all: BaseCrossValidator = RepeatedStratifiedKFold(
+            n_splits=2 if quick else count, n_repeats=1 if quick else repeats, random_state=seed
+        )
+        return of_all
 
-    return divide
+    return _of(splitter)
 
 
 def drawn(share: float, count: int) -> Splitter:
     """Return what draws so large a share of all slides for training, whatever their surface."""
-
-    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
-        ranks = np.stack([rng.permutation(len(codes)) for _ in range(2 if quick else count)])
-        trained_on: Mask = ranks < round(share * len(codes))
-        return trained_on
-
-    return divide
+    return _of(lambda quick, seed: ShuffleSplit(2 if quick else count, train_size=share, random_state=seed))
 
 
 def training_in(condition: str) -> Splitter:

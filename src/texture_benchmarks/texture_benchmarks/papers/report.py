@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import hashlib
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,9 @@ from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
 from texture_benchmarks.papers.method_result import MethodResult
 from texture_benchmarks.papers.paper_charts import accuracy_chart, confusions_chart
 from texture_benchmarks.papers.protocol import Finding, Method, MethodResults, Protocol, RecognitionTask, Table
-from texture_benchmarks.papers.trial import NONE, TunedRecipes, outcomes, searched
+from texture_benchmarks.papers.trial import NONE, TunedRecipes, outcomes, searched, without_ours
 from texture_core.arrays import AnyArray
+from texture_estimation.recipe import load_recipe
 from texture_simulation.scene import load_scene
 
 TUNED = '-tuned'
@@ -25,8 +28,9 @@ VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
     """Rebuild a paper's experiment on simulated surfaces."""
     scene = load_scene(protocol.scene)
+    protocol = without_ours(protocol) if experiment.papers_only else protocol
     tuned = searched(protocol, scene, experiment.seed, quick=experiment.quick) if experiment.tune else NONE
-    found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned)
+    found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned, splits=experiment.splits)
     name = f'{protocol.name}{TUNED if tuned else ""}'
     checked = protocol.findings(found)
     slides = {task.name: _slides(found[task.name, task.methods[0].name]) for task in protocol.tasks}
@@ -39,6 +43,8 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
         ),
         split=f'{protocol.split}{SEARCHED if tuned else ""}',
         numbers={
+            'seed': experiment.seed,
+            'recipes': digests(method.recipe for task in protocol.tasks for method in task.methods),
             'difficulty': _difficulty(protocol, found),
             'tasks': {task.name: {m.name: _figures(m, found[task.name, m.name]) for m in task.methods}
                       for task in protocol.tasks},
@@ -48,6 +54,17 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
         charts=_charts(protocol, found, name, experiment.out),
         lines=(*_lines(protocol, found, checked), *_tuning_lines(tuned, experiment.out)),
     )  # fmt: skip
+
+
+def digests(recipes: Iterable[str]) -> dict[str, str]:
+    """Return what tells the present definition of each recipe from another one, in eight letters."""
+    return {name: digest(load_recipe(name).as_mapping()) for name in sorted(set(recipes))}
+
+
+def digest(definition: Mapping[str, Any]) -> str:
+    """Return what tells a definition from another one, in eight letters; words that describe it do not count."""
+    counted = {name: value for name, value in definition.items() if name != 'description'}
+    return hashlib.sha256(json.dumps(counted, sort_keys=True).encode()).hexdigest()[:8]
 
 
 def _slides(outcome: MethodResult) -> int:
@@ -87,6 +104,7 @@ def finding_as_json(finding: Finding) -> dict[str, Any]:
         'here': finding.here,
         'interval': finding.interval.as_json(),
         'verdict': VERDICTS[finding.holds],
+        'reaches': finding.reaches,
     }
 
 
@@ -127,8 +145,8 @@ def _lines(protocol: Protocol, found: MethodResults, checked: Sequence[Finding])
     anchor = protocol.anchor
     where = f'{anchor.task} of {anchor.experiment}' if anchor.experiment else anchor.task
     yield (
-        f'difficulty: {anchor.setting}, set so that {anchor.method} ({where}) recognises {100 * anchor.test:.1f} % '
-        f'({anchor.source}){f"; {anchor.shortfall}" if anchor.shortfall else ""}'
+        f'anchor, no finding: {anchor.setting}, set so that {anchor.method} ({where}) recognises '
+        f'{100 * anchor.test:.1f} % ({anchor.source}){f"; {anchor.shortfall}" if anchor.shortfall else ""}'
     )
     yield 'findings of the paper:'
     for finding in checked:

@@ -12,7 +12,7 @@ from scipy.stats import norm
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
 from texture_benchmarks.papers.interval import mean
 from texture_benchmarks.papers.protocol import Finding
-from texture_benchmarks.papers.report import finding_as_json
+from texture_benchmarks.papers.report import digest, finding_as_json
 from texture_benchmarks.papers.roughness_answers import Answers
 from texture_benchmarks.papers.roughness_charts import Series, coverage_chart, grades_chart
 from texture_benchmarks.papers.roughness_report import lines
@@ -66,6 +66,8 @@ def run(experiment: Experiment) -> ExperimentResult:
     train, test = setup.grades.used_for(TRAIN), setup.grades.used_for(TEST)
     tuned = _tuned(setup, recipes, experiment) if experiment.tune else {}
     recipes |= {name: one.recipe for name, one in tuned.items()}
+    if experiment.papers_only:
+        return _table_2(setup, {name: recipe for name, recipe in recipes.items() if recipe.name != OURS})
     models = {name: train_grades(one, setup.examples(one, train), setup.grades, name) for name, one in recipes.items()}
     answers = {
         name: {
@@ -76,6 +78,8 @@ def run(experiment: Experiment) -> ExperimentResult:
         for name, recipe in recipes.items()
     }
     numbers: dict[str, Any] = {
+        'seed': experiment.seed,
+        'recipes': {recipe: _digest(recipe) for recipe in RECIPES.values()},
         'paper': {name: dict(zip(COLUMNS, row, strict=True)) for name, row in PAPER.items()},
         'one_person': ONE_PERSON,
         'targets': TARGETS,
@@ -108,6 +112,35 @@ def run(experiment: Experiment) -> ExperimentResult:
         charts=_charts(setup, answers, numbers['ours_other_splits'], experiment),
         lines=tuple(lines(numbers, setup.grades)),
     )
+
+
+def _table_2(setup: Setup, recipes: Mapping[str, RoughnessRecipe]) -> ExperimentResult:
+    """Return the errors of the paper's heads alone, on the textures trained and on the others, and the findings."""
+    train, test = setup.grades.used_for(TRAIN), setup.grades.used_for(TEST)
+    answers = {}
+    for name, recipe in recipes.items():
+        quick = _quickly(recipe, setup)
+        model = train_grades(quick, setup.examples(quick, train), setup.grades, name)
+        parts = {'seen': train, 'unseen': test}
+        answers[name] = {part: setup.ask(model, setup.examples(recipe, of)) for part, of in parts.items()}
+    return ExperimentResult(
+        name='roughness',
+        measured='mean absolute error in grades of single windows, by the heads of the paper',
+        data=f'simulated: {len(setup.textures)} surfaces, {setup.scans} scans each',
+        split=f"by texture, the paper's: {len(train)} for training, {len(test)} for test",
+        numbers={
+            'seed': setup.seed,
+            'recipes': {recipe: _digest(recipe) for name, recipe in RECIPES.items() if name in recipes},
+            'regressors': {
+                name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()
+            },
+            'findings': [finding_as_json(finding) for finding in findings(answers)],
+        },
+    )
+
+
+def _digest(recipe: str) -> str:
+    return digest(load_roughness_recipe(recipe).as_mapping())
 
 
 def findings(answers: Mapping[str, Mapping[str, Answers]]) -> list[Finding]:

@@ -25,11 +25,14 @@ from texture_features.windowing.time_stretch import Stretched
 from texture_simulation.scene import Scene
 
 FAST, SLOW = 'signal', 'signal_static'
+OUR_RECIPES = ('default', 'vibration-and-taxels')
 TunedRecipes = Mapping[tuple[str, str], TunedRecipe[Recipe]]  # by task and recipe
 NONE: TunedRecipes = {}
 
 
-def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE) -> MethodResults:
+def outcomes(
+    protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE, splits: int = 0
+) -> MethodResults:
     """Return what comes out of each method in each task.
 
     Parameters
@@ -44,6 +47,8 @@ def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned:
         Whether fewer slides will do.
     tuned
         Recipes that were searched for.
+    splits
+        Each method is tried on at most so many splits; 0 for all.
 
     Returns
     -------
@@ -53,12 +58,28 @@ def outcomes(protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned:
     return {
         (task.name, method): outcome
         for task in protocol.tasks
-        for method, outcome in of_task(protocol, task, scene, seed, quick=quick, tuned=tuned)
+        for method, outcome in of_task(protocol, task, scene, seed, quick=quick, tuned=tuned, splits=splits)
     }
 
 
+def without_ours(protocol: Protocol) -> Protocol:
+    """Return the protocol with the methods of the paper and their variations alone."""
+    tasks = [
+        replace(task, methods=tuple(method for method in task.methods if method.recipe not in OUR_RECIPES))
+        for task in protocol.tasks
+    ]
+    return replace(protocol, tasks=tuple(tasks))
+
+
 def of_task(
-    protocol: Protocol, task: RecognitionTask, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE
+    protocol: Protocol,
+    task: RecognitionTask,
+    scene: Scene,
+    seed: int,
+    *,
+    quick: bool,
+    tuned: TunedRecipes = NONE,
+    splits: int = 0,
 ) -> Iterator[tuple[str, MethodResult]]:
     """Yield what comes out of each method in one task.
 
@@ -89,8 +110,8 @@ def of_task(
     for method in task.methods:
         found = tuned.get((task.name, method.recipe))
         recipe = found.recipe if found else recipe_of(method)
-        splits = trained_on[:1] if found else trained_on[: method.splits or None]
-        yield method.name, evaluate_method(recipe, slides, splits, method.views, singly=method.singly)
+        most = 1 if found else min(filter(None, (method.splits, splits)), default=len(trained_on))
+        yield method.name, evaluate_method(recipe, slides, trained_on[:most], method.views, singly=method.singly)
 
 
 def searched(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> TunedRecipes:

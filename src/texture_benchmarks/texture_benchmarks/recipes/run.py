@@ -98,7 +98,7 @@ VARIANTS: Mapping[str, Variant] = {
     'ets-linear-svm, ties to the nearest': Variant(NEAREST),
     'ets-linear-svm, ties to the nearest, overlapping': Variant(NEAREST, OVERLAPPING_S),
     'ets-fine-svm, ties to the nearest': Variant(NEAREST),
-    'hu-pca-svm, 99 % of the variance': Variant({'variance': 0.99, 'gamma': 1.0, 'c': 10.0}),
+    'hu-log-pca-svm, 99 % of the variance': Variant({'variance': 0.99, 'gamma': 1.0, 'c': 10.0}),
     'jamali-naive-bayes-5, overlapping': Variant(apart_s=OVERLAPPING_S),
 }
 # They describe what only an array of taxels measures.

@@ -24,7 +24,7 @@ from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature import Feature
 from texture_features.feature_set import InputFeatures
 from texture_features.features.force import Force
-from texture_features.features.log_spectrum import LogSpectrum
+from texture_features.features.spectrum import Spectrum
 from texture_features.features.speed import Speed
 from texture_features.windowing.time_stretch import Stretched
 from texture_recordings.slide_dataset import SlideDataset, cut_slide
@@ -215,6 +215,6 @@ def _adapted_feature(feature: Feature, n_samples: int, of_motion: bool) -> Featu
     if isinstance(feature, Stretched):
         own = _adapted_feature(feature.feature, n_samples, of_motion)
         return dataclasses.replace(feature, feature=own) if of_motion else own
-    if isinstance(feature, LogSpectrum):  # padding a window with zeros adds points, but nothing to them
+    if isinstance(feature, Spectrum):  # padding a window with zeros adds points, but nothing to them
         return dataclasses.replace(feature, points=min(feature.points, max(2, n_samples // 2)))
     return feature

@@ -53,6 +53,13 @@ class SvmMaxWins:
         1.0, 'Gamma of the kernel exp(-gamma d² / (n_components · variance)); larger is narrower.', low=1e-9, high=1e9
     )
 
+    centre: str = param(
+        'features',
+        "Sets what is subtracted before the components are sought: 'features' the mean of each feature over the "
+        "examples, 'examples' the mean of each example over its features, as eq. 7 of the paper has it.",
+        choices=('features', 'examples'),
+    )
+
     def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
@@ -83,23 +90,29 @@ class SvmMaxWins:
         return PcaSvmPredictor(parameters['mean'], parameters['components'], svm, PairVotes(n_labels))
 
     def _components(self, values: Array) -> tuple[Array, Array]:
-        """Return the mean, (n_features,), and the components of all blocks, (n_features, n_components)."""
+        """Return the mean, (n_features,), and the components of all blocks, (n_features, n_components).
+
+        Where the mean of each example is subtracted, the components hold that: x - mean(x) projected on p is x
+        projected on p - mean(p).
+        """
         n_features = values.shape[1]
         if n_features % self.blocks:
             raise InvalidParameter(
                 f"parameter 'blocks' of svm_max_wins is {self.blocks}, which does not divide {n_features} features; "
                 'give as many blocks as directions are joined'
             )
-        mean = values.mean(axis=0)
+        of_examples = self.centre == 'examples'
+        mean = np.zeros(n_features) if of_examples else values.mean(axis=0)
         size = n_features // self.blocks
         found = [
-            principal_components(part - part.mean(axis=0), self.variance)
+            principal_components(part - part.mean(axis=int(of_examples), keepdims=True), self.variance)
             for part in np.split(values, self.blocks, axis=1)
         ]
         components = np.zeros((n_features, sum(part.shape[1] for part in found)))
         column = 0
         for block, part in enumerate(found):
-            components[block * size : (block + 1) * size, column : column + part.shape[1]] = part
+            own = part - part.mean(axis=0) if of_examples else part
+            components[block * size : (block + 1) * size, column : column + part.shape[1]] = own
             column += part.shape[1]
         return mean, components
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.classification.evidence_rules import EvidenceRule
+from texture_estimation.classification.evidence_rules import EvidenceRule, deciding_rows
 from texture_estimation.learners.learner import Codes
 from texture_estimation.log_probabilities import log_softmax
 from texture_estimation.search.halves import Mask
@@ -70,7 +70,7 @@ def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share
     slides : (n,)
         Number of each window's slide.
     rule
-        Joins the windows.
+        Joins the windows; of a slide with several groups that decide by themselves, the newest complete one counts.
     hop_share
         Distance of the windows over their length: of what overlaps, only the new part counts.
 
@@ -83,6 +83,12 @@ def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share
     """
     _, first, member = np.unique(slides, return_index=True, return_inverse=True)
     member = member.reshape(-1)
+    if rule.group:
+        kept = np.zeros(len(member), dtype=bool)
+        for number in range(len(first)):
+            rows = np.flatnonzero(member == number)
+            kept[rows[deciding_rows(len(rows), rule.group)]] = True
+        member, scores = member[kept], scores[kept]
     counts = np.bincount(member)
     window_evidence_rows = rule.window_evidence(log_softmax(scores))
     sums = np.stack([np.bincount(member, weights=column) for column in window_evidence_rows.T], axis=1)

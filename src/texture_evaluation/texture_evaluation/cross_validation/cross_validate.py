@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_estimation.classification.training import train
-from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_evaluation import metrics
@@ -229,7 +229,7 @@ def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str,
         *windows, end = features.vectors(slide)
         evidence = EvidenceAccumulator(model)
         estimates = [evidence.update(vector) for vector in windows]
-        alone = model.decide(np.stack([vector.values for vector in windows]))
+        alone = single_decisions(model, np.stack([vector.values for vector in windows]))
         surface = str(features.labels[features.groups == slide][0])
         results[slide] = SlideResult(surface, alone, estimates, evidence.update(end))
     return results

@@ -1,0 +1,86 @@
+"""Experiments over several seeds: means, intervals and verdicts."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
+from texture_benchmarks.papers.interval import Interval
+from texture_benchmarks.papers.seeds import mean_over_seeds, over_seeds, verdict, with_seeds
+from texture_core.errors import InvalidParameter
+
+
+def numbers(seed: int, test: float, gain: float) -> dict:
+    return {
+        'seed': seed,
+        'recipes': {'one': 'aaaaaaaa'},
+        'tasks': {'task': {'one': {'test': [test, 0.0, 1.0]}}},
+        'findings': [{'claim': 'it gains', 'interval': [gain, gain, gain], 'verdict': 'holds', 'reaches': False}],
+    }
+
+
+def result(seed: int, test: float, gain: float) -> ExperimentResult:
+    return ExperimentResult('mine', '', '', '', numbers(seed, test, gain))
+
+
+def test_the_interval_of_five_seeds_is_that_of_student() -> None:
+    interval = mean_over_seeds([0.70, 0.72, 0.74, 0.76, 0.78])
+    assert interval.value == pytest.approx(0.74)
+    assert interval.high - interval.value == pytest.approx(2.776 * 0.0316228 / np.sqrt(5), rel=1e-3)  # t of 4 degrees
+
+
+def test_each_figure_has_its_mean_over_seeds_and_a_finding_is_decided_by_it() -> None:
+    merged = with_seeds(numbers(0, 0.8, 0.1), [numbers(1, 0.9, 0.3), numbers(2, 0.7, -0.4)])
+    assert merged['seeds'] == [0, 1, 2]
+    assert merged['tasks']['task']['one']['by_seed'] == [0.8, 0.9, 0.7]
+    assert merged['tasks']['task']['one']['over_seeds'][0] == pytest.approx(0.8)
+    [finding] = merged['findings']
+    assert finding['over_seeds'][0] == pytest.approx(0.0)
+    assert finding['verdict'] == 'not decided'
+
+
+@pytest.mark.parametrize(
+    ('interval', 'reaches', 'holds'),
+    [
+        ((0.1, 0.05, 0.2), False, True),
+        ((-0.1, -0.2, -0.05), False, False),
+        ((0.0, -0.1, 0.1), False, None),
+        ((-0.05, -0.2, 0.01), True, True),
+        ((-0.1, -0.2, -0.05), True, False),
+    ],
+)
+def test_a_claim_holds_if_its_interval_lies_above_zero_or_reaches_it(interval, reaches, holds) -> None:
+    assert verdict(Interval(*interval), reaches=reaches) is holds
+
+
+def test_a_seed_that_was_run_with_the_same_recipes_is_not_run_again(tmp_path: Path) -> None:
+    seen: list[tuple[int, int, bool]] = []
+
+    def run(experiment: Experiment) -> ExperimentResult:
+        seen.append((experiment.seed, experiment.splits, experiment.papers_only))
+        return result(experiment.seed, 0.5 + 0.01 * experiment.seed, 0.1)
+
+    first = over_seeds(run, 'mine', Experiment(tmp_path, seed=3), 3)
+    assert seen == [(3, 0, False), (4, 5, True), (5, 5, True)]
+    assert over_seeds(run, 'mine', Experiment(tmp_path, seed=3), 3).numbers == first.numbers
+    assert [seed for seed, _, _ in seen[3:]] == [3]
+    assert 'over 3 seeds' in '\n'.join(first.lines)
+
+
+def test_a_seed_that_was_run_with_other_recipes_is_run_again(tmp_path: Path) -> None:
+    seen: list[int] = []
+
+    def run(experiment: Experiment, digest: str = 'aaaaaaaa') -> ExperimentResult:
+        seen.append(experiment.seed)
+        made = result(experiment.seed, 0.5, 0.1)
+        return ExperimentResult('mine', '', '', '', {**made.numbers, 'recipes': {'one': digest}})
+
+    over_seeds(run, 'mine', Experiment(tmp_path), 2)
+    over_seeds(lambda experiment: run(experiment, 'bbbbbbbb'), 'mine', Experiment(tmp_path), 2)
+    assert seen == [0, 1, 0, 1]
+
+
+def test_one_seed_has_no_interval(tmp_path: Path) -> None:
+    with pytest.raises(InvalidParameter, match='1 seeds were asked for; two or more are needed'):
+        over_seeds(lambda experiment: result(0, 0.5, 0.1), 'mine', Experiment(tmp_path), 1)
