@@ -76,7 +76,6 @@ PROTOCOL = Protocol(
         0.92,
         'table 1',
         setting='how near linen 4 is to linen 3, so that these are confused is built in',
-        shortfall='set with another scale of the spectrum, and not set again',
     ),
     findings=findings,
     quick_count=10,
