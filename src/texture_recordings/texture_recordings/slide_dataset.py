@@ -76,7 +76,24 @@ class SlideDataset:
         namespace: str | None = None,
         topics: Sequence[str] = STREAMS,
     ) -> SlideDataset:
-        """Read the labelled slides of bags with their signals; see `find_slides` for the arguments and errors."""
+        """Read the labelled slides of bags with their signals; see `find_slides` for the arguments and errors.
+
+        Parameters
+        ----------
+        bags
+            Bags, or folders of bags.
+        slides
+            Slides of each surface to keep, such as '1-30'; '' keeps all.
+        namespace
+            Namespace of the finger, if bags hold several.
+        topics
+            Signals to read.
+
+        Returns
+        -------
+        SlideDataset
+            By bag and time.
+        """
         return cls(tuple(find_slides(bags, slides, namespace, topics)))
 
     @classmethod

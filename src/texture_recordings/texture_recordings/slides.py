@@ -148,6 +148,11 @@ def find_slides(
     topics
         Signals to read; none by default.
 
+    Returns
+    -------
+    list of LabelledSlide
+        Counted for each surface.
+
     Raises
     ------
     InvalidData

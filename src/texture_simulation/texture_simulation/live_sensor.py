@@ -250,6 +250,11 @@ def live_anyskin(scene: Scene, surface: Surface, link: FilePath, rng: np.random.
         Symbolic link that leads to the device.
     rng
         All random numbers: positions on the sample, effects, noise.
+
+    Returns
+    -------
+    LiveSensor
+        Closed when its context ends.
     """
     model, device = anyskin.AnySkinModel(scene, surface, rng), EmulatedAnySkin(link, rng)
     return LiveSensor(

@@ -121,7 +121,17 @@ def feed_pvdf(device: Any, first: int, ticks: int) -> None:
 
 
 def feed_anyskin(device: Any, first: int, ticks: int) -> None:
-    """Feed all axes alike."""
+    """Feed all axes alike.
+
+    Parameters
+    ----------
+    device
+        Emulated device.
+    first
+        Number of the first tick.
+    ticks
+        How many.
+    """
     numbers = np.arange(first, first + ticks) % 30_000
     device.sample(np.outer(numbers, np.ones(15)))
 

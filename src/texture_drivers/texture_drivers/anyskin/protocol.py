@@ -115,7 +115,17 @@ class FrameParser:
 
 
 def in_range(values: Values) -> NDArray[np.bool_]:
-    """Return whether all values of each frame, (n_frames, n_magnetometers, 4), can have been measured, (n_frames,)."""
+    """Return whether all values of each frame, (n_frames, n_magnetometers, 4), can have been measured, (n_frames,).
+
+    Parameters
+    ----------
+    values : (n_frames, n_magnetometers, 4)
+        Temperature in °C, then the field along x, y and z, as sent.
+
+    Returns
+    -------
+    (n_frames,) bool
+    """
     with np.errstate(invalid='ignore'):  # NaN is in no range
         temperature_c, magnitudes = values[..., 0], np.abs(values)
         warm = (temperature_c >= tables.LOWEST_TEMPERATURE_C) & (temperature_c <= tables.HIGHEST_TEMPERATURE_C)

@@ -70,6 +70,14 @@ class PressedElements:
 
 
 def grid_m(places: tuple[tuple[float, float], ...]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return x and y of places, (n,) each."""
+    """Return x and y of places, (n,) each.
+
+    Returns
+    -------
+    (n,)
+        x, m.
+    (n,)
+        y, m.
+    """
     x_m, y_m = np.array(places).T
     return x_m, y_m
