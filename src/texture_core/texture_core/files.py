@@ -12,7 +12,8 @@ import stat
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, BinaryIO, Protocol, TypeVar
@@ -20,6 +21,7 @@ from typing import IO, Any, BinaryIO, Protocol, TypeVar
 import numpy as np
 
 from texture_core.arrays import AnyArray
+from texture_core.errors import InvalidParameter
 
 MB = 1_000_000
 # What compressed content may unpack to: 16 MB, and ten times the size of the file. Models and data sets reach 4 times.
@@ -146,6 +148,28 @@ def read_text(path: str | Path, most_bytes: int, encoding: str = 'utf-8') -> str
         The whole text.
     """
     return read_bounded(path, most_bytes).decode(encoding)
+
+
+@contextmanager
+def writing(path: str | Path, other: str = 'file') -> Iterator[None]:
+    """Say in one sentence, within a `with` block, that a file or folder cannot be written.
+
+    Parameters
+    ----------
+    path
+        What the block writes.
+    other
+        What to name instead, such as 'folder'.
+
+    Raises
+    ------
+    InvalidParameter
+        If the block raises OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another {other}") from error
 
 
 def take_all(file: Readable, most_bytes: int) -> bytes:

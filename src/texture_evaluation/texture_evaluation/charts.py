@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from texture_core.arrays import AnyArray, Array
+from texture_core.arrays import AnyArray
 
 # Okabe & Ito 2008: distinguished by all kinds of colour vision.
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000')
@@ -30,200 +30,6 @@ DPI = 130
 MANY = 25  # more labels than this: no numbers in the cells
 
 
-def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: str | Path) -> Path:
-    """Draw a confusion table; each row is a surface and adds up to 100 %.
-
-    Parameters
-    ----------
-    labels
-        Name of each row and column.
-    table : (n, n)
-        Counts, true surfaces in the rows.
-    title
-        Above the chart.
-    path
-        File that is written; its ending says the format.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
-    side = 3.5 + 0.28 * len(labels)
-    with chart(path, (side + 0.8, side)) as figure:
-        axes = figure.subplots()
-        draw_confusion(axes, labels, table)
-        axes.set_title(title)
-    return Path(path)
-
-
-def evidence_chart(series: Mapping[str, tuple[Array, Array]], title: str, path: str | Path) -> Path:
-    """Draw the share of slides recognised over the sliding time used, one line a method.
-
-    Parameters
-    ----------
-    series
-        Name of the method → sliding time in s and share recognised, 0 to 1, (n,) each.
-    title
-        Above the chart.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
-    percent = {name: (seconds, 100 * np.asarray(accuracy)) for name, (seconds, accuracy) in series.items()}
-    return line_chart(percent, title, ('sliding time used (s)', 'slides recognised (%)'), path)
-
-
-def line_chart(
-    series: Mapping[str, tuple[Array, Array]],
-    title: str,
-    axis_labels: tuple[str, str],
-    path: str | Path,
-    *,
-    logarithmic: bool = False,
-) -> Path:
-    """Draw lines of percentages over x, on a logarithmic x axis if wanted; (x, y) by the name of each line.
-
-    Parameters
-    ----------
-    series
-        Name of the line → x and share, 0 to 1, (n,) each.
-    title
-        Above the chart.
-    axis_labels
-        Of x and of y.
-    path
-        File that is written.
-    logarithmic
-        Whether the x axis is logarithmic.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
-    with chart(path, (7.0, 4.2)) as figure:
-        axes = figure.subplots()
-        for (name, (x, y)), style in zip(series.items(), line_styles(), strict=False):
-            axes.plot(x, y, label=name, marker='.', **style)
-        axes.set(xlabel=axis_labels[0], ylabel=axis_labels[1], title=title)
-        if logarithmic:
-            axes.set_xscale('log')
-        else:
-            axes.set_xlim(left=0)
-        axes.set_ylim(top=101)
-        axes.legend(loc='best')
-    return Path(path)
-
-
-def error_chart(
-    series: Mapping[str, tuple[Array, Array]],
-    title: str,
-    axis_labels: tuple[str, str],
-    path: str | Path,
-    *,
-    points: int,
-) -> Path:
-    """Draw positive errors over time on a logarithmic axis: the largest of each of `points` stretches of time.
-
-    Parameters
-    ----------
-    series
-        Name of the line → time and error, above 0, (n,) each.
-    title
-        Above the chart.
-    axis_labels
-        Of time and of error, with their units.
-    path
-        File that is written.
-    points
-        Number of stretches of time.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
-    with chart(path, (7.0, 4.2)) as figure:
-        axes = figure.subplots()
-        for (name, (x, y)), colour in zip(series.items(), COLOURS, strict=False):
-            size = max(1, len(x) // points)
-            rows = len(x) // size
-            largest = np.asarray(y)[: rows * size].reshape(rows, size).max(axis=1)
-            axes.semilogy(np.asarray(x)[: rows * size : size], largest, label=name, color=colour, linewidth=1)
-        axes.set(xlabel=axis_labels[0], ylabel=axis_labels[1], title=title)
-        axes.legend(loc='best')
-    return Path(path)
-
-
-def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], title: str, path: str | Path) -> Path:
-    """Draw what is recovered of packets, and dashed what false ones are believed; a panel for each kind of fault.
-
-    Parameters
-    ----------
-    panels
-        Kind of fault → name of the line → faults per byte, share recovered and share of false ones, 0 to 1, (n,) each.
-    title
-        Above the chart.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
-    with chart(path, (4.0 * len(panels), 4.0), title) as figure:
-        rows = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
-        for axes, (kind, series) in zip(rows, panels.items(), strict=True):
-            for (name, (rates, recovered, false)), colour in zip(series.items(), COLOURS, strict=False):
-                axes.plot(rates, 100 * recovered, label=f'{name}: recovered', marker='.', color=colour)
-                if false.any():
-                    axes.plot(rates, 100 * false, label=f'{name}: false', marker='.', color=colour, linestyle='--')
-            axes.set(xlabel='faults per byte', title=kind, xscale='log', ylim=(-2, 102))
-        rows[0].set_ylabel('share of the packets sent (%)')
-        rows[-1].legend(loc='center left', bbox_to_anchor=(0.0, 0.42))
-    return Path(path)
-
-
-def front_chart(
-    panels: Mapping[str, Mapping[str, tuple[float, float]]], title: str, axis_labels: tuple[str, str], path: str | Path
-) -> Path:
-    """Draw methods by cost and share of successes, a panel for each data set, and the front that no other betters.
-
-    Parameters
-    ----------
-    panels
-        Title of the panel → name of the method → its cost, on a logarithmic axis, and its share, 0 to 1.
-    title
-        Above the chart.
-    axis_labels
-        Of cost and of share, with their units.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
-    names = list(dict.fromkeys(name for points in panels.values() for name in points))
-    with chart(path, (4.2 * len(panels) + 2.0, 4.8), title) as figure:
-        rows = figure.subplots(1, len(panels) + 1, squeeze=False, width_ratios=[4.2] * len(panels) + [2.0])[0]
-        for axes, (name, points) in zip(rows, panels.items(), strict=False):
-            _front(axes, points, names)
-            axes.set(xlabel=axis_labels[0], title=name, xscale='log', ylim=(0, 101))
-        rows[0].set_ylabel(axis_labels[1])
-        listed = '\n'.join(f'{number}  {name}' for number, name in enumerate(names, 1))
-        rows[-1].text(0.0, 1.0, listed, va='top', fontsize=8)
-        rows[-1].axis('off')
-    return Path(path)
-
-
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
     """Return the points, by rising cost, of which no other has at most the cost and at least the share."""
     front: list[int] = []
@@ -231,39 +37,6 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:
         if not front or points[index][1] > points[front[-1]][1]:
             front.append(index)
     return front
-
-
-def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, path: str | Path) -> Path:
-    """Draw how values are spread, each group on its own row; the line stands at 99 % of them.
-
-    Parameters
-    ----------
-    series
-        Name of the group → its values, (n,).
-    title
-        Above the chart.
-    axis_label
-        Of the values, with their unit.
-    path
-        File that is written.
-
-    Returns
-    -------
-    Path
-        Of the file.
-    """
-    with chart(path, (7.0, 1.0 + 1.3 * len(series)), title) as figure:
-        rows = figure.subplots(len(series), 1, sharex=True, squeeze=False)[:, 0]
-        longest = max(float(np.max(values)) for values in series.values())
-        edges = np.linspace(0.0, 1.02 * longest, 120)
-        for axes, (name, values) in zip(rows, series.items(), strict=True):
-            p99 = float(np.percentile(values, 99))
-            axes.hist(values, bins=edges, color=COLOURS[0])
-            axes.axvline(p99, color=COLOURS[5], linestyle='--')
-            axes.set_title(f'{name}: median {np.median(values):.2f}, 99 % below {p99:.2f}', fontsize=9)
-            axes.set_ylabel('windows')
-        rows[-1].set_xlabel(axis_label)
-    return Path(path)
 
 
 @contextmanager
@@ -294,21 +67,6 @@ def chart(path: str | Path, size: tuple[float, float], title: str = '') -> Itera
         yield figure
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=DPI, bbox_inches='tight', pad_inches=0.12)
-
-
-def _front(axes: Any, points: Mapping[str, tuple[float, float]], names: Sequence[str]) -> None:
-    values = list(points.values())
-    best = pareto_front(values)
-    axes.step(
-        [values[index][0] for index in best], [100 * values[index][1] for index in best],
-        where='post', color=COLOURS[5], linewidth=1,
-    )  # fmt: skip
-    for index, (name, (cost, share)) in enumerate(points.items()):
-        axes.plot(cost, 100 * share, '.', color=COLOURS[5 if index in best else 0])
-        axes.annotate(
-            str(names.index(name) + 1), (cost, 100 * share), xytext=(3, 3), textcoords='offset points',
-            fontsize=8, fontweight='bold' if index in best else 'normal',
-        )  # fmt: skip
 
 
 def line_styles() -> Iterator[dict[str, Any]]:

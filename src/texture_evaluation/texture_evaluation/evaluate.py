@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from texture_core.arrays import AnyArray, Array
-from texture_core.errors import InvalidParameter, ModelMismatch
+from texture_core.errors import ModelMismatch
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
+from texture_core.files import writing
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.model import TextureModel, load_model
@@ -83,10 +84,8 @@ class EvaluationReport:
         InvalidParameter
             If the file cannot be written.
         """
-        try:
+        with writing(path):
             Path(path).write_text(json.dumps(self.as_json(), indent=1) + '\n', encoding='utf-8')
-        except OSError as error:
-            raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another file") from error
 
 
 def evaluate_bags(

@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.files import writing
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
@@ -266,10 +267,8 @@ def write_recipe(finalist: Finalist[Any], path: Path, origin: str) -> None:
         If the file cannot be written.
     """
     content = yaml.safe_dump(finalist.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
-    try:
+    with writing(path):
         path.write_text(f'# {origin}\n# {_scores(finalist)}.\n{content}', encoding='utf-8')
-    except OSError as error:
-        raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another place") from error
 
 
 def _origin(wanted: Wanted, params: SearchParams) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from texture_core.errors import InvalidParameter
+from texture_core.files import writing
 from texture_evaluation.agreement import intraclass_correlation, krippendorff_alpha, one_against_rest
 from texture_evaluation.ratings import GRADES, Ratings
 
@@ -82,7 +82,7 @@ class PanelReport:
             If a file cannot be written.
         """
         ratings = self.ratings
-        try:
+        with writing(folder, 'folder'):
             folder.mkdir(parents=True, exist_ok=True)
             report, table = folder / 'panel.json', folder / 'grades.csv'
             report.write_text(json.dumps(self.as_json(), indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
@@ -91,8 +91,6 @@ class PanelReport:
                 writer.writerow(('texture', 'grade', 'std'))
                 rows = zip(ratings.textures, ratings.means, ratings.deviations, strict=True)
                 writer.writerows((name, f'{mean:.3f}', f'{std:.3f}') for name, mean, std in rows)
-        except OSError as error:
-            raise InvalidParameter(f"'{folder}' cannot be written: {error.strerror}; name another folder") from error
         return report, table
 
 

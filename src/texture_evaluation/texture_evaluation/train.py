@@ -7,9 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from texture_core.errors import InvalidParameter
+from texture_core.files import writing
 from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.roughness.model import RoughnessModel
 from texture_features.labelled_features import LabelledFeatures
 from texture_recordings.bags import find_bags
 from texture_recordings.slide_dataset import SlideDataset
@@ -62,7 +64,7 @@ def train_from_bags(
     default = Path(out).name.removesuffix('.skops') if out else plan.name
     model = train(plan, examples, name or default)
     if out is not None:
-        _save(model, Path(out), bags, slides)
+        save_model(model, out, bags, slides)
     return model
 
 
@@ -91,9 +93,29 @@ def with_channels(recipe: Recipe, channels: str) -> Recipe:
     return replace(recipe, feature_set=feature_set)
 
 
-def _save(model: TextureModel, out: Path, bags: Sequence[str | Path], slides: str) -> None:
-    data = {'bags': [path.name for path in find_bags(bags)], 'slides': slides or 'all'}
-    try:
+def save_model(
+    model: TextureModel | RoughnessModel, out: str | Path, bags: Sequence[str | Path], slides: str, **more: str
+) -> None:
+    """Save a model with the names of the bags it was trained on.
+
+    Parameters
+    ----------
+    model
+        What was trained.
+    out
+        Path of the model, with or without .skops.
+    bags
+        Bags, or folders of bags.
+    slides
+        Which slides of each surface; '' for all.
+    **more
+        Further facts about the data.
+
+    Raises
+    ------
+    InvalidParameter
+        If the file cannot be written.
+    """
+    data = {'bags': [path.name for path in find_bags(bags)], 'slides': slides or 'all', **more}
+    with writing(out):
         model.save(out, {'data': data})
-    except OSError as error:
-        raise InvalidParameter(f"the model cannot be saved at '{out}': {error.strerror}; name another place") from error

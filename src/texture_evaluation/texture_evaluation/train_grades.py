@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from texture_core.errors import InvalidParameter
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.model import RoughnessModel
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
-from texture_recordings.bags import find_bags
+from texture_evaluation.train import save_model
 from texture_recordings.slide_dataset import SlideDataset
 
 
@@ -60,11 +59,5 @@ def train_grades_from_bags(
     examples = SlideDataset.from_bags(bags, slides, namespace, windows.topics).features(windows)
     model = train_grades(plan, examples, table, name or (Path(out).name.removesuffix('.skops') if out else plan.name))
     if out is not None:
-        facts = {'bags': [path.name for path in find_bags(bags)], 'slides': slides or 'all', 'grades': str(grades)}
-        try:
-            model.save(out, {'data': facts})
-        except OSError as error:
-            raise InvalidParameter(
-                f"the model cannot be saved at '{out}': {error.strerror}; name another place"
-            ) from error
+        save_model(model, out, bags, slides, grades=str(grades))
     return model

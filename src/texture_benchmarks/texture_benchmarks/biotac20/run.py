@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from texture_benchmarks.charts import confusion_chart, evidence_chart
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.charts import confusion_chart, evidence_chart
 from texture_evaluation.evaluate import EvaluationReport, evaluate
 from texture_evaluation.metrics import curve
 from texture_evaluation.train import train_from_bags

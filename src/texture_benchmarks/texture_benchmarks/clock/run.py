@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from texture_benchmarks.charts import error_chart
 from texture_benchmarks.clock.trial import ClockErrors, simulate_clock_errors
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
-from texture_evaluation.charts import error_chart
 
 DURATION_S, QUICK_S = 600.0, 20.0
 SEEDS = 5

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.charts import line_chart
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import AnyArray, Array
@@ -16,7 +17,6 @@ from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
 from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, SlideNovelty
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation.charts import line_chart
 from texture_evaluation.evaluate import evaluate_dataset
 from texture_evaluation.metrics import SlideResult, decided_at
 from texture_evaluation.train import training_examples

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from texture_benchmarks.charts import evidence_chart, line_chart
 from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.frontier.chart import early_chart, size_chart
 from texture_benchmarks.frontier.training_costs import Cost, TrainingSize, costs
@@ -22,7 +23,6 @@ from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.search.parallel import single_blas_thread
 from texture_evaluation import metrics
-from texture_evaluation.charts import evidence_chart, line_chart
 from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
 from texture_evaluation.cross_validation.cross_validate import cross_validate
 from texture_evaluation.cross_validation.splits import Split

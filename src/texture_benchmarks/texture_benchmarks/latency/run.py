@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from texture_benchmarks.charts import histogram_chart
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
 from texture_estimation.model import TextureModel
-from texture_evaluation.charts import histogram_chart
 from texture_evaluation.evaluate import run_model
 from texture_evaluation.train import train_from_bags
 from texture_features.windowing.windows import WindowEvent

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.charts import line_chart
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.learning.trial import IncrementalRun, Score, run_incremental
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation.charts import line_chart
 from texture_recordings.slide_dataset import SlideDataset
 
 RECIPE = 'default'

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from texture_benchmarks.charts import line_chart
 from texture_benchmarks.load.rig import Rig, fast_daq
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
-from texture_evaluation.charts import line_chart
 
 if TYPE_CHECKING:
     from texture_benchmarks.ros.sensor_load import SensorLoad

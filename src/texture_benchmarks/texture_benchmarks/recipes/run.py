@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from sklearn.model_selection import LeaveOneGroupOut
 
+from texture_benchmarks.charts import front_chart
 from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.recipes import minirocket
@@ -30,7 +31,6 @@ from texture_core.errors import InvalidData
 from texture_core.resources import folder
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation.charts import front_chart
 from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
 from texture_evaluation.cross_validation.cross_validate import FoldFeatures, cross_validate, split_slides
 from texture_evaluation.cross_validation.splits import Split

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from texture_benchmarks.charts import histogram_chart
 from texture_benchmarks.papers.roughness_slides import FORCE_N, SPEED_M_S, USED_S, SimulatedTextures
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.roughness.grade_latency import times_us
 from texture_estimation.roughness.grades import TEST, TRAIN, read_grades
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
-from texture_evaluation.charts import histogram_chart
 from texture_simulation.scene import load_scene
 
 RECIPES = {'ours': 'roughness', 'SVM5': 'ets-roughness-svm5', 'ANN5': 'ets-roughness-ann5'}

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.charts import fault_chart
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.sensors.trial import CHECKSUMMED, PROTOCOLS, LinkStatistics, link_statistics
 from texture_core.arrays import Array
-from texture_evaluation.charts import fault_chart
 from texture_simulation.devices.faults import ByteFaults
 
 PACKETS, QUICK_PACKETS = 20_000, 1_000

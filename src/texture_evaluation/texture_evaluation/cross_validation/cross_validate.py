@@ -14,7 +14,8 @@ from joblib import Parallel, delayed  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
 from texture_core.arrays import AnyArray, Array
-from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.errors import InvalidData
+from texture_core.files import writing
 from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
@@ -133,10 +134,8 @@ class CrossValidation:
         InvalidParameter
             If the file cannot be written.
         """
-        try:
+        with writing(path):
             Path(path).write_text(json.dumps(self.as_json(), indent=1) + '\n', encoding='utf-8')
-        except OSError as error:
-            raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another file") from error
 
 
 def figures(results: Sequence[SlideResult]) -> dict[str, Any]:
