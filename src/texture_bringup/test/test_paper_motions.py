@@ -37,13 +37,21 @@ PAIRS = {
         'jamali-naive-bayes-3',
         'jamali-naive-bayes-5',
         'jamali-amplitude',
-        'jamali-amplitude-signal',
         'jamali-amplitude-deviation',
         'jamali-stft',
         'jamali-wavelets',
         'jamali-symbols',
     ),
-    'kaboli': ('kaboli-svm', 'kaboli-pa', 'kaboli-pa-ovr', 'kaboli-em', 'kaboli-svm-rbf'),
+    'kaboli': (
+        'kaboli-svm',
+        'kaboli-pa',
+        'kaboli-pa-ovr',
+        'kaboli-em',
+        'kaboli-svm-rbf',
+        'kaboli-svm-two-fingers',
+        'kaboli-pa-two-fingers',
+        'kaboli-em-two-fingers',
+    ),
     'hu': ('hu-pca-svm', 'hu-log-pca-svm'),
 }
 

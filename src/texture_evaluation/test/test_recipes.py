@@ -12,9 +12,10 @@ from texture_evaluation.evaluate import evaluate
 from texture_recordings.slide_dataset import SlideDataset
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+OF_ONE_FINGER = [name for name in SHIPPED if '/' not in ''.join(load_recipe(name).feature_set.topics)]
 
 
-@pytest.mark.parametrize('name', SHIPPED)
+@pytest.mark.parametrize('name', OF_ONE_FINGER)
 def test_each_recipe_learns_distinct_simulated_surfaces_and_recognises_them(name: str, simulated: Path) -> None:
     recipe = load_recipe(name)
     # The slides are shorter than the windows of some papers.

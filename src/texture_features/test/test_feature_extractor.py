@@ -19,19 +19,33 @@ RATE_HZ = 1000.0
 class Bench:
     """The node under test, and a peer that plays the sensor and the explorer and hears the features."""
 
-    def __init__(self, graph):
+    def __init__(self, graph, recipe='default', topics=('signal',)):
         self.graph, peer = graph, graph.peer
-        self.node = graph.add(FeatureExtractor, recipe='default')
+        self.node = graph.add(FeatureExtractor, recipe=recipe)
         self._features = graph.listen(msg.FeatureVector, 'features', FEATURE_QOS)
         self.reports = graph.listen(DiagnosticArray, '/diagnostics')
-        self.signals = peer.create_publisher(msg.TactileSignal, 'signal', SENSOR_QOS)
+        self.of_topics = {topic: peer.create_publisher(msg.TactileSignal, topic, SENSOR_QOS) for topic in topics}
+        self.signals = self.of_topics[topics[0]]
         self.states = peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
         self.until = graph.until
-        self.until(lambda: self.signals.get_subscription_count() and peer.count_publishers('features') == 1)
+        self.until(
+            lambda: (
+                all(publisher.get_subscription_count() for publisher in self.of_topics.values())
+                and self.states.get_subscription_count()
+                and peer.count_publishers('features') == 1
+            )
+        )
 
     @property
     def features(self):
         return [from_msg(message) for message in self._features]
+
+    def play_all(self, batches):
+        by_time = sorted(((batch.stamp_ns, topic, batch) for topic in batches for batch in batches[topic]),
+                         key=lambda item: item[:2])  # fmt: skip
+        for _, topic, batch in by_time:
+            self.of_topics[topic].publish(to_msg(batch))
+            self.graph.spin_once(0.02)
 
     def play(self, batches):
         for batch in batches:
@@ -106,3 +120,47 @@ def test_broken_messages_are_counted_and_survived(bench):
     bench.until(lambda: bench.node._cutter._slides)
     bench.play(recording())
     bench.until(lambda: len(bench.features) == 4)
+
+
+FINGERS = ('finger0/signal', 'finger0/signal_static', 'finger1/signal', 'finger1/signal_static')
+
+
+def finger_batches(topic, seconds, late_s, seed):
+    """Return what one finger publishes: PAC at 2.2 kHz or slow channels at 100 Hz, from `late_s` on."""
+    rate_hz, channels = (2200.0, ('pac',)) if topic.endswith('signal') else (100.0, ('tdc', 'tac', 'electrode1'))
+    begin_ns = NANOSECONDS + round(late_s * NANOSECONDS)
+    count = round((seconds - late_s) * rate_hz)
+    samples = np.random.default_rng(seed).normal(size=(count, len(channels))).astype(np.float32)
+    step = round(rate_hz / 10)
+    return [
+        TactileSignal(
+            begin_ns + round(first / rate_hz * NANOSECONDS),
+            's',
+            channels,
+            (),
+            rate_hz,
+            first,
+            samples[first : first + step],
+        )
+        for first in range(0, count, step)
+    ]
+
+
+def test_two_fingers_are_joined_by_their_stamps_into_the_16_numbers_of_kaboli():
+    with LocalGraph(69) as graph:
+        bench = Bench(graph, recipe='kaboli-svm-two-fingers', topics=FINGERS)
+        # the second finger's numbering begins later: only its stamps tell which samples belong together
+        batches = {topic: finger_batches(topic, 3.0, 0.05 * ('1/' in topic), n) for n, topic in enumerate(FINGERS)}
+        bench.states.publish(to_msg(slide(2.5)))
+        bench.until(lambda: bench.node._cutter._slides)
+        bench.play_all(batches)
+        bench.until(lambda: len(bench.features) >= 5)
+        received = bench.features[0]
+    assert len(received.values) == 16
+    one_finger = FeatureSet.load('kaboli-svm')
+    for finger in ('finger0', 'finger1'):
+        alone = {topic.rpartition('/')[2]: signals for topic, signals in batches.items() if topic.startswith(finger)}
+        events = cut_recording(alone, [slide(2.5), lift(2.5)], one_finger.windows)
+        expected = next(one_finger.extract(event) for event in events if event.start_ns == received.start_ns)
+        own = [value for name, value in zip(received.names, received.values, strict=True) if name.startswith(finger)]
+        np.testing.assert_allclose(own, expected.values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import product
@@ -171,7 +171,12 @@ def run_later(options: BenchmarkOptions) -> BenchmarkResult:
 def _shipped(options: BenchmarkOptions) -> Sequence[str]:
     if options.quick:
         return QUICK_RECIPES
-    return sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+    return of_one_finger(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+
+
+def of_one_finger(recipes: Iterable[str]) -> list[str]:
+    """Return the recipes, in the order of their names, without those of several fingers: no recorded data has these."""
+    return sorted(name for name in recipes if all('/' not in topic for topic in load_recipe(name).feature_set.topics))
 
 
 def _numbers(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from texture_benchmarks.recipes.run import (
     QUICK_MATERIALS,
     QUICK_SLIDES,
     RATE_HZ,
+    of_one_finger,
 )
 from texture_benchmarks.recipes.trial import at_rate, comparable
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
@@ -48,7 +49,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
 }
 # Pairs of networks, and the search for the penalty of linear machines, learn for as long as all others together.
 SLOW = ('-ann', 'kaboli-svm.yaml')
-RECIPES = sorted(
+RECIPES = of_one_finger(
     path.stem
     for path in folder('texture_estimation', 'config/recipes').glob('*.yaml')
     if path.stem not in NEEDS_ARRAY and not any(part in path.name for part in SLOW)
