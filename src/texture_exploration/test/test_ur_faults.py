@@ -21,7 +21,7 @@ from texture_exploration.arms import ur_probe
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import Explorer
-from texture_exploration.motions.touch import TouchParams
+from texture_exploration.motions.touch import REACTION_S, TouchParams
 from texture_exploration.safety import SafetyLimits
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
@@ -154,16 +154,20 @@ def test_after_a_protective_stop_in_contact_the_same_force_is_pressed_again():
         assert press(arm, emulator) == pytest.approx(3.0, abs=0.3)
 
 
-def test_after_a_recovery_the_arm_stands_still_until_it_is_reported_to_move(shared):
-    emulator, arm = shared
-    keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
-    emulator.controller.ask('emulate protective stop')
-    wait_for(lambda: arm.state().fault == 'protective stop')
-    wait_for(emulator.rests)
-    seen = len(emulator.fingers)
-    arm.recover()
-    wait_for(lambda: len(emulator.fingers) > seen + 250)
-    assert all(finger.vx_m_s == 0.0 for finger in list(emulator.fingers)[seen:])
+def test_after_a_recovery_the_arm_stands_still_until_it_is_reported_to_move():
+    """Commands hold for 2 s here: one of before, in the worker or in a register of the controller, would be obeyed."""
+    with bench_at('127.0.0.84') as emulator, connected(emulator.ip, command_timeout_s=2.0, silence_s=1.0) as arm:
+        keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
+        emulator.controller.ask('emulate protective stop')
+        keep(arm, SLIDING, lambda: arm.state().fault == 'protective stop')
+        keep(arm, SLIDING, emulator.rests)
+        seen = len(emulator.fingers)
+        arm.recover()
+        assert arm.state().fault == ''
+        wait_for(lambda: len(emulator.fingers) > seen + 500)
+        after = list(emulator.fingers)[seen:]
+        assert all(finger.vx_m_s == finger.vy_m_s == finger.vz_m_s == 0.0 for finger in after)
+        keep(arm, SLIDING, lambda: emulator.fingers[-1].vx_m_s > 0.01)
 
 
 def test_after_a_protective_stop_in_a_slide_and_a_recovery_the_same_request_presses_as_asked():
@@ -260,6 +264,61 @@ def test_after_a_slow_acknowledgement_the_watchdog_guards_the_moving_arm_as_befo
     # The watchdog waits 100 ms; what is more is this machine, but not the second that it waits for a stop.
     assert end.x_m - begin.x_m < 0.02 * 0.5
     assert emulator.controller.ask('programState').startswith('STOPPED')
+
+
+ASKED_N = 1.4  # at 2 kN/m the finger comes down at 8 mm/s; only the watchdog forbids to come down faster
+
+
+def hold_up(process_id, seconds):
+    os.kill(process_id, signal.SIGSTOP)
+    try:
+        time.sleep(seconds)
+    finally:
+        os.kill(process_id, signal.SIGCONT)
+
+
+DEAFNESS = {
+    'the line to the controller falls silent': lambda emulator, arm: emulator.controller.ask('emulate silence 1.0'),
+    'the process that talks to it hangs': lambda emulator, arm: hold_up(arm.worker_pid, 1.0),
+    'the controller is held up': lambda emulator, arm: hold_up(emulator.controller.pid, 0.6),
+}
+
+
+@pytest.mark.parametrize('what', DEAFNESS)
+@pytest.mark.parametrize('late_s', [0.0, 0.4])
+def test_an_approach_that_hears_nothing_from_the_contact_on_presses_little_harder_than_asked(what, late_s):
+    """Asked: 1.5 times the wanted force; a busy machine may hold the emulated watchdog up for another 0.1 s."""
+    with bench_at('127.0.0.83', surface_z_m=0.1 + ABOVE_PLANE_M) as emulator:
+        arm = UrArm(UrArmParams(ip=emulator.ip, silence_s=1.0))
+        explorer = Explorer(arm, TouchParams(), SafetyLimits(state_timeout_s=1.0), lambda state: None)
+        explorer.connect()
+        try:
+            emulator.controller.ask(f'emulate slow {late_s}')
+            request = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=ASKED_N, distance_m=0.02)
+            exploration = explorer.begin('one', request)
+            wait_for(lambda: emulator.fingers[-1].vz_m_s < -0.003 and emulator.fingers[-1].z_m < 0.0002)
+            down_m_s = -emulator.fingers[-1].vz_m_s
+            DEAFNESS[what](emulator, arm)
+            assert exploration.ended.wait(DEADLINE_S)
+            assert 2000.0 * down_m_s * (0.1 + REACTION_S) < 1.6 * ASKED_N
+            assert max(finger.force_n for finger in list(emulator.fingers)) < 2.7 * ASKED_N
+        finally:
+            explorer.close()
+
+
+def test_a_command_towards_the_surface_holds_no_longer_than_the_watchdog_waits(shared):
+    emulator, arm = shared
+    keep(arm, ArmCommand(normal_m_s=0.02), lambda: emulator.fingers[-1].z_m > 0.03)
+    for direction, least_s, most_s in ((1, 0.15, 0.5), (-1, 0.03, 0.15)):
+        arm.stop()
+        wait_for(emulator.rests)
+        moving = ArmCommand(normal_m_s=0.02 * direction)
+        keep(arm, moving, lambda way=direction: emulator.fingers[-1].vz_m_s * way > 0.019)
+        arm.command(moving)
+        begin_m = emulator.fingers[-1].z_m
+        wait_for(emulator.rests)
+        held_s = abs(emulator.fingers[-1].z_m - begin_m) / 0.02
+        assert least_s < held_s < most_s
 
 
 def test_a_program_of_somebody_else_is_not_stopped_unless_it_is_said():

@@ -111,6 +111,17 @@ def test_the_watchdog_stops_a_program_that_hears_nothing(controller, frequency_h
     assert not controller.robot.velocity.any()
 
 
+def test_a_controller_that_is_held_up_again_and_again_excuses_a_silent_client_for_100_ms(controller):
+    send(controller, ScriptCommand.SET_WATCHDOG, [10.0])
+    run(controller, 0.01)
+    speed_l(controller, 0.05, 0.0, 0.0)
+    begin_s = controller.time_s
+    while controller.playing:
+        controller.catch_up()
+        assert controller.time_s < begin_s + 0.22
+    assert controller.time_s > begin_s + 0.18
+
+
 def test_a_stop_of_the_script_stops_the_arm(controller):
     speed_l(controller, 0.05, 0.0, 0.0)
     run(controller, 0.1)
@@ -176,7 +187,7 @@ def test_zeroing_under_load_hides_the_true_force(controller):
 
 
 def test_a_program_of_somebody_else_takes_no_commands_and_can_be_paused(controller):
-    dashboard = DashboardSession(controller, lambda seconds: None)
+    dashboard = DashboardSession(controller, lambda seconds: None, lambda seconds: None)
 
     def ask(line):
         return dashboard.receive(line.encode() + b'\n').decode().strip()

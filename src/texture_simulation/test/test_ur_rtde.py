@@ -112,8 +112,8 @@ def test_a_message_of_nonsense_is_no_fault(session, controller, kind, size):
 
 
 def test_the_dashboard_answers_line_by_line(controller):
-    offline = []
-    dashboard = DashboardSession(controller, offline.append)
+    offline, silent = [], []
+    dashboard = DashboardSession(controller, offline.append, silent.append)
     assert dashboard.greeting() == BANNER
     assert dashboard.receive(b'PolyscopeVersion\nget serial') == b'URSoftware 5.12.0.0 (emulated)\n'
     assert dashboard.receive(b' number\n').strip().isdigit()
@@ -123,11 +123,13 @@ def test_the_dashboard_answers_line_by_line(controller):
     assert dashboard.receive(b'emulate offline soon\n').startswith(b"came 'soon'")
     dashboard.receive(b'emulate offline 1.5\n')
     assert offline == [1.5]
+    dashboard.receive(b'emulate silence 0.5\n')
+    assert silent == [0.5]
     assert dashboard.receive(b'emulate drop deep\n') == b"came 'deep'; a number of metres is needed\n"
 
 
 def test_a_surface_that_drops_is_not_touched_any_more_until_it_is_back(controller):
-    dashboard = DashboardSession(controller, lambda _seconds: None)
+    dashboard = DashboardSession(controller, lambda _seconds: None, lambda _seconds: None)
     plane = controller.robot.surface
     pressed = plane.origin - (0.0, 0.0, 0.001)
     forces = []

@@ -15,7 +15,8 @@ class ArmState:
     """Position, velocity and normal force of the fingertip in the frame of the surface.
 
     `time_ns` is when the arm measured it, of CLOCK_MONOTONIC; `position` in m, `velocity` in m/s; `force_n` is the
-    force normal to the surface, positive when pressing. `fault` says why the arm cannot move; '' if it can.
+    force normal to the surface, positive when pressing. `fault` says why the arm cannot move; '' if it can. For
+    `watchdog_s` at most the arm goes on with its last velocity when it hears nothing more; 0 if it does not say.
     """
 
     time_ns: int
@@ -23,6 +24,7 @@ class ArmState:
     velocity: Vector
     force_n: float
     fault: str = ''
+    watchdog_s: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -206,6 +206,7 @@ class RailsArm:
             velocity=self._velocity(),
             force_n=force_mn / tables.MILLI,
             fault='; '.join(text for flag, text in tables.FAULTS.items() if flags & flag),
+            watchdog_s=tables.WATCHDOG_S,
         )
         self._fresh.set()
 

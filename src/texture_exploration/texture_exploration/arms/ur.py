@@ -94,6 +94,7 @@ class UrArm:
             velocity=frame.direction(report.velocity_m_s),
             force_n=frame.direction(report.force_n)[2],
             fault=self._fault(report),
+            watchdog_s=report.watchdog_s,
         )
 
     def command(self, command: ArmCommand) -> None:

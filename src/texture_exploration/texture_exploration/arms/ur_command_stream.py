@@ -140,13 +140,20 @@ class UrCommandStream:
             return False
         if not self._leave(mode):
             return False
-        if mode is not Mode.STANDSTILL and not self._watchdog.armed and not self._watchdog.arm():
+        if not self._guarded(mode):
             self._count(False)
             return False
         self._mode = mode
         self._rest_ns = self._measured_ns
         self._braking = self._next_is_speed = False
         return True
+
+    def _guarded(self, mode: Mode) -> bool:
+        """Return whether the watchdog guards a mode; at rest one that waits too long is set again."""
+        if mode is Mode.STANDSTILL:
+            return True
+        late = self._mode is Mode.STANDSTILL and self._watchdog.widened
+        return self._watchdog.arm() if late or not self._watchdog.armed else True
 
     def _leave(self, mode: Mode) -> bool:
         """Do what ends the present mode; return whether that is enough for the new one."""

@@ -10,7 +10,7 @@ from texture_exploration.arms.protocol import Vector
 
 COMMAND, STOP, RECOVER, REPORT, FAILURE = (bytes([number]) for number in range(1, 6))
 COMMAND_FORMAT = struct.Struct('<q4d')
-REPORT_FORMAT = struct.Struct('<q9di4?5I')
+REPORT_FORMAT = struct.Struct('<q10di4?5I')
 LARGEST = 4096
 
 
@@ -59,13 +59,14 @@ class UrReport:
 
     `time_ns` is when it arrived, of CLOCK_MONOTONIC. `force_n` is the force of the surroundings on the tool. `unsteady`
     says that the force sensor could not be zeroed, because the force changed all the while the finger rose; `zeroed`,
-    that it was, since the arm was connected or recovered.
+    that it was, since the arm was connected or recovered. `watchdog_s` is how long the controller's watchdog waits.
     """
 
     time_ns: int
     position_m: Vector
     velocity_m_s: Vector
     force_n: Vector
+    watchdog_s: float
     safety_mode: int
     playing: bool
     silent: bool
@@ -75,7 +76,7 @@ class UrReport:
 
     def to_bytes(self) -> bytes:
         """Return the message."""
-        vectors = (*self.position_m, *self.velocity_m_s, *self.force_n)
+        vectors = (*self.position_m, *self.velocity_m_s, *self.force_n, self.watchdog_s)
         status = (self.safety_mode, self.playing, self.silent, self.unsteady, self.zeroed, *astuple(self.counts))
         return REPORT + REPORT_FORMAT.pack(self.time_ns, *vectors, *status)
 
@@ -84,9 +85,9 @@ class UrReport:
         """Return what a message says."""
         numbers = REPORT_FORMAT.unpack(data[1:])
         position, velocity, force = numbers[1:4], numbers[4:7], numbers[7:10]
-        safety_mode, playing, silent, unsteady, zeroed = numbers[10:15]
-        counts = Counts(*numbers[15:])
-        return cls(numbers[0], position, velocity, force, safety_mode, playing, silent, unsteady, zeroed, counts)
+        watchdog_s, safety_mode, playing, silent, unsteady, zeroed = numbers[10:16]
+        status = (safety_mode, playing, silent, unsteady, zeroed, Counts(*numbers[16:]))
+        return cls(numbers[0], position, velocity, force, watchdog_s, *status)
 
 
 def failure_message(text: str) -> bytes:

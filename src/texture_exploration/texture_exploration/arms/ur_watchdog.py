@@ -33,7 +33,9 @@ class Watchdog:
     Attributes
     ----------
     armed
-        The controller waits no longer than 1 / `watchdog_hz`; no arm moves without.
+        The controller waits no longer than `moving_s`; no arm moves without.
+    moving_s
+        How long it waits while the arm moves: 1 / `watchdog_hz`, or longer if it acknowledged the watchdog itself late.
     slow, slowest_s
         How many commands took longer than that, and the longest time that one took.
     """
@@ -49,10 +51,15 @@ class Watchdog:
         self.slow = 0
         self.slowest_s = 0.0
         self._control = control
-        self._period_s = 1.0 / params.watchdog_hz
+        self._period_s = self.moving_s = 1.0 / params.watchdog_hz
         self._patient_s = max(params.acknowledge_s, self._period_s)
         self._guard = guard
         self._clock = clock
+
+    @property
+    def widened(self) -> bool:
+        """Whether the controller waits longer than 1 / `watchdog_hz` while the arm moves."""
+        return self.moving_s > self._period_s
 
     def arm(self) -> bool:
         """Let the watchdog guard a moving arm; return whether the controller agreed.
@@ -71,7 +78,8 @@ class Watchdog:
         try:
             yield
         finally:
-            self._set(max(self._period_s, min(MARGIN * took_s, self._patient_s)))
+            self.moving_s = max(self._period_s, min(MARGIN * took_s, self._patient_s))
+            self._set(self.moving_s)
 
     def call(self, command: Callable[..., Any], *arguments: Any) -> bool:
         """Send a command that is acknowledged; return whether the controller took it."""

@@ -23,6 +23,7 @@ from typing import Any
 
 from texture_core.parameters import from_mapping
 from texture_exploration.arms.protocol import Vector
+from texture_exploration.arms.surface_frame import SurfaceFrame
 from texture_exploration.arms.ur_command_stream import UrCommandStream
 from texture_exploration.arms.ur_messages import (
     COMMAND,
@@ -51,7 +52,8 @@ LOST = 'the connection to the controller was lost; is it still on, and the cable
 class Observer:
     """Reports what the controller measures, in a thread of its own: commands may take a while.
 
-    `newest` is the last report, None before the first; `unsteady`, `zeroed` and `counts` come from the other thread.
+    `newest` is the last report, None before the first; `unsteady`, `zeroed`, `watchdog_s` and `counts` come from the
+    other thread.
 
     Silence counts only while this thread is awake, so that a machine that stalls is not taken for a dead controller.
     """
@@ -60,6 +62,7 @@ class Observer:
         self.silent = False
         self.connected = True
         self.unsteady = self.zeroed = False
+        self.watchdog_s = 1.0 / params.watchdog_hz
         self.counts = Counts()
         self.newest: UrReport | None = None
         self._receive = receive
@@ -103,6 +106,7 @@ class Observer:
             position_m=_vector(receive.getActualTCPPose()),
             velocity_m_s=_vector(receive.getActualTCPSpeed()),
             force_n=_vector(receive.getActualTCPForce()),
+            watchdog_s=self.watchdog_s,
             safety_mode=receive.getSafetyMode(),
             playing=receive.getRuntimeState() == PROGRAM_PLAYING,
             silent=self.silent,
@@ -125,6 +129,7 @@ class Worker:
     def __init__(self, params: UrArmParams, channel: socket.socket) -> None:
         self._params = params
         self._channel = channel
+        self._frame = SurfaceFrame(params.surface_pose)
         receive_class = importlib.import_module('rtde_receive').RTDEReceiveInterface
         control_class = importlib.import_module('rtde_control').RTDEControlInterface
         # Whether the arm is under remote control has been asked already.
@@ -181,6 +186,7 @@ class Worker:
         """Pass on to the observer what it reports beside the measurements."""
         commands, watchdog = self._commands, self._watchdog
         self._observer.unsteady, self._observer.zeroed = commands.unsteady, commands.trusted
+        self._observer.watchdog_s = watchdog.moving_s
         self._observer.counts = Counts(
             refused=commands.refused,
             zeroed=commands.zeroings,
@@ -214,12 +220,18 @@ class Worker:
             while data := self._channel.recv(LARGEST, socket.MSG_DONTWAIT):
                 self._handle(data)
         except BlockingIOError:
-            if self._ur_command is not None and self._age_s(self._ur_command) > self._params.command_timeout_s:
+            if self._ur_command is not None and self._age_s(self._ur_command) > self._holds_s(self._ur_command):
                 self._ur_command = None
             return True
         except OSError:
             pass
         return False
+
+    def _holds_s(self, ur_command: UrCommand) -> float:
+        """Return for how long a command holds: a velocity towards the surface no longer than the watchdog waits."""
+        params = self._params
+        falls = ur_command.force_n is None and self._frame.direction(ur_command.velocity_m_s)[2] < 0.0
+        return min(params.command_timeout_s, 1.0 / params.watchdog_hz) if falls else params.command_timeout_s
 
     @staticmethod
     def _age_s(ur_command: UrCommand) -> float:

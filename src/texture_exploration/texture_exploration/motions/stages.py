@@ -97,7 +97,8 @@ class ApproachStage(Stage):
     def __init__(self, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to meet the surface')
         self._touch = touch
-        self._speed_m_s = touch.approach_m_s(force_n)
+        self._limits = limits
+        self._force_n = force_n
         self._start_m = 0.0
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
@@ -120,7 +121,15 @@ class ApproachStage(Stage):
                 f'no surface within {self._touch.approach_travel_m:g} m below the start; '
                 "bring the finger closer or raise 'approach_travel_m'"
             )
-        return ArmCommand(normal_m_s=-self._speed_m_s)
+        speed_m_s = self._touch.approach_m_s(self._force_n, arm.watchdog_s)
+        if arm.watchdog_s:
+            # The same way may be gone, however much slower the arm has to be.
+            self.timeout_s = self._limits.approach_timeout_s * self._touch.approach_m_s(self._force_n) / speed_m_s
+            self.goal = (
+                f'the finger to meet the surface at {speed_m_s * 1e3:.2g} mm/s, as the arm goes on for '
+                f'{arm.watchdog_s * 1e3:.0f} ms when it hears nothing'
+            )
+        return ArmCommand(normal_m_s=-speed_m_s)
 
 
 class SettleForceStage(Stage):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from texture_core.parameters import param
@@ -9,6 +10,7 @@ from texture_exploration.motions.path import ramp_s
 
 REACTION_S = 0.03  # from contact to standstill: two states of the arm, two steps of the exploration
 IMPACT = 0.8  # of the wanted force
+HARMLESS_N = 0.5  # a smaller force is not approached more slowly for what an arm does that hears nothing
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,13 @@ class TouchParams:
         unit='m',
         low=0.001,
         high=0.5,
+    )
+    unheard_force_share: float = param(
+        1.5,
+        'Sets the largest force, as a share of the wanted one, that the approach may reach on an arm that goes on '
+        'until its watchdog stops it; a smaller share comes down more slowly.',
+        low=0.2,
+        high=10.0,
     )
     contact_force_n: float = param(
         0.2,
@@ -121,9 +130,23 @@ class TouchParams:
         0.005, 'Sets the least height by which the finger is lifted after a contact.', unit='m', low=0.001, high=0.1
     )
 
-    def approach_m_s(self, force_n: float) -> float:
-        """Return how fast the finger may come down to press with a force."""
-        return min(self.approach_speed_m_s, IMPACT * force_n / (self.approach_stiffness_n_m * REACTION_S))
+    def approach_m_s(self, force_n: float, watchdog_s: float = 0.0) -> float:
+        """Return how fast the finger may come down to press with a force.
+
+        An arm that loses its commands just as it reacts to the contact goes on for the time of its watchdog. Until then
+        the force stays below `unheard_force_share` of the wanted one on a contact of `approach_stiffness_n_m`.
+
+        Parameters
+        ----------
+        force_n
+            The wanted force.
+        watchdog_s
+            See `texture_exploration.arms.protocol.ArmState`.
+        """
+        heard_m_s = IMPACT * force_n / (self.approach_stiffness_n_m * REACTION_S)
+        allowed_n = max(self.unheard_force_share * force_n, HARMLESS_N)
+        unheard_m_s = allowed_n / (self.approach_stiffness_n_m * (watchdog_s + REACTION_S)) if watchdog_s else math.inf
+        return min(self.approach_speed_m_s, heard_m_s, unheard_m_s)
 
     def ramp_s(self, speed_m_s: float) -> float:
         """Return how long it takes to gain or lose a speed."""

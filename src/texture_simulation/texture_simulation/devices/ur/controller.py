@@ -17,6 +17,7 @@ from texture_simulation.devices.ur.tables import CONTROL_SCRIPT, VERSIONS, Safet
 STARTING_S = 0.05  # between the upload of a program and its start
 STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 ENDED = object()
+MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
 
 
 class EmulatedController:
@@ -63,8 +64,14 @@ class EmulatedController:
             self.protective_stop()
 
     def catch_up(self) -> None:
-        """Do a cycle that should have been done before; it is not the client who was silent in it."""
-        self.registers.last_command_s += self.step_s
+        """Do a cycle that should have been done before; it is not the client who was silent in it.
+
+        A client that is heard no more gains `MAX_EXCUSED_S` at most by that: a moving arm needs its watchdog.
+        """
+        registers = self.registers
+        if registers.excused_s < MAX_EXCUSED_S:
+            registers.excused_s += self.step_s
+            registers.last_command_s += self.step_s
         self.tick()
 
     def upload(self, script: str) -> None:
@@ -100,7 +107,7 @@ class EmulatedController:
     def set_watchdog(self, min_frequency_hz: float) -> None:
         """Stop the program when input_int_register_0 comes less often."""
         self._watchdog_s = 1.0 / min_frequency_hz
-        self.registers.last_command_s = self.time_s
+        self.registers.heard(self.time_s)
 
     def protective_stop(self) -> None:
         """Stop hard; the program ends."""

@@ -25,9 +25,15 @@ TOO_EARLY = (
 class DashboardSession:
     """The conversation with one client."""
 
-    def __init__(self, controller: EmulatedController, go_offline: Callable[[float], None]) -> None:
+    def __init__(
+        self,
+        controller: EmulatedController,
+        go_offline: Callable[[float], None],
+        go_silent: Callable[[float], None],
+    ) -> None:
         self._controller = controller
         self._go_offline = go_offline
+        self._go_silent = go_silent
         self._received = b''
 
     def greeting(self) -> bytes:
@@ -96,6 +102,9 @@ class DashboardSession:
     def _emulate_offline(self, argument: str) -> str:
         return self._with_seconds(argument, self._go_offline, 'Going offline')
 
+    def _emulate_silence(self, argument: str) -> str:
+        return self._with_seconds(argument, self._go_silent, 'Falling silent')
+
     def _emulate_slow(self, argument: str) -> str:
         return self._with_seconds(argument, partial(setattr, self._controller, 'acknowledge_s'), 'Acknowledging late')
 
@@ -151,6 +160,7 @@ ANSWERS: Mapping[str, Answer] = {
     'quit': _fixed('Disconnected'),
     'emulate protective stop': DashboardSession._emulate_stop,
     'emulate offline': DashboardSession._emulate_offline,
+    'emulate silence': DashboardSession._emulate_silence,
     'emulate slow': DashboardSession._emulate_slow,
     'emulate drop': DashboardSession._emulate_drop,
 }

@@ -21,7 +21,9 @@ from texture_simulation.devices.ur.rtde import InputClaims, RtdeSession
 from texture_simulation.devices.ur.script import ScriptSession
 from texture_simulation.devices.ur.tables import DASHBOARD_PORT, RTDE_PORT, SCRIPT_PORT
 
-MAX_MISSED_CYCLES = 250  # that are made up for; a process that was frozen for longer has lost the time
+# That are made up for; a process that was held up for longer has lost the time. Meanwhile it hears no commands, and no
+# real controller moves for longer than its watchdog waits without one.
+MAX_MISSED_CYCLES = 50
 CHUNK = 65536
 
 
@@ -59,12 +61,13 @@ class Server:
             SCRIPT_PORT: partial(ScriptSession, controller),
         }
         if controller.version.dashboard:
-            self._kinds[DASHBOARD_PORT] = partial(DashboardSession, controller, self._go_offline)
+            self._kinds[DASHBOARD_PORT] = partial(DashboardSession, controller, self._go_offline, self._go_silent)
         self._selector = selectors.DefaultSelector()
         self._listeners: list[socket.socket] = []
         self._sessions: dict[socket.socket, Session] = {}
         self._online_ns = 0
         self._offline_s = 0.0  # asked for
+        self._silent_until_ns = 0
         self._finger = FingerReport(controller, finger_port)
         self._open()
 
@@ -108,8 +111,17 @@ class Server:
     def _go_offline(self, seconds: float) -> None:
         self._offline_s = seconds
 
+    def _go_silent(self, seconds: float) -> None:
+        self._silent_until_ns = time.monotonic_ns() + int(seconds * 1e9)
+
+    @property
+    def _silent(self) -> bool:
+        return time.monotonic_ns() < self._silent_until_ns
+
     def _serve(self) -> None:
         """Deal with what has come."""
+        if self._silent:
+            return
         for key, _ in self._selector.select(timeout=0):
             key.data()
         if self._offline_s:
@@ -139,8 +151,9 @@ class Server:
             self._hang_up(connection)
 
     def _publish(self) -> None:
-        for connection, session in list(self._sessions.items()):
-            self._send(connection, session.package())
+        if not self._silent:
+            for connection, session in list(self._sessions.items()):
+                self._send(connection, session.package())
         self._finger.send()
 
     def _send(self, connection: socket.socket, data: bytes) -> None:

@@ -110,7 +110,7 @@ def _write(name: str, index: int) -> Setter:
 def _write_command(controller: EmulatedController, values: Sequence[Any]) -> None:
     """Write input_int_register_0, which the watchdog watches."""
     controller.registers.int_in[0] = values[0]
-    controller.registers.last_command_s = controller.time_s
+    controller.registers.heard(controller.time_s)
 
 
 def _ignore(_controller: EmulatedController, _values: Sequence[Any]) -> None:

@@ -1,0 +1,43 @@
+"""How fast the finger may come down."""
+
+from dataclasses import replace
+
+import pytest
+
+from texture_core.exploration import ExplorationRequest
+from texture_exploration.motions.touch import REACTION_S, TouchParams
+
+TOUCH = TouchParams(approach_speed_m_s=0.1, approach_stiffness_n_m=2000.0)
+
+
+@pytest.mark.parametrize('force_n', [0.5, 1.4, 6.0])
+@pytest.mark.parametrize('watchdog_s', [0.1, 0.15, 0.9])
+def test_until_the_watchdog_stops_the_arm_the_force_stays_below_its_share_of_the_wanted_one(force_n, watchdog_s):
+    speed_m_s = TOUCH.approach_m_s(force_n, watchdog_s)
+    assert 2000.0 * speed_m_s * (watchdog_s + REACTION_S) == pytest.approx(1.5 * force_n)
+
+
+def test_an_arm_that_stops_at_once_and_a_small_force_are_approached_as_the_reaction_allows():
+    assert TOUCH.approach_m_s(1.0) == pytest.approx(0.8 / (2000.0 * 0.03))
+    assert TOUCH.approach_m_s(0.1, 0.1) == TOUCH.approach_m_s(0.1)
+
+
+def test_an_approach_that_a_watchdog_slows_down_may_take_longer_and_says_why(table):
+    """At 20 kN/m an arm that is deaf for 0.9 s comes down at 0.08 instead of 1.3 mm/s."""
+    stiff = TouchParams(approach_stiffness_n_m=20000.0, approach_travel_m=0.004)
+    table = type(table)(touch=stiff)
+    state = table.arm.state
+    table.arm.state = lambda: replace(state(), watchdog_s=0.9)
+    outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.02))
+    took_s = (table.states[-1].stamp_ns - table.states[0].stamp_ns) * 1e-9
+    assert 'no surface within 0.004 m' in outcome.message
+    assert took_s > 40.0
+
+
+def test_an_approach_that_is_too_slow_says_so(table):
+    table = type(table)(touch=TouchParams(approach_stiffness_n_m=200000.0))
+    state = table.arm.state
+    table.arm.state = lambda: replace(state(), watchdog_s=0.9)
+    outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.02))
+    assert outcome.message.startswith('waited')
+    assert 'as the arm goes on for 900 ms when it hears nothing' in outcome.message
