@@ -11,8 +11,10 @@ from contextlib import ExitStack, contextmanager
 import pytest
 
 from texture_core.exploration import ExplorationRequest, Phase
+from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.rails import RailsArm, RailsParams
+from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
@@ -43,6 +45,12 @@ def ur(_folder):
 
 
 @contextmanager
+def patient_ur(_folder):
+    with ControllerProcess(UR) as controller:
+        yield controller, UrArm(UrArmParams(ip=UR.ip, silence_s=1.0, watchdog_hz=3.0)), SLIDE
+
+
+@contextmanager
 def rails(folder):
     with EmulatedRails(folder / 'rails', RailsMachine(start_height_m=HEIGHT_M)) as device:
         yield device, RailsArm(RailsParams(device=str(device.port.link), height_m=HEIGHT_M)), SLIDE
@@ -54,6 +62,12 @@ def hand(folder):
         yield bus, InHandArm(InHandParams(hand='dynamixel', device=str(bus.port.link), grip_timeout_s=20.0)), RUB
 
 
+@contextmanager
+def simulated(_folder):
+    arm = SimulatedArm(SimulatedArmParams(start_height_m=HEIGHT_M))
+    yield arm, arm, SLIDE
+
+
 def nothing(_device):
     pass
 
@@ -62,6 +76,11 @@ def lose(motor):
     return lambda bus: setattr(bus.motors, 'absent', motor)
 
 
+def hold(motors):
+    return lambda bus: setattr(bus.motors, 'held', motors)
+
+
+STALLED = 'the finger stalled: in 250 ms it moved by'
 # Robot, module it needs, what happens, how it is mended, what is told, and how soon at most.
 FAULTS = {
     'ur freezes': (ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.resume, 'silent|not answered', 0.15),
@@ -88,7 +107,25 @@ FAULTS = {
     'a hand loses its cable': (
         hand, 'dynamixel_sdk', EmulatedDynamixelBus.unplug, EmulatedDynamixelBus.plug, 'cannot be reached', 0.1,
     ),
+    'simulated stalls': (simulated, 'numpy', SimulatedArm.jam, SimulatedArm.connect, STALLED, 0.5),
+    'ur stalls': (
+        patient_ur, 'rtde_control', lambda c: c.ask('emulate speed 0.1'), lambda c: c.ask('emulate speed 1'),
+        STALLED, 0.5,
+    ),
+    'rails stall': (
+        rails, 'serial',
+        lambda r: setattr(
+            r.firmware, 'machine', RailsMachine(start_height_m=HEIGHT_M, stalled=True, reports_stall=False)
+        ),
+        lambda r: setattr(r.firmware, 'machine', RailsMachine(start_height_m=HEIGHT_M)),
+        STALLED, 0.5,
+    ),
+    'hand stalls': (hand, 'dynamixel_sdk', hold(set(range(16)) - {1, 5, 9, 13}), hold(set()), STALLED, 0.5),
 }  # fmt: skip
+
+
+def test_every_arm_has_a_test_of_a_finger_that_stalls():
+    assert {name.split()[0] for name, (*_, told, _soon_s) in FAULTS.items() if told is STALLED} == set(ARMS)
 
 
 def explored(explorer, request, on_slide=None):
@@ -108,9 +145,11 @@ def test_a_fault_in_the_slide_is_reported_in_time_and_the_next_exploration_works
     pytest.importorskip(module)
     with ExitStack() as open_now:
         device, arm, request = open_now.enter_context(robot(tmp_path))
-        # On a busy machine, too, the motor that is silent shall be named.
-        limits = SafetyLimits(state_timeout_s=0.4) if robot is hand else SafetyLimits()
-        explorer = Explorer(arm, TOUCH, limits, lambda state: None)
+        # On a busy machine, too, the motor that is silent shall be named, and a finger that stalls.
+        patience_s = 1.0 if told is STALLED else 0.4 if robot is hand else SafetyLimits().state_timeout_s
+        limits = SafetyLimits(state_timeout_s=patience_s)
+        states = []
+        explorer = Explorer(arm, TOUCH, limits, states.append)
         open_now.callback(explorer.close)
         explorer.connect()
         happen = functools.partial(happens, device)
@@ -118,7 +157,8 @@ def test_a_fault_in_the_slide_is_reported_in_time_and_the_next_exploration_works
         ended_s = (time.monotonic_ns() - exploration.state.stamp_ns) * 1e-9
         outcome = exploration.outcome
         assert (outcome.success, outcome.slid, exploration.state.phase) == (False, True, Phase.ABORTED), outcome
-        detected_s = (exploration.state.stamp_ns - since_ns) * 1e-9
+        over = (state for state in states if state.phase in (Phase.LIFT, Phase.ABORTED) and state.stamp_ns > since_ns)
+        detected_s = (next(over).stamp_ns - since_ns) * 1e-9
         record_property('detected_s', detected_s)
         print(f'{name}: {detected_s * 1e3:.0f} ms, ended {ended_s * 1e3:.0f} ms later: {outcome.message}')
         assert re.search(told, outcome.message), outcome.message

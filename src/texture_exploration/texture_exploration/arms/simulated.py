@@ -111,7 +111,7 @@ class SimulatedArm:
         self._own_thread = own_thread
         self._last_command = (STANDSTILL, clock())  # the command, and when it came
         self._state = ArmState(clock(), (0.0, 0.0, params.start_height_m), (0.0, 0.0, 0.0), 0.0)
-        self._frozen = False
+        self._frozen = self._jammed = False
         self._fault = ''
         self._push_n = 0.0
         self._true_n = 0.0
@@ -135,6 +135,7 @@ class SimulatedArm:
         """Start to move in time; clears what was injected."""
         self.close()
         self._frozen, self._fault, self._push_n = False, '', 0.0
+        self._jammed = False
         self._stuck_n, self._drift_n, self._drift_n_s = None, 0.0, 0.0
         self._closing.clear()
         self.step(0.0)
@@ -180,6 +181,10 @@ class SimulatedArm:
         """Behave like a controller that hangs: the state grows old, commands do nothing, until connected again."""
         self._frozen = True
 
+    def jam(self) -> None:
+        """Behave like an arm whose finger something holds along the surface, until connected again."""
+        self._jammed = True
+
     def fail(self, reason: str) -> None:
         """Behave like an arm in a protective stop: stand still and report the reason, until connected again."""
         self._fault = reason
@@ -217,6 +222,7 @@ class SimulatedArm:
         # After it slept it cannot know for how long the newest command was meant: at most so long as one holds.
         moving_s = min(max(0.0, dt_s + min(0.0, left_s)), self._params.command_timeout_s)
         moved = self._velocity_control.moved_m(now_ns) if self._velocity_control else self._moved_m(command, moving_s)
+        moved = (0.0, 0.0, moved[2]) if self._jammed else moved
         x, y, z = (at + step_m for at, step_m in zip(self._state.position, moved, strict=True))
         velocity = _speed(moved, moving_s)
         if left_s < 0:

@@ -10,6 +10,7 @@ from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
 from texture_exploration.motions.contact import ContactLost, ContactWatch
 from texture_exploration.motions.path import STEADY_S, Follower, smooth
+from texture_exploration.motions.stall import StallWatch
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -224,6 +225,7 @@ class SlideStage(Stage):
         self._speed_m_s = speed_m_s
         self.force_n = force_n
         self._contact = contact
+        self._stall = StallWatch(touch)
         # A slide begins within twice the tolerance, so a smaller share would refuse what was let in.
         self._mean_share = max(touch.mean_force_share, 2 * touch.force_tolerance)
         self._start_m: float | None = None
@@ -241,6 +243,7 @@ class SlideStage(Stage):
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """The slide counts from here, also if it goes on later after the contact was lost."""
         super().begin(time_ns, arm)
+        self._stall.restart()
         if self._start_m is None:
             self._start_m = self._follower.travelled_m
 
@@ -263,7 +266,9 @@ class SlideStage(Stage):
         if self._contact.touching:
             self.steady_s = min(STEADY_HORIZON_S, left_s, self._follower.steady_m / self._speed_m_s)
             self._steady_until_ns = max(self._steady_until_ns, time_ns + int(self.steady_s * 1e9))
-        return ArmCommand(self._follower.velocity(self._speed_m_s), force_n=self.force_n)
+        velocity = self._follower.velocity(self._speed_m_s)
+        self._stall.update(arm, velocity)
+        return ArmCommand(velocity, force_n=self.force_n)
 
     def _left_s(self, time_ns: int, arm: ArmState) -> float:
         assert self._start_m is not None

@@ -113,6 +113,21 @@ class TouchParams:
     seek_lost_contact: bool = param(
         False, 'Stops where contact was lost, comes down again and goes on, up to 3 times; false aborts.'
     )
+    stall_speed_share: float = param(
+        0.25,
+        'Sets the share of the commanded way below which a sliding finger counts as stalled; a larger share aborts '
+        'sooner.',
+        low=0.05,
+        high=0.9,
+    )
+    stall_s: float = param(
+        0.25,
+        'Sets the time over which the commanded way and that of the finger are compared during a slide; a longer time '
+        'notices a stall later.',
+        unit='s',
+        low=0.05,
+        high=5.0,
+    )
     mean_force_share: float = param(
         0.3,
         'Sets the largest relative error of the mean measured force with which a slide succeeds.',

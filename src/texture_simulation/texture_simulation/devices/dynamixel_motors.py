@@ -93,6 +93,7 @@ class DynamixelMotors:
     ) -> None:
         self.ids = ids
         self.absent: set[int] = set()  # cable out
+        self.held: set[int] = set()  # something holds them where they are
         self.twice: set[int] = set()  # two motors with this id, whose answers collide
         self.stiffness_n_m = stiffness_n_m
         self._watchdog_stops = watchdog_stops
@@ -160,12 +161,14 @@ class DynamixelMotors:
         goal = (self._registers(GOAL_POSITION, '<i') - 2048) * RAD_PER_COUNT
         most = np.abs(self._registers(GOAL_CURRENT, '<h')) * A_PER_COUNT
         gain = self._registers(P_GAIN, '<H') * A_PER_RAD_AND_GAIN
+        free = np.array([motor not in self.held for motor in self.ids])
         for _ in range(steps):
             self._current = np.where(torque, np.clip(gain * (goal - self._angle), -most, most), 0.0)
             depth = np.maximum(0.0, self._angle * self._lever - self._height)
             spring = self.stiffness_n_m * self._lever * (depth > 0)
             # Implicit: the load is that at the end of the step, so no stiffness makes it swing.
             self._speed = (self._current * TORQUE_NM_A - spring * depth) / (DAMPING + PHYSICS_S * spring * self._lever)
+            self._speed = np.where(free, self._speed, 0.0)
             self._angle = self._angle + self._speed * PHYSICS_S
         self._show()
 

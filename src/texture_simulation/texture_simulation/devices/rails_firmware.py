@@ -52,6 +52,7 @@ class RailsMachine:
         14.0, 'Sets the force above which the firmware lifts the finger by itself.', unit='N', low=0.1
     )
     stalled: bool = param(False, 'Blocks the rails mechanically, so that the encoders do not follow the motors.')
+    reports_stall: bool = param(True, 'Lets the firmware stop and report encoders that do not follow the motors.')
 
 
 class RailsFirmware:
@@ -138,9 +139,10 @@ class RailsFirmware:
         change = self.machine.acceleration_m_s2 * dt_s
         self.velocity[:2] += np.clip(self._wanted - self.velocity[:2], -change, change)
         if self.machine.stalled and self._wanted.any():
-            self._flags |= STALL
             self.velocity[:2] = 0.0
-            self._halt()
+            if self.machine.reports_stall:
+                self._flags |= STALL
+                self._halt()
         self.position[:2] += self.velocity[:2] * dt_s
         travel = self.machine.travel_m
         for axis in (0, 1):

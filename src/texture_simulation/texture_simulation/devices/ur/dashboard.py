@@ -108,6 +108,10 @@ class DashboardSession:
     def _emulate_slow(self, argument: str) -> str:
         return self._with_seconds(argument, partial(setattr, self._controller, 'acknowledge_s'), 'Acknowledging late')
 
+    def _emulate_speed(self, argument: str) -> str:
+        robot = self._controller.robot
+        return self._with_number(argument, partial(setattr, robot, 'speed_share'), 'The speed was set', 'shares')
+
     def _emulate_drop(self, argument: str) -> str:
         plane = self._controller.robot.surface
         return self._with_number(argument, partial(setattr, plane, 'drop_m'), 'The surface was moved', 'metres')
@@ -162,5 +166,6 @@ ANSWERS: Mapping[str, Answer] = {
     'emulate offline': DashboardSession._emulate_offline,
     'emulate silence': DashboardSession._emulate_silence,
     'emulate slow': DashboardSession._emulate_slow,
+    'emulate speed': DashboardSession._emulate_speed,
     'emulate drop': DashboardSession._emulate_drop,
 }

@@ -47,6 +47,8 @@ class EmulatedRobot:
         What moves it; set from outside.
     touched_at : (6,)
         Where the last contact began.
+    speed_share
+        Position of the speed slider on the pendant, 0 to 1; the force mode does not obey it.
     """
 
     def __init__(self, params: UrControllerParams, rng: np.random.Generator) -> None:
@@ -54,6 +56,8 @@ class EmulatedRobot:
         x, y, z = self.surface.origin
         self.pose: Array = np.array([x, y, z + params.start_height_m, 0.0, 0.0, 0.0])
         self.velocity: Array = np.zeros(6)
+        self.speed_share = 1.0
+        self._unslowed: Array = np.zeros(6)  # velocity as it would be without the slider
         self.force: Array = np.zeros(6)
         self.motion: RobotMove = StopMove(HALT)
         self.force_mode: ForceMode | None = None
@@ -71,9 +75,12 @@ class EmulatedRobot:
 
     def step(self, step_s: float) -> None:
         """Move for one step."""
-        velocity = self.motion.velocity(self.pose, self.velocity, step_s)
+        led = velocity = self.motion.velocity(self.pose, self._unslowed, step_s)
         if self.force_mode is not None:
             velocity = self._comply(velocity, self.force_mode, step_s)
+            led = _stiff(led, self.force_mode)
+        self._unslowed = velocity
+        velocity = velocity - (1.0 - self.speed_share) * led
         self.velocity = velocity
         self.pose = self.pose + velocity * step_s
         touched = self._contact.any()
@@ -122,3 +129,9 @@ class EmulatedRobot:
         along = np.where(mode.selection[:3] > 0, self._compliant_m_s, along)
         turning = np.where(mode.selection[3:] > 0, 0.0, velocity[3:])
         return np.concatenate([mode.axes @ along, turning])
+
+
+def _stiff(velocity: Array, mode: ForceMode) -> Array:
+    """Return the part of a velocity along the axes that do not yield, (6,)."""
+    along = np.where(mode.selection[:3] > 0, 0.0, mode.axes.T @ velocity[:3])
+    return np.concatenate([mode.axes @ along, velocity[3:]])
