@@ -178,10 +178,13 @@ class UrCommandStream:
         """Zero the force sensor, at rest and in free air; return whether the controller did."""
         taken = self._watchdog.call(self._control.zeroFtSensor)
         self._count(taken)
-        self.trusted |= taken
-        self.zeroings += taken
+        if not taken:
+            self._rest_ns = self._measured_ns  # free air is still proven: try again after another rest
+            return False
+        self.trusted = True
+        self.zeroings += 1
         self._air.presume_contact()  # the force is another one now; the next zeroing needs a proof of its own
-        return taken
+        return True
 
     def _hold_still(self, _ur_command: UrCommand | None) -> bool:
         """Zero the force sensor as soon as the arm has calmed down in free air."""
