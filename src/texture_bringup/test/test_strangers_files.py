@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import dataclasses
 import hashlib
 import io
 import json
@@ -19,6 +20,7 @@ import pickle
 import resource
 import shutil
 import signal
+import struct
 import time
 import warnings
 import zipfile
@@ -59,6 +61,7 @@ from texture_features.feature_set import FeatureSet
 from texture_features.labelled_features import LabelledFeatures
 from texture_launch.reader import all_arguments
 from texture_recordings.bag_writer import BagWriter
+from texture_recordings.bags import RawMessage
 from texture_recordings.cdr import TYPES, decode, encode, typestore
 from texture_recordings.importers.biotac20 import import_biotac20
 from texture_recordings.importers.ntp21 import import_ntp21
@@ -755,6 +758,77 @@ def small_records(folder: Path) -> bytes:
     return content[:header] + kept + message * (MB5 // len(message)) + footer
 
 
+SLIDING = ExplorationState(10**9, 'e1', 'linear_slide', Phase.SLIDE, 0.1, 0.05, 1.0, surface='oak')
+ONE_SAMPLE = TactileSignal(10**9, 'x', ('a',), ('g',), RATE_HZ, 0, np.zeros((1, 1), np.float32))
+
+
+def stamped(raw: bytes, number: int, noise: bytes = b'') -> bytes:
+    """Return a message 20 µs later than the one before it, with noise at its end."""
+    stamp = struct.pack('<iI', *divmod(10**9 + 20_000 * number, 10**9))
+    return raw[:4] + stamp + raw[12 : len(raw) - len(noise)] + noise
+
+
+def many_states(number: int) -> Iterator[tuple[str, type, bytes]]:
+    raw, rng = encode(SLIDING), np.random.default_rng(0)
+    for each in range(number):
+        yield 'exploration', ExplorationState, stamped(raw, each, rng.bytes(4))
+
+
+def many_signals(number: int) -> Iterator[tuple[str, type, bytes]]:
+    yield 'exploration', ExplorationState, encode(SLIDING)
+    raw = encode(ONE_SAMPLE)
+    at, rng = len(raw) - 16, np.random.default_rng(0)
+    for each in range(number):
+        numbered = raw[:at] + each.to_bytes(8, 'little') + raw[at + 8 :]
+        yield 'signal', TactileSignal, stamped(numbered, each, rng.bytes(2) + b'\0\0')
+
+
+def many_explorations(number: int) -> Iterator[tuple[str, type, bytes]]:
+    rng = np.random.default_rng(0)
+    for each in range(number):
+        raw = encode(dataclasses.replace(SLIDING, exploration_id=f'e{each}'))
+        yield 'exploration', ExplorationState, stamped(raw, each, rng.bytes(4))
+
+
+def many_channels(number: int) -> Iterator[tuple[str, type, bytes]]:
+    yield 'exploration', ExplorationState, encode(SLIDING)
+    raw = encode(ONE_SAMPLE)
+    at = raw.index(b'\1\0\0\0\2\0\0\0a\0')
+    names = struct.pack('<I', number) + b'\1\0\0\0\0\0\0\0' * number
+    yield 'signal', TactileSignal, raw[:at] + names + raw[at + 12 :]
+
+
+def long_promises(number: int) -> Iterator[tuple[str, type, bytes]]:
+    for each in range(number):
+        stamp_ns = 10**9 * (1 + 3600 * each)
+        state = dataclasses.replace(SLIDING, stamp_ns=stamp_ns, exploration_id=f'e{each}', steady_s=3600.0)
+        signal = dataclasses.replace(ONE_SAMPLE, stamp_ns=stamp_ns + 3599 * 10**9, first_sample=3_600_000 * each)
+        yield 'exploration', ExplorationState, encode(state)
+        yield 'signal', TactileSignal, encode(signal)
+
+
+def slow_samples(number: int) -> Iterator[tuple[str, type, bytes]]:
+    """Yield samples ten times a second, each of which begins a window."""
+    for each in range(number):
+        stamp_ns = 10**9 * (1 + 1000 * each)
+        signal = TactileSignal(stamp_ns, 'x', ('a',), ('g',), 10.0, 10_000 * each, np.zeros((10_000, 1), np.float32))
+        yield 'exploration', ExplorationState, encode(dataclasses.replace(SLIDING, stamp_ns=stamp_ns, steady_s=3600.0))
+        yield 'signal', TactileSignal, encode(signal)
+
+
+def bag_of(messages_of: Callable[[int], Iterator[tuple[str, type, bytes]]], number: int) -> Callable[[Path], bytes]:
+    """Return what writes a whole bag with so many messages instead of the good one."""
+
+    def make(folder: Path) -> bytes:
+        shutil.rmtree(folder / 'bag')
+        with BagWriter(folder / 'bag') as bag:
+            for each, (topic, kind, raw) in enumerate(messages_of(number)):
+                bag.write_raw(RawMessage(topic, TYPES[kind], 10**9 + each, raw))
+        return (folder / 'bag/bag.mcap').read_bytes()
+
+    return make
+
+
 BOMBS: dict[str, tuple[str, str, Callable[[Path], bytes]]] = {
     'a card of empty lists': ('model', CARD, lambda _: b'{"recipe": [' + b'[],' * (MB5 // 3) + b'[]]}'),
     'a card of small objects': ('model', CARD, lambda _: b'{"recipe": [' + b'{"":0},' * (MB5 // 7) + b'0]}'),
@@ -795,6 +869,12 @@ BOMBS: dict[str, tuple[str, str, Callable[[Path], bytes]]] = {
         'checkpoint', 'good.json', lambda _: b'{"format":1,"identity":{},"scores":[' + b'[],' * (MB5 // 3) + b'[]]}',
     ),
     'small messages': ('bag', 'bag/bag.mcap', small_records),
+    'a bag of states': ('bag', 'bag/bag.mcap', bag_of(many_states, 100_000)),
+    'a bag of single samples': ('bag', 'bag/bag.mcap', bag_of(many_signals, 190_000)),
+    'a bag of explorations': ('bag', 'bag/bag.mcap', bag_of(many_explorations, 60_000)),
+    'a bag of channels': ('bag', 'bag/bag.mcap', bag_of(many_channels, 1_900_000)),
+    'a bag that promises years': ('bag', 'bag/bag.mcap', bag_of(long_promises, 3000)),
+    'a bag of slow samples': ('bag', 'bag/bag.mcap', bag_of(slow_samples, 300)),
     'metadata of 5 MB': ('bag', 'bag/metadata.yaml', lambda _: b'- 1\n' * (MB5 // 4)),
     'a data set of zeros': (
         'NTP data set', 'slides.npz',

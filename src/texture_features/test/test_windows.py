@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_features.windowing.sample_buffer import BufferedStream
+from texture_features.windowing.slide_coverage import SlideCoverage
 from texture_features.windowing.windows import CutWindow, SlideEnd, WindowCutter, WindowParams, cut_recording
 
 PARAMS = WindowParams(length_s=0.5, hop_s=0.1)
@@ -146,6 +147,23 @@ def test_a_stream_that_begins_late_or_again_costs_only_its_windows():
     late = run({'signal': stream(1.0, begin_s=0.35)}, [state(0.0, steady_s=1.0), state(1.0, Phase.LIFT)])
     assert starts(late) == [0.4, 0.5]
     assert late[-1].skipped == 4
+
+
+@pytest.mark.parametrize(('begin_s', 'windows'), [(3599.0, 6), (0.0, 6), (7200.0, 0)])
+def test_an_hour_without_samples_is_passed_over_at_once_and_counted(begin_s, windows, monkeypatch):
+    """Whoever promises an hour for each of thousands of slides shall not make anybody count to 36 000 for each."""
+    asked = []
+    window = SlideCoverage.window
+    monkeypatch.setattr(SlideCoverage, 'window', lambda slide: asked.append(1) or window(slide))
+    *cut, end = run({'signal': stream(1.0, begin_s=begin_s)}, [state(0.0, steady_s=3600.0)])
+    assert (len(cut), end.skipped) == (windows, 35_996 - windows)
+    assert len(asked) < 50
+
+
+def test_what_a_stream_delivered_before_it_began_again_is_not_passed_over_with_its_gaps():
+    signals = [*stream(2.0, begin_s=10.0), *stream(2.0, begin_s=20.0)]
+    *cut, end = run({'signal': signals}, [state(0.0, steady_s=30.0)])
+    assert (len(cut), end.skipped) == (32, 296 - 32)
 
 
 def test_speed_and_force_are_means_over_the_window():

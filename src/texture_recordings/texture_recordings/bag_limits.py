@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 import struct
 import sys
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
@@ -20,6 +21,7 @@ from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
 from rosbags.rosbag2 import ReaderError, reader, storage_mcap, storage_sqlite3
 
 from texture_core.files import MB, Budget, FileRefused, open_regular, read_text, unpacked_limit
+from texture_core.signal import TactileSignal
 
 if sys.version_info >= (3, 14):
     from compression.zstd import ZstdDecompressor
@@ -33,6 +35,13 @@ PACKED_RECORD_BYTES = 8
 CHUNK = 0x06
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
 RECORD_HEAD = struct.Struct('<BQ')
+# Signals are read in 10 µs each, other messages in 25 µs, and each becomes objects of up to 1.5 kB; a bag of 5 MB may
+# hold so many signals, or a third of it of other messages, and larger ones another for every 8 bytes.
+SIGNALS_AT_LEAST, OTHERS_COUNT = 200_000, 3
+SHORT_BYTES, TEXTS_BYTES = 512, 64  # of other messages; longer ones may hold a text, which takes 1 µs, in each 8 bytes
+SMALL_BAG_BYTES, SIGNAL_BYTES = 5 * MB, 8
+# Windows are cut from time that was sampled, however few samples that takes. Signals of the suite take 1 kB/s or more.
+RECORDED_AT_LEAST_S, BYTES_PER_S = 3600.0, 300
 # SQLite counts its own steps; reading a row three times takes fewer than a hundred, and a row 30 bytes or more.
 MAX_STEPS = 10_000_000
 STEPS_PER_BYTE = 4
@@ -82,6 +91,43 @@ def check_index(storage: Any) -> None:
 def messages_budget(files: Iterable[Path]) -> Budget:
     """Return how many bytes the messages of a bag may have: a damaged or altered file may give the same ones again."""
     return _budget(sum(file.stat().st_size for file in files))
+
+
+class MessageLimit:
+    """How many messages a bag may still have.
+
+    Parameters
+    ----------
+    files
+        Files of the bag.
+    """
+
+    def __init__(self, files: Iterable[Path]) -> None:
+        self._file_bytes = sum(file.stat().st_size for file in files)
+        self._left = SIGNALS_AT_LEAST + max(0, self._file_bytes - SMALL_BAG_BYTES) // SIGNAL_BYTES
+
+    def spend(self, n_bytes: int, is_signal: bool) -> None:
+        """Count a message; FileRefused if there are more than the size of the bag allows."""
+        self._left -= 1 if is_signal else OTHERS_COUNT + max(0, n_bytes - SHORT_BYTES) // TEXTS_BYTES
+        if self._left < 0:
+            raise FileRefused(
+                f'it has more messages than a bag of {self._file_bytes / MB:.3g} MB may hold; split the recording'
+            )
+
+
+def check_duration(path: Path, signals: Iterable[TactileSignal]) -> None:
+    """Raise FileRefused if the signals of a bag stand for much more time than its size can tell of."""
+    size = sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]) if file.is_file())
+    seconds: defaultdict[str, float] = defaultdict(float)
+    for signal in signals:
+        seconds[signal.sensor] += len(signal.samples) / signal.sampling_rate_hz
+    most_s = RECORDED_AT_LEAST_S + size / BYTES_PER_S
+    longest_s = max(seconds.values(), default=0.0)
+    if longest_s > most_s:
+        raise FileRefused(
+            f'it has {longest_s / 3600:.3g} h of samples, and a bag of {size / MB:.3g} MB may have '
+            f'{most_s / 3600:.3g} h; check the sampling rate of its signals'
+        )
 
 
 def _budget(file_bytes: int) -> Budget:

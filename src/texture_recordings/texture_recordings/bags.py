@@ -17,7 +17,7 @@ from rosbags.typesys.base import TypesysError
 from texture_core.errors import InvalidData
 from texture_core.plain_data import parse_yaml
 from texture_core.signal import TactileSignal
-from texture_recordings.bag_limits import CheckedPath, check_index, check_storage, messages_budget
+from texture_recordings.bag_limits import CheckedPath, MessageLimit, check_index, check_storage, messages_budget
 from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode, typestore
 
 if sys.version_info >= (3, 14):
@@ -172,7 +172,7 @@ def _read(
         files = _files(checked)
         for file in files:
             check_storage(file)
-        budget = messages_budget(files)
+        budget, limit = messages_budget(files), MessageLimit(files)
         with Reader(checked) as reader:
             for storage in getattr(reader.storage, 'storages', [reader.storage]):
                 if hasattr(storage, 'chunks'):
@@ -184,6 +184,7 @@ def _read(
             for connection, log_ns, data in reader.messages(connections, start_ns, stop_ns):
                 missing -= 1
                 budget.spend(len(data))
+                limit.spend(len(data), connection.msgtype == TYPES[TactileSignal])
                 yield RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
                 raise ReaderError(f'{missing} of its messages are missing')

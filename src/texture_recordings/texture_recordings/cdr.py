@@ -29,10 +29,11 @@ MESSAGES: Mapping[str, type] = {
     for cls in (TactileSignal, ExplorationState, FeatureVector, TextureEstimate, RoughnessEstimate)
 }
 TYPES: Mapping[type, str] = {cls: name for name, cls in MESSAGES.items()}
+PHASES = tuple(Phase)
 Convert = tuple[Callable[[Any], Any], Callable[[Any], Any]]
 # By the type of a field, where it is not the same on both sides: to the wire, and back.
 WIRE: Mapping[Any, Convert] = {
-    Phase: (lambda phase: phase.code, lambda code: tuple(Phase)[code]),
+    Phase: (lambda phase: phase.code, PHASES.__getitem__),
     tuple[str, ...]: (list, tuple),
     tuple[float, ...]: (lambda values: np.array(values, dtype=np.float64), lambda values: tuple(values.tolist())),
     Array: (lambda values: np.ascontiguousarray(values, dtype=np.float64), lambda values: values),
@@ -117,6 +118,7 @@ class SignalDecoder:
     def __init__(self) -> None:
         self._head = b''
         self._like: TactileSignal | None = None
+        self._heads_left = MAX_HEADS_BYTES
 
     def decode(self, raw: bytes) -> TactileSignal:
         """Return the signal in the CDR of a TactileSignal; `samples` is a view of `raw`."""
@@ -136,14 +138,43 @@ class SignalDecoder:
         )  # fmt: skip
 
     def _decode_first(self, raw: bytes) -> TactileSignal:
+        _check_texts(raw)
         signal: TactileSignal = decode(raw, TYPES[TactileSignal])
         # The samples are the last field: what stands before them, without the stamp, is common to the stream.
         tail = len(raw) - 4 * signal.samples.size - INDEX_AND_LENGTH.size
         self._head, self._like = raw[STAMP_END:tail], signal
+        self._heads_left -= len(self._head)
+        if self._heads_left < 0:
+            raise InvalidData(f"the channels of sensor '{signal.sensor}' change again and again")
         return signal
+
+
+def _check_texts(raw: bytes) -> None:
+    """Raise InvalidData if a TactileSignal has more channels or units than any sensor: a text takes 8 bytes."""
+    try:
+        at = STAMP_END
+        for _ in ('frame', 'sensor'):
+            at = _after_text(raw, at)
+        for name in ('channels', 'units'):
+            (count,) = LENGTH.unpack_from(raw, at)
+            if count > MAX_CHANNELS:
+                raise InvalidData(f'a signal has {count} {name}; {MAX_CHANNELS} are allowed')
+            at += LENGTH.size
+            for _ in range(count):
+                at = _after_text(raw, at)
+    except struct.error:
+        pass  # whoever reads on says what is wrong
+
+
+def _after_text(raw: bytes, at: int) -> int:
+    (length,) = LENGTH.unpack_from(raw, at)
+    return -(-(at + LENGTH.size + int(length)) // LENGTH.size) * LENGTH.size
 
 
 LITTLE_ENDIAN = b'\x00\x01'
 STAMP = struct.Struct('<2xiI')
 STAMP_END = 12
 INDEX_AND_LENGTH = struct.Struct('<QI')
+LENGTH = struct.Struct('<I')
+MAX_CHANNELS = 4096
+MAX_HEADS_BYTES = 2_000_000  # a stream says the same of itself all the time, unless its driver is started again

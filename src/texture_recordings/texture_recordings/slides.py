@@ -17,8 +17,10 @@ import numpy as np
 
 from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState, Phase
+from texture_core.files import FileRefused
 from texture_core.signal import TactileSignal
 from texture_core.slide_motion import SlideMotion
+from texture_recordings.bag_limits import check_duration
 from texture_recordings.bags import find_bags, read_bag
 from texture_recordings.motion_of_states import motion_made
 
@@ -176,6 +178,10 @@ def find_slides(
 def _slides_of(path: Path, namespace: str | None, topics: Sequence[str]) -> list[LabelledSlide]:
     """Return the labelled slides of one bag, yet without numbers: an exploration lasts until the next one begins."""
     messages = list(read_bag(path, (*topics, STATES), namespace))
+    try:
+        check_duration(path, (value for topic, _, value in messages if topic in topics))
+    except FileRefused as error:
+        raise InvalidData(f"the bag '{path}' cannot be used: {error}") from error
     reported = [message for message in messages if message[0] == STATES and message[2].exploration_id]
     groups = [list(group) for _, group in groupby(reported, key=lambda message: message[2].exploration_id)]
     starts: list[int | None] = [group[0][1] for group in groups]

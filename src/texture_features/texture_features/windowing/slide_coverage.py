@@ -119,9 +119,12 @@ class SlideCoverage:
                 return None
             self._intervals.popleft()
 
-    def advance(self) -> None:
-        """Go on to the next window."""
-        self._next_ns += self._hop_ns
+    def advance(self, count: int = 1) -> int:
+        """Go on by so many windows, but not beyond the covered stretch of the present one; return by how many."""
+        left = (self._intervals[0][1] - self._length_ns - self._next_ns) // self._hop_ns + 1
+        count = min(count, left)
+        self._next_ns += count * self._hop_ns
+        return count
 
     def _cover(self, start: int, end: int) -> None:
         if self._intervals and start <= self._intervals[-1][1]:

@@ -22,6 +22,7 @@ from texture_features.windowing.sample_buffer import BufferedStream, SampleBuffe
 from texture_features.windowing.slide_coverage import CoveredSpan, SlideCoverage
 
 TIMEOUT_S = 0.3
+ALL = 1 << 62
 
 
 @dataclass(frozen=True)
@@ -148,6 +149,7 @@ class WindowCutter:
         self._windows = 0
         self._skipped = 0
         self._old_states = 0
+        self._lost = 1  # windows from the present one on that are lost for the same reason
 
     def add_signal(self, topic: str, signal: TactileSignal) -> None:
         """Add a batch; batches of one topic come in the order in which they were sampled."""
@@ -228,7 +230,7 @@ class WindowCutter:
             if found is _Missing.LATE:
                 return False
             if isinstance(found, _Missing):
-                self._skip(slide)
+                self._skip(slide, self._lost)
                 continue
             slide.advance()
             self._windows += 1
@@ -236,6 +238,7 @@ class WindowCutter:
         return slide.ended
 
     def _find(self, slide: SlideCoverage, span: CoveredSpan) -> dict[str, Window] | _Missing:
+        self._lost = 1
         windows = {}
         for topic, source in self._inputs.items():
             found = self._find_in(source, slide, span)
@@ -247,7 +250,7 @@ class WindowCutter:
     def _find_in(self, source: _Input, slide: SlideCoverage, span: CoveredSpan) -> Window | _Missing:
         """Look for a window in the runs of a stream; only the newest can still grow."""
         source.due = -math.inf
-        state = _Missing.LATE
+        state, lost = _Missing.LATE, ALL
         for buffer in source.stream.buffers:
             anchor = source.anchors.get(buffer) or buffer.anchor(slide.start_ns)
             if anchor is None:
@@ -261,8 +264,13 @@ class WindowCutter:
                 return _finite_window(buffer, first, count, span)
             state = _Missing.LOST if first < buffer.first_sample else _Missing.LATE
             source.due = first + count
+            if state is _Missing.LOST:
+                # What begins before the first sample is lost: a gap of an hour is passed over at once.
+                missing_s = (buffer.first_sample - first - 1) / buffer.rate_hz
+                lost = min(lost, int(missing_s / self._params.hop_s))
         if state is _Missing.LOST:
             source.due = math.inf
+            self._lost = max(1, lost)
         return state
 
     def _window_event(self, slide: SlideCoverage, span: CoveredSpan, windows: Mapping[str, Window]) -> CutWindow:
@@ -280,10 +288,10 @@ class WindowCutter:
             direction_rad=span.direction_rad,
         )
 
-    def _skip(self, slide: SlideCoverage) -> None:
-        slide.advance()
-        slide.skipped += 1
-        self._skipped += 1
+    def _skip(self, slide: SlideCoverage, count: int) -> None:
+        skipped = slide.advance(count)
+        slide.skipped += skipped
+        self._skipped += skipped
 
     def _end_slide(self) -> SlideEnd:
         slide = self._slides.popleft()
@@ -296,7 +304,7 @@ class WindowCutter:
         events: list[WindowEvent] = []
         while self._slides and self._slides[0].ended:
             while self._slides[0].window():
-                self._skip(self._slides[0])
+                self._skip(self._slides[0], ALL)
             events.append(self._end_slide())
             self._ready = True
             events += self.take()
