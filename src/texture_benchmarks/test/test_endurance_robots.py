@@ -12,6 +12,7 @@ from texture_benchmarks.endurance.robot_faults import (
     AT_START,
     HAND,
     NO_FAULT,
+    RAILS,
     RIGS,
     ROBOT_FAULTS,
     SIMULATED_ARM,
@@ -27,6 +28,7 @@ from texture_benchmarks.endurance.true_contact import TrueContact, true_contact
 from texture_core.finger_state import FingerState
 from texture_core.parameters import parameters_of
 from texture_exploration.arms.in_hand import InHandParams
+from texture_exploration.arms.rails import RailsParams
 from texture_exploration.arms.simulated import SimulatedArmParams
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.motions.touch import TouchParams
@@ -36,7 +38,7 @@ from texture_exploration.signal_watch import SignalWatchParams
 ASKED_N = 3.0
 KEPT = TrueContact(slide_s=2.0, observed_s=2.0, mean_force_n=3.0, max_force_n=3.2, longest_loss_s=0.0)
 EXITS = (ExplorerExit(UR, 'SIGINT', 90.0, 0.5),)
-ARM_PARAMS = {UR: UrArmParams, HAND: InHandParams, SIMULATED_ARM: SimulatedArmParams}
+ARM_PARAMS = {UR: UrArmParams, HAND: InHandParams, RAILS: RailsParams, SIMULATED_ARM: SimulatedArmParams}
 
 
 def exploration(**changed):

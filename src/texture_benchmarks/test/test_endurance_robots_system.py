@@ -8,7 +8,7 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_benchmarks.endurance.robot_faults import HAND, UR, PlannedRobotFault, RobotSession, RobotTrial  # noqa: E402
+from texture_benchmarks.endurance.robot_faults import HAND, RAILS, UR, PlannedRobotFault, RobotSession, RobotTrial  # noqa: E402
 from texture_benchmarks.endurance.robot_requirements import check_robots  # noqa: E402
 from texture_benchmarks.endurance.robot_run import RobotPlan, endure_robots  # noqa: E402
 from texture_core.exploration import ExplorationRequest  # noqa: E402
@@ -52,4 +52,13 @@ def test_an_exception_in_the_bus_thread_is_named_and_no_motor_keeps_its_torque(t
     record = run(HAND, 'none', trials, tmp_path, 'SIGKILL')
     assert 'InjectedError' in record.explorations[0].message
     assert record.explorations[-1].ending == 'success'
+    assert record.exits[0].powered == ''
+
+
+@needs('serial')
+def test_rails_whose_cable_is_pulled_out_are_named_and_the_same_request_succeeds(tmp_path):
+    trials = [RobotTrial(SLIDE, PlannedRobotFault('cable pulled out', 0.3, 0.3))]
+    record = run(RAILS, 'none', trials, tmp_path)
+    named, again = record.explorations
+    assert ('cannot be reached' in named.message, again.ending) == (True, 'success')
     assert record.exits[0].powered == ''

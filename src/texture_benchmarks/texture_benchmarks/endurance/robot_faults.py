@@ -11,8 +11,8 @@ import numpy as np
 
 from texture_core.exploration import ExplorationRequest
 
-UR, HAND, SIMULATED_ARM = 'emulated UR', 'emulated hand', 'simulated arm'
-RIGS = (UR, HAND, SIMULATED_ARM)
+UR, HAND, RAILS, SIMULATED_ARM = 'emulated UR', 'emulated hand', 'emulated rails', 'simulated arm'
+RIGS = (UR, HAND, RAILS, SIMULATED_ARM)
 NO_FAULT = 'none'
 AT_START, BEFORE, IN_SLIDE = 'before the explorer starts', 'before the exploration', 'in the slide'
 EXITS = ('SIGINT', 'SIGTERM', 'SIGKILL')
@@ -72,6 +72,14 @@ ROBOT_FAULTS: Mapping[str, Mapping[str, RobotFault]] = {
         'exception in the bus thread': RobotFault('exception', IN_SLIDE, weight=1.5),
         'cable pulled out': RobotFault('unplug', IN_SLIDE, 0.2, 1.5),
         'surface lost': RobotFault('drop', IN_SLIDE, weight=2.0),
+        'explorer killed': KILLED,
+    },
+    RAILS: {
+        NO_FAULT: NONE,
+        'cable pulled out': RobotFault('unplug', IN_SLIDE, 0.2, 1.5),
+        'silence': RobotFault('silence', IN_SLIDE, 1.2, 2.5),
+        'something in the way': RobotFault('block', IN_SLIDE),
+        'surface lost': RobotFault('drop', IN_SLIDE, DROP_M, DROP_M),
         'explorer killed': KILLED,
     },
     SIMULATED_ARM: {
@@ -141,7 +149,7 @@ def draw_session(rng: np.random.Generator, rig: str) -> RobotSession:
     faults = ROBOT_FAULTS[rig]
     starts = {name: fault for name, fault in faults.items() if fault.when == AT_START}
     others = {name: fault for name, fault in faults.items() if fault.when != AT_START}
-    start = _draw(rng, starts) if rng.random() < START_FAULT_SHARE else NO_FAULT
+    start = _draw(rng, starts) if starts and rng.random() < START_FAULT_SHARE else NO_FAULT
     names = [_draw(rng, others) for _ in range(EXPLORATIONS_PER_SESSION)]
     if start != NO_FAULT and faults[start].surface:
         names = [start] * EXPLORATIONS_PER_SESSION  # the surface stays as it is

@@ -12,10 +12,12 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from texture_benchmarks.endurance.emulated_hand import STIFFNESS_N_M, EmulatedHandProcess
+from texture_benchmarks.endurance import emulated_hand, emulated_rails
+from texture_benchmarks.endurance.emulated_process import EmulatedRobotProcess
 from texture_benchmarks.endurance.robot_faults import (
     DROP_M,
     HAND,
+    RAILS,
     ROBOT_FAULTS,
     SIMULATED_ARM,
     UR,
@@ -169,12 +171,8 @@ class UrRig:
 
     def powered(self) -> str:
         """Return that the robot still moves."""
-        moving = not _until(self._rests)
+        moving = not _until(lambda: _rests(self.fingers))
         return f'the robot moves: {self.fingers.fingers[-1]}' if moving else ''
-
-    def _rests(self) -> bool:
-        finger = self.fingers.fingers[-1]
-        return finger.vx_m_s == finger.vy_m_s == finger.vz_m_s == 0.0
 
     def _stop(self, _fault: PlannedRobotFault, _pid: int) -> str:
         return self._controller.ask('emulate protective stop')
@@ -197,7 +195,7 @@ class HandRig:
         self.fingers = FingerLog()
         self._session = session
         self._folder = tempfile.TemporaryDirectory(prefix='endurance_hand_')
-        self._hand = EmulatedHandProcess(Path(self._folder.name) / 'bus', self.fingers.port)
+        self._hand = EmulatedRobotProcess(emulated_hand.__name__, Path(self._folder.name) / 'bus', self.fingers.port)
         # Motors report their speed and current in coarse steps: as in the launch file of the hand.
         self.parameters = {
             **PATIENCE, 'arm': 'hand', 'hand': 'dynamixel', 'device': str(self._hand.link), 'grip_timeout_s': 20.0,
@@ -229,7 +227,7 @@ class HandRig:
     def restore(self, fault: PlannedRobotFault) -> None:
         """See `RobotRig.restore`."""
         if ROBOT_FAULTS[HAND][fault.name].action == 'drop':
-            self._hand.ask(f'stiffness {STIFFNESS_N_M}')
+            self._hand.ask(f'stiffness {emulated_hand.STIFFNESS_N_M}')
 
     def taken_over(self) -> str:
         """Return '': no other program can play."""
@@ -258,11 +256,86 @@ class HandRig:
         return 'the object is gone'
 
 
+class RailsRig:
+    """The emulated rails."""
+
+    program: Sequence[str] = ()
+
+    def __init__(self, session: RobotSession) -> None:
+        self.fingers = FingerLog()
+        self._folder = tempfile.TemporaryDirectory(prefix='endurance_rails_')
+        self._rails = EmulatedRobotProcess(
+            emulated_rails.__name__, Path(self._folder.name) / 'rails', self.fingers.port
+        )
+        height_m = emulated_rails.FREE.start_height_m
+        self.parameters: Mapping[str, Any] = {
+            **PATIENCE, 'arm': 'rails', 'device': str(self._rails.link), 'height_m': height_m
+        }  # fmt: skip
+        self._open = ExitStack()
+        self.actions: Mapping[str, Callable[[PlannedRobotFault, int], str]] = {
+            'none': _do_nothing, 'kill': _kill, 'unplug': self._unplug, 'silence': self._silence,
+            'block': self._block, 'drop': self._drop,
+        }  # fmt: skip
+
+    def __enter__(self) -> RailsRig:
+        self._open.callback(self._folder.cleanup)
+        self._open.enter_context(self.fingers)
+        self._open.enter_context(self._rails)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._open.close()
+
+    def inject(self, fault: PlannedRobotFault, pid: int) -> str:
+        """See `RobotRig.inject`."""
+        return self.actions[ROBOT_FAULTS[RAILS][fault.name].action](fault, pid)
+
+    def restore(self, fault: PlannedRobotFault) -> None:
+        """See `RobotRig.restore`."""
+        for command in ('block 0', 'drop 0'):
+            self._rails.ask(command)
+
+    def taken_over(self) -> str:
+        """Return '': no other program can play."""
+        return ''
+
+    def powered(self) -> str:
+        """Return that the rails still move."""
+        moving = not _until(lambda: _rests(self.fingers))
+        return f'the rails move: {self.fingers.fingers[-1]}' if moving else ''
+
+    def _unplug(self, fault: PlannedRobotFault, _pid: int) -> str:
+        return self._for_a_while('unplug', 'plug', fault.strength)
+
+    def _silence(self, fault: PlannedRobotFault, _pid: int) -> str:
+        return self._for_a_while('silent 1', 'silent 0', fault.strength)
+
+    def _block(self, _fault: PlannedRobotFault, _pid: int) -> str:
+        self._rails.ask('block 1')
+        return 'the encoders do not follow the motors'
+
+    def _drop(self, _fault: PlannedRobotFault, _pid: int) -> str:
+        self._rails.ask(f'drop {DROP_M}')
+        return f'the surface drops by {1e3 * DROP_M:.0f} mm'
+
+    def _for_a_while(self, begin: str, end: str, seconds: float) -> str:
+        self._rails.ask(begin)
+        time.sleep(seconds)
+        self._rails.ask(end)
+        return f'for {seconds:.2f} s'
+
+
 RIG_CLASSES: Mapping[str, Callable[[RobotSession], RobotRig]] = {
     UR: UrRig,
     HAND: HandRig,
+    RAILS: RailsRig,
     SIMULATED_ARM: SimulatedArmRig,
 }
+
+
+def _rests(fingers: FingerLog) -> bool:
+    finger = fingers.fingers[-1]
+    return finger.vx_m_s == finger.vy_m_s == finger.vz_m_s == 0.0
 
 
 def _do_nothing(_fault: PlannedRobotFault, _pid: int) -> str:
