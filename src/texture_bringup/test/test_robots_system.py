@@ -34,7 +34,8 @@ IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 # finger went. The model knows neither circles nor strokes as slow as in the hand: there only the evidence counts.
 MOTIONS = ((LINEAR, SURFACE), (CIRCULAR, ''), (IN_HAND, ''))
 REPORTED = (UrArmParams, SafetyLimits, SignalWatchParams)  # parameters in the example of a file
-ROBOTS = {'ur': 73, 'rails': 74, 'hand': 75}  # and the domain of its nodes
+ROBOTS = {'ur': 73, 'rails': 74, 'hand': 75, 'ros_controllers': 95}  # and the domain of its nodes
+FORCES = {'ros_controllers': ['--force', '5']}  # that its preset allows; the default of the motion otherwise
 
 
 @pytest.fixture(scope='module')
@@ -58,9 +59,11 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
         'silence_s': 1.5,
         'signal_timeout_s': 3.0,
         'watchdog_hz': 1.0,
+        'deadman_s': 1.5,
+        'connect_timeout_s': 30.0,
     }
     (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
-    place = {'ip': '127.0.0.110'} if robot == 'ur' else {'robot': tmp_path / robot}
+    place = {'ur': {'ip': '127.0.0.110'}, 'ros_controllers': {}}.get(robot, {'robot': tmp_path / robot})
     given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'surface': SURFACE, 'model': model, **place}
     given['explorer_params'] = tmp_path / 'patient.yaml'
     with ChildLauncher(robot, given, dict(os.environ), tmp_path / 'nodes.log') as launcher:
@@ -69,7 +72,7 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
             operator.wait_for_signal(DEADLINE_S)
             operator.wait_for_listeners(('exploration', 'features'), 1, launcher.check)  # who estimates
         for motion, label in MOTIONS:
-            code = command.main(['explore', *motion])
+            code = command.main(['explore', *motion, *FORCES.get(robot, [])])
             reported = capsys.readouterr().out
             assert code == 0, reported + launcher.log.read_text()
             found = re.findall(

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_core.rotation import rotation_matrix
+from texture_core.rotation import quaternion_matrix, rotation_matrix
 
 
 def test_a_quarter_turn_about_z_brings_x_to_y() -> None:
@@ -23,3 +23,15 @@ def test_a_rotation_keeps_lengths_and_handedness() -> None:
 def test_the_axis_of_a_rotation_stays_where_it_is() -> None:
     axis = np.array([0.3, -2.0, 1.1])
     assert rotation_matrix(axis) @ axis == pytest.approx(axis)
+
+
+def test_a_quaternion_turns_as_the_rotation_vector_does() -> None:
+    half = 0.35
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    quaternion = (*(np.sin(half) * axis), np.cos(half))
+    assert quaternion_matrix(quaternion) == pytest.approx(rotation_matrix(2 * half * axis))
+    assert quaternion_matrix(np.array(quaternion) * 3.0) == pytest.approx(rotation_matrix(2 * half * axis))
+
+
+def test_a_quaternion_of_length_zero_is_no_rotation() -> None:
+    assert np.isnan(quaternion_matrix((0.0, 0.0, 0.0, 0.0))).all()

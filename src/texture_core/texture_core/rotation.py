@@ -1,4 +1,4 @@
-"""Rotation vectors, as robots use them."""
+"""Rotation vectors and quaternions, as robots use them."""
 
 from __future__ import annotations
 
@@ -28,4 +28,28 @@ def rotation_matrix(rotation_vector_rad: Sequence[float] | Array) -> Array:
     first = np.sinc(angle / np.pi)
     second = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
     matrix: Array = np.eye(3) + first * cross + second * cross @ cross
+    return matrix
+
+
+def quaternion_matrix(quaternion: Sequence[float]) -> Array:
+    """Return the matrix of a rotation that is given as the quaternion x, y, z, w of ROS.
+
+    Parameters
+    ----------
+    quaternion : (4,)
+        Of any length but 0; it is normalised.
+
+    Returns
+    -------
+    (3, 3)
+        Its columns are the axes of the turned frame; NaN for a quaternion of length 0, which is no rotation.
+    """
+    vector, w = np.array(quaternion[:3], dtype=float), float(quaternion[3])
+    length = float(np.sqrt(vector @ vector + w * w))
+    if length == 0.0:
+        return np.full((3, 3), np.nan)
+    vector, w = vector / length, w / length
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    matrix: Array = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
     return matrix

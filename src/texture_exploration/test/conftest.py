@@ -12,7 +12,12 @@ from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 # The pure tests run where there is no ROS.
-ROS_TESTS = ['test_explorer_node.py', 'test_explore_preset.py', 'test_signal_watch_node.py']
+ROS_TESTS = [
+    'test_explorer_node.py',
+    'test_explore_preset.py',
+    'test_ros_controllers_process.py',
+    'test_signal_watch_node.py',
+]
 collect_ignore = [] if importlib.util.find_spec('rclpy') else ROS_TESTS
 
 ARM_STEP_NS = 5_000_000

@@ -2,13 +2,16 @@
 
 import contextlib
 import math
+import os
 import tempfile
 import time
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
 from texture_core.errors import CommandRefused
+from texture_core.node_process import NodeProcess
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.protocol import ArmCommand
 from texture_simulation.devices.rails import EmulatedRails
@@ -31,7 +34,17 @@ def emulated_rails():
         yield {'device': str(rails.port.link)}
 
 
+@contextlib.contextmanager
+def emulated_controllers():
+    pytest.importorskip('rclpy', reason='there is no ROS here')
+    domain = {'ROS_DOMAIN_ID': '92', 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    with mock.patch.dict(os.environ, domain), NodeProcess('texture_simulation', 'twist_controller'):
+        # Patient with a busy machine, which is not what is tried here.
+        yield {'connect_timeout_s': 30.0, 'deadman_s': 1.0}
+
+
 DEVICES = {
+    'ros_controllers': emulated_controllers,
     'ur': ur_controller,
     'rails': emulated_rails,
 }  # what must be there for an arm, and the parameters that lead to it

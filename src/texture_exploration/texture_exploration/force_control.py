@@ -23,7 +23,7 @@ from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import LoopModel, stability_limit_gain
 from texture_exploration.stiffness import TOUCHING_N, StiffnessEstimate
 
-NOISE_N = 0.005  # of the force
+NOISE_SHARE = 1.0 / 6.0  # of the force that counts as touching: the noise of the force
 SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
 SETTLED = 0.3  # from an error of this share of the wanted force on, the slope is observed
 REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
@@ -98,6 +98,14 @@ class ForceLoopParams:
         'share of the wanted force; a larger share presses faster.',
         low=0.05,
         high=100.0,
+    )
+    touching_n: float = param(
+        TOUCHING_N,
+        'Sets the force above which the force control takes the finger for touching; it must exceed the noise of the '
+        'force sensor. A larger force meets the surface harder.',
+        unit='N',
+        low=0.005,
+        high=5.0,
     )
 
     def loop(self, stiffness_n_m: float, period_s: float, gain_m_s_n: float = 0.0) -> LoopModel:
@@ -226,7 +234,7 @@ class ForceLoop:
         params.check_gain(period_s)
         self._params = params
         self._period_s = period_s
-        self.stiffness = StiffnessEstimate()
+        self.stiffness = StiffnessEstimate(params.touching_n)
         self.lag = LagEstimate()
         self._declared = params  # what was declared; `_params` holds what was measured
         self._observer = self._new_observer()
@@ -241,7 +249,7 @@ class ForceLoop:
 
     def observe(self, contact: ContactState, speed_m_s: float = 0.0) -> None:
         """Take note of a contact, whatever is commanded; call it once a period. Sliding tells nothing of stiffness."""
-        if contact.force_n < TOUCHING_N:
+        if contact.force_n < self._params.touching_n:
             self.stiffness.restart()
             return
         if self.stiffness.empty:
@@ -287,15 +295,16 @@ class ForceLoop:
             Normal velocity, m/s, positive away from the surface.
         """
         height_m, force_n = contact.height_m, contact.force_n
-        if force_n < TOUCHING_N:
+        if force_n < self._params.touching_n:
             self.restart()
             return -self.approach_m_s(height_m)
         estimated_n_m = self.stiffness.value_n_m
         settled = abs(wanted_n - force_n) < SETTLED * wanted_n
         feed_forward_m_s = 0.0
+        noise_n = NOISE_SHARE * self._params.touching_n
         if not math.isnan(estimated_n_m) and (settled or self._observer.running):
             feed_forward_m_s = self._observer.update(
-                contact.travelled_m, height_m + force_n / estimated_n_m, speed_m_s, NOISE_N / estimated_n_m
+                contact.travelled_m, height_m + force_n / estimated_n_m, speed_m_s, noise_n / estimated_n_m
             )
         down_m_s = math.inf if speed_m_s > SLOWEST_M_S else self._pressing_m_s(wanted_n)
         return self.controller.update(wanted_n - force_n, dt_s, feed_forward_m_s, down_m_s)

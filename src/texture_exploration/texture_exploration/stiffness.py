@@ -7,14 +7,22 @@ import math
 SOFTEST_N_M = 50.0
 MIN_POINTS = 3
 RECENT_SHARE = 0.5  # of the force, from which on points count
-MIN_RISE_N = 0.1  # of the force, before a stiffness can be told from noise
+MIN_RISE_N = 0.1  # of the force at the default of `TOUCHING_N`, before a stiffness can be told from noise
 TOUCHING_N = 0.03
 
 
 class StiffnessEstimate:
-    """Estimate how stiff a contact is, by the slope of force over height while the force rises: least squares."""
+    """Estimate how stiff a contact is, by the slope of force over height while the force rises: least squares.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    touching_n
+        A smaller force is none; it must exceed the noise of the force sensor.
+    """
+
+    def __init__(self, touching_n: float = TOUCHING_N) -> None:
+        self._touching_n = touching_n
+        self._min_rise_n = MIN_RISE_N * touching_n / TOUCHING_N
         self.value_n_m = math.nan
         self.restart()
 
@@ -30,13 +38,13 @@ class StiffnessEstimate:
 
     def update(self, height_m: float, force_n: float) -> None:
         """Take a point; those before the contact are passed over."""
-        if self.fixed or force_n < TOUCHING_N or (self._points and force_n <= self._points[-1][1]):
+        if self.fixed or force_n < self._touching_n or (self._points and force_n <= self._points[-1][1]):
             return
         self._points.append((height_m, force_n))
         # A finger is the stiffer the harder it is pressed: what counts is how stiff it is now.
-        recent_n = min(RECENT_SHARE * force_n, force_n - 1.5 * MIN_RISE_N)
+        recent_n = min(RECENT_SHARE * force_n, force_n - 1.5 * self._min_rise_n)
         self._points = [point for point in self._points if point[1] >= recent_n]
-        if len(self._points) >= MIN_POINTS and force_n - self._points[0][1] > MIN_RISE_N:
+        if len(self._points) >= MIN_POINTS and force_n - self._points[0][1] > self._min_rise_n:
             self.value_n_m = max(SOFTEST_N_M, self._slope())
 
     def _slope(self) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import statistics
 import tempfile
@@ -11,13 +12,17 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from unittest import mock
 
 from texture_benchmarks.motion.trial import CIRCLE, SLIDE, ForceControlMetrics, force_control_metrics
 from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
 from texture_core.finger_state import FingerState
+from texture_core.node_process import NodeProcess
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.protocol import Arm, ArmState
 from texture_exploration.arms.rails import RailsArm, RailsParams
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.ros_controllers_params import RosControllersParams
 from texture_exploration.arms.ur import UrArm
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.explorer import Explorer
@@ -32,7 +37,9 @@ from texture_simulation.devices.ur.process import ControllerProcess
 
 HEIGHT_M = 0.002
 UR_IP = '127.0.0.66'
-LIMITS = SafetyLimits(state_timeout_s=1.0)  # a busy machine is not what is tried here
+CONTROLLER_DOMAIN = 99
+LAG_S = 0.02
+LIMITS = SafetyLimits(state_timeout_s=1.0, approach_timeout_s=40.0)  # a busy machine is not what is tried here
 DEADLINE_S = 60.0
 GRIP_S = 20.0
 TOUCH = TouchParams()
@@ -108,6 +115,26 @@ def hand(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
         yield InHandArm(InHandParams(hand='dynamixel', device=str(made.port.link), grip_timeout_s=GRIP_S))
 
 
+@contextmanager
+def ros_controllers(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
+    """Start an emulated velocity controller with a lag of 20 ms, known only through its topics, in a domain of its own.
+
+    The stiffest contact is expected throughout, and may be met with half of the wanted force.
+    """
+    emulated = {'finger_port': finger_port, 'stiffness_n_m': stiffness_n_m, 'start_height_m': HEIGHT_M, 'lag_s': LAG_S}
+    isolation = {'ROS_DOMAIN_ID': str(CONTROLLER_DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    with (
+        mock.patch.dict(os.environ, isolation),
+        NodeProcess('texture_simulation', 'twist_controller', emulated),
+    ):
+        # A busy machine is not what is tried here.
+        yield RosControllersArm(
+            RosControllersParams(
+                connect_timeout_s=DEADLINE_S, deadman_s=1.0, max_stiffness_n_m=20000.0, max_impact_n=0.5
+            )
+        )
+
+
 @dataclass(frozen=True)
 class RobotUnderTest:
     """An emulated robot: how it is started, what it does, how it touches, and the module that it needs."""
@@ -121,6 +148,7 @@ class RobotUnderTest:
 ROBOTS: Mapping[str, RobotUnderTest] = {
     'emulated UR': RobotUnderTest(ur, 'rtde_control'),
     'emulated rails': RobotUnderTest(rails, 'serial'),
+    'emulated ROS controllers': RobotUnderTest(ros_controllers, 'rclpy'),
     # Motors tell their speed and current in coarse steps.
     'emulated hand': RobotUnderTest(
         hand, 'dynamixel_sdk', (RUB,), TouchParams(speed_tolerance=0.3, force_tolerance=0.2)

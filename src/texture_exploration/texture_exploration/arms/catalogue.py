@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from texture_exploration.arms.in_hand import InHandArm
 from texture_exploration.arms.protocol import ArmClass
 from texture_exploration.arms.rails import RailsArm
+from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.simulated import SimulatedArm
 from texture_exploration.arms.ur import UrArm
 
 ARMS: Mapping[str, ArmClass] = {
     'simulated': SimulatedArm,  # kinematic, over an elastic plane; drives the emulator
     'ur': UrArm,  # Universal Robots, through ur-rtde
+    'ros_controllers': RosControllersArm,  # any arm that ROS drives: velocities, pose and force over standard topics
     'hand': InHandArm,  # the sliding fingers of a hand, while the others hold
     'rails': RailsArm,  # Hu et al. 2014: two rails and a pressing motor behind a microcontroller
 }

@@ -3,12 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from texture_core.arrays import Array
+from texture_core.parameters import param
 from texture_core.rotation import rotation_matrix
 from texture_exploration.arms.protocol import Vector
+
+
+@dataclass(frozen=True)
+class SurfacePoseParams:
+    """Where the surface is, seen from the base of an arm; a base of the parameters of each arm with a base frame."""
+
+    surface_x_m: float = param(
+        0.4, 'Sets the x coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+    )
+    surface_y_m: float = param(
+        0.0, 'Sets the y coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+    )
+    surface_z_m: float = param(
+        0.1, 'Sets the z coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
+    )
+    surface_rx_rad: float = param(
+        0.0,
+        'Sets the x component of the rotation vector of the surface frame; its z axis points away from the surface.',
+        unit='rad',
+        low=-7.0,
+        high=7.0,
+    )
+    surface_ry_rad: float = param(
+        0.0, 'Sets the y component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
+    )
+    surface_rz_rad: float = param(
+        0.0, 'Sets the z component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
+    )
+
+    @property
+    def surface_pose(self) -> tuple[float, ...]:
+        """Pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
+        origin = (self.surface_x_m, self.surface_y_m, self.surface_z_m)
+        return (*origin, self.surface_rx_rad, self.surface_ry_rad, self.surface_rz_rad)
 
 
 class SurfaceFrame:

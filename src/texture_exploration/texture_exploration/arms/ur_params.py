@@ -6,35 +6,14 @@ from dataclasses import dataclass
 
 from texture_core.parameters import param
 from texture_exploration.arms.command_limits import CommandLimits
+from texture_exploration.arms.surface_frame import SurfacePoseParams
 
 
 @dataclass(frozen=True)
-class UrArmParams(CommandLimits):
+class UrArmParams(SurfacePoseParams, CommandLimits):
     """Where the controller is, where the surface is, and how the arm is supervised."""
 
     ip: str = param('127.0.0.2', 'Sets the IP address of the controller; the default is that of the emulated one.')
-    surface_x_m: float = param(
-        0.4, 'Sets the x coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
-    surface_y_m: float = param(
-        0.0, 'Sets the y coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
-    surface_z_m: float = param(
-        0.1, 'Sets the z coordinate of the origin of the surface frame in the base frame.', unit='m', low=-3.0, high=3.0
-    )
-    surface_rx_rad: float = param(
-        0.0,
-        'Sets the x component of the rotation vector of the surface frame; its z axis points away from the surface.',
-        unit='rad',
-        low=-7.0,
-        high=7.0,
-    )
-    surface_ry_rad: float = param(
-        0.0, 'Sets the y component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
-    )
-    surface_rz_rad: float = param(
-        0.0, 'Sets the z component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
-    )
     rate_hz: float = param(
         250.0,
         'Sets the rate of commands and states; a higher rate reacts faster and costs more computing time.',
@@ -106,6 +85,11 @@ class UrArmParams(CommandLimits):
     take_over: bool = param(
         False, 'Stops a program of another user that runs or pauses on the controller; false refuses to connect.'
     )
+    upper_range_registers: bool = param(
+        False,
+        'Lets the control program use the registers 24 to 47, so that a fieldbus (EtherNet/IP, PROFINET) may keep 0 to '
+        '23; false uses 0 to 23.',
+    )
     probe_timeout_s: float = param(
         1.5,
         'Sets how long the controller may take to answer the first requests before connecting fails.',
@@ -120,9 +104,3 @@ class UrArmParams(CommandLimits):
         low=0.5,
         high=60.0,
     )
-
-    @property
-    def surface_pose(self) -> tuple[float, ...]:
-        """Pose of the surface in the base frame as a UR controller writes it: m and rad, (6,)."""
-        origin = (self.surface_x_m, self.surface_y_m, self.surface_z_m)
-        return (*origin, self.surface_rx_rad, self.surface_ry_rad, self.surface_rz_rad)

@@ -11,6 +11,58 @@ from texture_exploration.force_control import ContactState, ForceLoop, ForceLoop
 HOLDS_S = 0.02  # so long an arm keeps a velocity when nobody asks for another
 
 
+class CommandedVelocity:
+    """Choose the velocity that carries out a command: a wanted force by the force loop, a velocity as it is.
+
+    Towards the surface a commanded velocity is limited to what the force loop can still stop in time.
+
+    Parameters
+    ----------
+    params
+        The force loop.
+    period_s
+        How often `choose` is called.
+    """
+
+    def __init__(self, params: ForceLoopParams, period_s: float) -> None:
+        self._loop = ForceLoop(params, period_s)
+        self._travelled_m = 0.0
+
+    @property
+    def lag_s(self) -> float:
+        """How late the arm follows, as measured while it came down; NaN until it is measured."""
+        return self._loop.lag.value_s
+
+    def travelled(self, distance_m: float) -> None:
+        """Take note of how far the finger has gone along the surface since the last call."""
+        self._travelled_m += distance_m
+
+    def choose(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
+        """Return the velocity to ask for, m/s.
+
+        Parameters
+        ----------
+        command
+            What the arm shall do.
+        state
+            The newest state of the arm.
+        held_s
+            For how long the velocity of the last call was asked for.
+        """
+        normal_m_s = self._normal_m_s(command, state, held_s)
+        self._loop.asked(state.position[2], normal_m_s, held_s)
+        return (*command.tangential_m_s, normal_m_s)
+
+    def _normal_m_s(self, command: ArmCommand, state: ArmState, held_s: float) -> float:
+        contact = ContactState(state.position[2], self._travelled_m, state.force_n)
+        speed_m_s = math.hypot(*command.tangential_m_s)
+        self._loop.observe(contact, speed_m_s)
+        if command.force_n is None:
+            self._loop.restart()
+            return max(command.normal_m_s, -self._loop.approach_m_s(contact.height_m))
+        return self._loop.velocity_m_s(command.force_n, contact, speed_m_s, held_s)
+
+
 class VelocityForceControl:
     """Ask for velocities that press as wanted, and move by what was asked a delay ago.
 
@@ -27,14 +79,13 @@ class VelocityForceControl:
     """
 
     def __init__(self, params: ForceLoopParams, period_s: float, now_ns: int, delay_s: float) -> None:
-        self._loop = ForceLoop(params, period_s)
+        self._velocity = CommandedVelocity(params, period_s)
         self._delayed = DelayedVelocity(delay_s, now_ns)
-        self._travelled_m = 0.0
 
     def moved_m(self, now_ns: int) -> Vector:
         """Return how far the finger has gone since this was asked last."""
         moved = self._delayed.moved_m(now_ns)
-        self._travelled_m += math.hypot(*moved[:2])
+        self._velocity.travelled(math.hypot(*moved[:2]))
         return moved
 
     def ask(self, command: ArmCommand, state: ArmState, dt_s: float) -> None:
@@ -49,19 +100,7 @@ class VelocityForceControl:
         dt_s
             Time since the last call.
         """
-        held_s = min(dt_s, HOLDS_S)
-        normal = self._normal_m_s(command, state, held_s)
-        self._loop.asked(state.position[2], normal, held_s)
-        self._delayed.ask(state.time_ns, (*command.tangential_m_s, normal))
-
-    def _normal_m_s(self, command: ArmCommand, state: ArmState, dt_s: float) -> float:
-        contact = ContactState(state.position[2], self._travelled_m, state.force_n)
-        speed_m_s = math.hypot(*command.tangential_m_s)
-        self._loop.observe(contact, speed_m_s)
-        if command.force_n is None:
-            self._loop.restart()
-            return max(command.normal_m_s, -self._loop.approach_m_s(contact.height_m))
-        return self._loop.velocity_m_s(command.force_n, contact, speed_m_s, dt_s)
+        self._delayed.ask(state.time_ns, self._velocity.choose(command, state, min(dt_s, HOLDS_S)))
 
 
 class DelayedVelocity:

@@ -1,0 +1,323 @@
+"""The arm behind ROS controllers without ROS: an emulated arm at the other end of its topics, in simulated time."""
+
+import math
+
+import numpy as np
+import pytest
+
+from texture_core.errors import CommandRefused, DeviceError, InvalidParameter
+from texture_core.exploration import ExplorationRequest
+from texture_core.rotation import quaternion_matrix, rotation_matrix
+from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.ros_controllers_params import RosControllersParams as Params
+from texture_exploration.arms.ros_controllers_topics import ForceSample, PoseSample
+from texture_exploration.arms.tool_state import GRAVITY_M_S2, ToolState
+from texture_exploration.exploration import Exploration
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.lift_first import LiftFirst
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
+
+PERIOD_NS = 4_000_000
+EXPLORER_PERIODS = 2  # of the arm, in one of the explorer
+NO_NOISE = TwistControllerParams(force_noise_n=0.0, jitter_s=0.0)
+LIMITS = SafetyLimits(approach_timeout_s=30.0)  # a late arm comes down slowly on what may be stiff
+
+
+class Robot:
+    """The topics of an emulated arm, and the clock."""
+
+    def __init__(self, emulated=NO_NOISE, **given):
+        self.now_ns = 1_000_000_000
+        self.arm = EmulatedTwistArm(emulated, self.now_ns)
+        self.frames = ('base', 'tool0_controller')
+        self.pose_comes = self.force_comes = True
+        self.heard_by = 1
+        self.sent = []  # velocities with their times
+        self.forces = []
+        self.closed = False
+        self.driven = RosControllersArm(
+            Params(**given), clock=lambda: self.now_ns, open_topics=lambda _params: self, own_thread=False
+        )
+
+    def newest_pose(self):
+        x, y, z = self.arm.position.tolist()
+        return PoseSample(self.now_ns, self.frames[0], (x, y, z), TOOL_DOWN) if self.pose_comes else None
+
+    def newest_force(self):
+        x, y, z = self.arm.reading_n().tolist()
+        return ForceSample(self.now_ns, self.frames[1], (x, y, z)) if self.force_comes else None
+
+    def listeners(self):
+        return self.heard_by
+
+    def send_velocity(self, velocity_m_s):
+        self.sent.append((self.now_ns, velocity_m_s))
+        self.arm.command(self.now_ns, np.array(velocity_m_s))
+
+    def send_force(self, force_n):
+        self.forces.append(force_n)
+        self.arm.press(np.array(force_n))
+
+    def close(self):
+        self.closed = True
+
+    def pass_time(self, time_s, command=None):
+        """Let time pass; the command is given again in each period of the explorer."""
+        for period in range(round(time_s * 1e9 / PERIOD_NS)):
+            if command is not None and period % EXPLORER_PERIODS == 0:
+                self.driven.command(command)
+            self.now_ns += PERIOD_NS
+            self.arm.advance(self.now_ns)
+            self.driven.step()
+
+    @property
+    def is_commanded_to_rest(self):
+        return not any(self.sent[-1][1])
+
+    def zero_force(self):
+        """Rise in free air and rest: then the force sensor is zeroed."""
+        self.pass_time(0.3, ArmCommand(normal_m_s=0.02))
+        self.pass_time(0.4, ArmCommand())
+        assert self.driven.zeroed
+
+    def explore(self, request, touch):
+        home = self.driven.state().position
+        motion = MOTIONS[request.motion](request, home, touch, LIMITS)
+        forces = {}
+
+        def note(state):
+            forces.setdefault(state.phase.value, []).append(self.arm.finger().force_n)
+
+        exploration = Exploration(
+            'one',
+            request,
+            arm=self.driven,
+            motion=LiftFirst(motion, touch, LIMITS, lambda: self.driven.zeroed),
+            limits=LIMITS,
+            clock=lambda: self.now_ns,
+            on_state=note,
+        )
+        return exploration.run(lambda: self.pass_time(0.01)), forces
+
+
+@pytest.fixture
+def robot():
+    robot = Robot()
+    robot.driven.connect()
+    return robot
+
+
+def test_the_velocity_is_commanded_in_the_base_frame_and_measured_in_that_of_the_surface():
+    turned = {'surface_rx_rad': 0.0, 'surface_ry_rad': 0.3}
+    robot = Robot(TwistControllerParams(jitter_s=0.0, force_noise_n=0.0, **turned), **turned)
+    robot.driven.connect()
+    robot.pass_time(0.5, ArmCommand(tangential_m_s=(0.02, -0.01)))
+    expected = rotation_matrix((0.0, 0.3, 0.0)) @ [0.02, -0.01, 0.0]
+    assert robot.sent[-1][1] == pytest.approx(expected)
+    assert robot.driven.state().velocity == pytest.approx((0.02, -0.01, 0.0), abs=1e-6)
+    assert robot.driven.state().position[2] == pytest.approx(0.01, abs=1e-6)
+
+
+def test_a_controller_in_the_frame_of_the_tool_is_commanded_in_that_frame():
+    robot = Robot(twist_frame_id='tool0_controller')
+    robot.driven.connect()
+    robot.pass_time(0.02, ArmCommand(tangential_m_s=(0.02, 0.01), normal_m_s=0.03))
+    assert robot.sent[-1][1] == pytest.approx((0.02, -0.01, -0.03))  # the tool looks down
+
+
+def test_offset_and_weight_of_the_tool_are_removed_in_free_air_and_the_force_is_that_of_the_surface(robot):
+    assert abs(robot.driven.state().force_n) > 1.0
+    robot.zero_force()
+    robot.pass_time(0.1)
+    assert robot.driven.state().force_n == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_weight_is_removed_also_when_the_tool_has_turned_since_the_zero():
+    params = Params(tool_mass_kg=0.5)
+    tool = ToolState(params)
+    weight = np.array([0.0, 0.0, -0.5 * GRAVITY_M_S2])
+    offset = np.array([0.7, -0.2, 1.1])
+
+    def show(now_ns, quaternion, height_m, push_n=0.0, moving=False):
+        to_base = quaternion_matrix(quaternion)
+        tool.take_pose(now_ns, PoseSample(now_ns, 'base', (0.4, 0.0, 0.1 + height_m), quaternion))
+        force = to_base.T @ (weight + np.array([0.0, 0.0, push_n])) + offset
+        tool.take_force(now_ns, ForceSample(now_ns, 'tool0_controller', tuple(force)), moving=moving)
+        return tool.state('').force_n
+
+    for step in range(50):
+        show(4_000_000 * (step + 1), TOOL_DOWN, 0.01 + 1e-4 * step, moving=True)
+    for step in range(60):
+        show(4_000_000 * (51 + step), TOOL_DOWN, 0.015)
+    assert tool.zero.zeroed
+    assert tool.zero.offset_n == pytest.approx(offset)
+    turned = (math.sin(0.6), 0.0, 0.0, math.cos(0.6))
+    assert show(4_000_000 * 120, turned, 0.015, push_n=2.0) == pytest.approx(2.0)
+
+
+def test_the_sensor_is_not_zeroed_in_contact(robot):
+    robot.zero_force()
+    robot.driven.recover()
+    assert not robot.driven.zeroed
+    robot.arm.position = robot.arm._origin - [0.0, 0.0, 0.02]  # 40 N
+    robot.pass_time(0.3, ArmCommand(normal_m_s=0.01))
+    robot.pass_time(0.5, ArmCommand())
+    assert robot.arm.finger().force_n > 5.0
+    assert not robot.driven.zeroed
+
+
+def test_a_command_with_a_force_rises_first_and_presses_once_the_sensor_is_zeroed():
+    robot = Robot(TwistControllerParams(start_height_m=0.002))
+    robot.driven.connect()
+    robot.pass_time(0.1, ArmCommand(force_n=1.0))
+    assert robot.sent[-1][1][2] > 0
+    robot.pass_time(12.0, ArmCommand(force_n=1.0))
+    assert robot.driven.zeroed
+    assert robot.arm.finger().force_n == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_force_that_changes_all_the_way_up_is_a_fault(robot):
+    robot.arm.position = robot.arm._origin - [0.0, 0.0, 0.05]
+    robot.pass_time(3.0, ArmCommand(force_n=1.0))
+    assert 'could not be zeroed' in robot.driven.state().fault
+    assert robot.is_commanded_to_rest
+
+
+@pytest.mark.parametrize('what', ['pose', 'force'])
+def test_a_stale_pose_or_force_commands_zero_velocity_within_100_ms(robot, what):
+    robot.pass_time(0.2, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    assert not robot.is_commanded_to_rest
+    setattr(robot, f'{what}_comes', False)
+    begin_ns = robot.now_ns
+    robot.pass_time(0.2, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    first_ns = next(time_ns for time_ns, velocity in robot.sent if time_ns > begin_ns and not any(velocity))
+    assert (first_ns - begin_ns) * 1e-9 <= 0.1
+    assert f'no {what} has come on' in robot.driven.state().fault
+    assert not any(velocity != (0.0, 0.0, 0.0) for time_ns, velocity in robot.sent if time_ns >= first_ns)
+
+
+def test_a_broadcaster_that_repeats_an_old_pose_counts_as_stale(robot):
+    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    frozen = robot.newest_pose()
+    robot.newest_pose = lambda: frozen
+    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    assert 'no pose has come' in robot.driven.state().fault
+
+
+def test_a_command_that_is_not_repeated_ends_in_zero_velocity(robot):
+    robot.driven.command(ArmCommand(tangential_m_s=(0.02, 0.0)))
+    robot.pass_time(0.05)
+    assert not robot.is_commanded_to_rest
+    robot.pass_time(0.1)
+    assert robot.is_commanded_to_rest
+
+
+def test_at_rest_nothing_is_sent_after_a_while_so_that_others_may_command(robot):
+    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    robot.driven.stop()
+    robot.pass_time(1.0)
+    number = len(robot.sent)
+    robot.pass_time(1.0)
+    assert len(robot.sent) == number
+
+
+def test_closing_commands_zero_velocity_and_leaves_the_topics(robot):
+    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    robot.driven.close()
+    assert robot.is_commanded_to_rest
+    assert robot.closed
+    with pytest.raises(DeviceError, match='not connected'):
+        robot.driven.state()
+
+
+def test_a_command_out_of_range_is_refused_and_zero_velocity_is_commanded(robot):
+    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    with pytest.raises(CommandRefused):
+        robot.driven.command(ArmCommand(tangential_m_s=(math.nan, 0.0)))
+    robot.pass_time(0.01)
+    assert robot.is_commanded_to_rest
+
+
+def test_a_controller_that_ends_is_named(robot):
+    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    robot.heard_by = 0
+    robot.pass_time(0.01, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    assert "nobody listens on 'twist_controller/twist' any more" in robot.driven.state().fault
+    robot.heard_by = 1
+    robot.driven.recover()
+    robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    assert robot.driven.state().fault == ''
+
+
+def test_a_controller_that_listens_without_moving_the_arm_is_named_and_recovers():
+    robot = Robot(TwistControllerParams(active=False))
+    robot.driven.connect()
+    robot.pass_time(0.5, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    assert 'mm commanded' in robot.driven.state().fault
+    assert 'is not active' in robot.driven.state().fault
+    assert robot.is_commanded_to_rest
+
+
+def test_a_late_arm_that_limits_its_speed_still_follows():
+    robot = Robot(TwistControllerParams(lag_s=0.08, max_speed_m_s=0.1, max_acceleration_m_s2=1.0))
+    robot.driven.connect()
+    robot.pass_time(1.0, ArmCommand(tangential_m_s=(0.2, 0.0)))
+    assert robot.driven.state().fault == ''
+
+
+@pytest.mark.parametrize(('frames', 'said'), [(('world', 'tool0_controller'), 'pose'), (('base', 'wrist'), 'force')])
+def test_an_unknown_frame_is_refused_when_connecting(frames, said):
+    robot = Robot(connect_timeout_s=0.1)
+    robot.frames = frames
+    with pytest.raises(DeviceError, match=f'the {said} on .* is given in the frame'):
+        robot.driven.connect()
+    assert robot.closed
+
+
+def test_what_is_missing_is_named_when_connecting():
+    robot = Robot(connect_timeout_s=0.1)
+    robot.force_comes, robot.heard_by = False, 0
+    with pytest.raises(DeviceError, match=r"no force comes on .*; nobody listens on 'twist_controller/twist'"):
+        robot.driven.connect()
+
+
+def test_a_frame_for_velocities_that_is_neither_base_nor_tool_is_refused():
+    with pytest.raises(InvalidParameter, match="it must be the base frame 'base'"):
+        Params(twist_frame_id='world')
+
+
+@pytest.mark.parametrize('stiffness_n_m', [200.0, 2000.0, 20000.0])
+def test_the_lag_is_measured_coming_down_and_the_force_kept(stiffness_n_m):
+    emulated = TwistControllerParams(lag_s=0.02, jitter_s=0.002, stiffness_n_m=stiffness_n_m, start_height_m=0.002)
+    robot = Robot(emulated, max_stiffness_n_m=20000.0, max_impact_n=0.5)
+    robot.driven.connect()
+    request = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.06)
+    outcome, forces = robot.explore(request, TouchParams(approach_stiffness_n_m=20000.0))
+    assert outcome.success, outcome.message
+    assert max(forces['contact']) < 1.2
+    assert np.sqrt(np.mean((np.array(forces['slide']) - 1.0) ** 2)) < 0.05
+    assert 15 <= robot.driven.counts['lag_ms'] <= 40
+
+
+def test_a_compliance_controller_presses_by_itself_and_is_let_go_at_the_end():
+    robot = Robot(TwistControllerParams(jitter_s=0.0), target_wrench_topic='target_wrench')
+    robot.driven.connect()
+    robot.zero_force()
+    robot.pass_time(6.0, ArmCommand(force_n=2.0))
+    assert robot.forces[-1] == pytest.approx((0.0, 0.0, -2.0))
+    assert robot.arm.finger().force_n == pytest.approx(2.0, rel=0.05)
+    robot.driven.stop()
+    robot.pass_time(0.05)
+    assert robot.forces[-1] == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize('motion', MOTIONS)
+def test_every_motion_succeeds_behind_a_late_controller(motion):
+    robot = Robot(TwistControllerParams(start_height_m=0.003))
+    robot.driven.connect()
+    requests = {'circular': {'speed_m_s': 0.05, 'turns': 0.5}, 'in_hand_sliding': {'duration_s': 1.0}}
+    outcome, _ = robot.explore(ExplorationRequest(motion, **requests.get(motion, {'distance_m': 0.02})), TouchParams())
+    assert outcome.success, outcome.message

@@ -1,0 +1,95 @@
+"""The arm behind an emulated controller that is a process of its own, seen only through its topics."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from geometry_msgs.msg import PoseStamped
+
+from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.node_process import NodeProcess
+from texture_core.ros.local_graph import LocalGraph
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.ros_controllers_params import RosControllersParams
+from texture_exploration.explorer import Explorer
+from texture_exploration.motions.touch import TouchParams
+from texture_exploration.safety import SafetyLimits
+
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
+
+# Patient with a busy machine where that is not what is tried.
+PATIENT = RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, max_impact_n=0.5)
+LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0)
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
+HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever
+DEADLINE_S = 60.0
+MOVING = """
+import time
+from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.ros_controllers_params import RosControllersParams
+
+arm = RosControllersArm(RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0))
+arm.connect()
+print('moving', flush=True)
+while True:
+    arm.command(ArmCommand(tangential_m_s=(0.01, 0.0)))
+    time.sleep(0.01)
+"""
+
+
+@pytest.fixture
+def graph():
+    with LocalGraph(94, deadline_s=DEADLINE_S) as graph:
+        yield graph
+
+
+def explored(explorer, on_slide=None):
+    """Return the exploration, after doing something in its slide, and when that was, ns."""
+    exploration, done_ns = explorer.begin('one', SLIDE), 0
+    while not exploration.ended.wait(0.002):
+        if on_slide and not done_ns and exploration.state.phase is Phase.SLIDE:
+            done_ns = time.monotonic_ns()
+            on_slide()
+    return exploration, done_ns
+
+
+def test_a_controller_that_dies_in_the_slide_is_named_and_the_next_request_connects_again(graph, record_property):
+    explorer = Explorer(RosControllersArm(PATIENT), TouchParams(), LIMITS, lambda state: None)
+    with NodeProcess('texture_simulation', 'twist_controller', HELD) as controller:
+        explorer.connect()
+        exploration, since_ns = explored(explorer, lambda: controller.process.send_signal(signal.SIGKILL))
+    assert since_ns
+    assert not exploration.outcome.success
+    # It shows by what comes first: no pose, no listener, or no motion.
+    assert re.search('no pose has come|nobody listens|the controller on .* is not active', exploration.outcome.message)
+    record_property('detected_s', (exploration.state.stamp_ns - since_ns) * 1e-9)
+    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+        again, _ = explored(explorer)
+    explorer.close()
+    assert again.outcome.success, again.outcome.message
+
+
+def test_when_the_process_that_commands_is_killed_the_arm_comes_to_rest(graph, record_property):
+    places = graph.listen(PoseStamped, 'tcp_pose_broadcaster/pose')
+    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+        with subprocess.Popen([sys.executable, '-c', MOVING], env=dict(os.environ), stdout=subprocess.PIPE) as process:
+            graph.until(lambda: len(places) > 1 and places[-1].pose.position.x > places[0].pose.position.x + 0.002)
+            process.send_signal(signal.SIGKILL)
+            killed_s = time.monotonic()
+        moved = [places[-1].pose.position.x, time.monotonic()]
+
+        def is_at_rest():
+            x = places[-1].pose.position.x
+            if abs(x - moved[0]) > 1e-9:
+                moved[:] = x, time.monotonic()
+            return time.monotonic() - moved[1] > 0.5
+
+        graph.until(is_at_rest)
+        record_property('stopped_s', moved[1] - killed_s)
+        print(f'at rest {1e3 * (moved[1] - killed_s):.0f} ms after the death of who commanded')
+        assert moved[1] - killed_s < 1.5

@@ -1,0 +1,372 @@
+"""An arm that ROS controllers drive: it commands velocities, and reads pose and force, over standard topics.
+
+The force is controlled by the velocity loop of the suite, or by a compliance controller if one is named. This file
+knows no ROS: the topics are behind `texture_exploration.arms.ros_controllers_topics.ControllerTopics`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from texture_core.errors import DeviceError
+from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading, Vector
+from texture_exploration.arms.ros_controllers_params import RosControllersParams
+from texture_exploration.arms.ros_controllers_topics import ControllerTopics
+from texture_exploration.arms.ros_controllers_watch import FollowWatch, stale
+from texture_exploration.arms.surface_frame import SurfaceFrame
+from texture_exploration.arms.tool_state import ToolState
+from texture_exploration.arms.velocity_only import CommandedVelocity
+
+STANDSTILL = ArmCommand()
+REST: Vector = (0.0, 0.0, 0.0)
+HALTING_NS = 500_000_000  # so long zero velocity is repeated; afterwards others may command the controller
+RISE_M_S = 0.02
+MAX_RISES = 5.0  # a finger that is lifted to zero its sensor rises at most by so many times what proves free air
+POLL_S = 0.005
+NOT_CONNECTED = 'the arm is not connected; connect it first'
+UNSTEADY = (
+    'its force sensor could not be zeroed: the force changed all the while the finger rose; see that nothing touches '
+    "the finger, and raise 'zero_steady_n' above the noise of the sensor"
+)
+
+
+def open_topics(params: RosControllersParams) -> ControllerTopics:
+    """Return the topics over ROS.
+
+    Raises
+    ------
+    DeviceError
+        If ROS is not installed.
+    """
+    try:
+        module = importlib.import_module('texture_exploration.ros.controller_topics')
+    except ImportError as error:
+        raise DeviceError(
+            f"the arm 'ros_controllers' needs ROS 2, which is not installed here ({error}); see docs/start.md"
+        ) from error
+    topics: ControllerTopics = module.RosTopics(params)
+    return topics
+
+
+class RosControllersArm:
+    """The arm as the explorer uses it; see `texture_exploration.arms.protocol.Arm`.
+
+    Zero velocity is commanded on every way out: a stop, a fault, a command that is too old, `close`, and by a process
+    of its own if this one is killed.
+
+    Parameters
+    ----------
+    params
+        Topics, frames, force control and supervision.
+    clock
+        CLOCK_MONOTONIC in ns.
+    open_topics
+        Makes the topics when connecting.
+    own_thread
+        Command by itself at `rate_hz` once connected. If False, whoever owns the arm calls `step`.
+
+    Raises
+    ------
+    InvalidParameter
+        If the force control would be unstable.
+    """
+
+    Params = RosControllersParams
+
+    def __init__(
+        self,
+        params: RosControllersParams = RosControllersParams(),  # noqa: B008 (frozen)
+        clock: Callable[[], int] = time.monotonic_ns,
+        open_topics: Callable[[RosControllersParams], ControllerTopics] = open_topics,
+        own_thread: bool = True,
+    ) -> None:
+        self._params = params
+        self._clock = clock
+        self._open_topics = open_topics
+        self._own_thread = own_thread
+        self.force_reading = ForceReading.MEASURED if params.force_is_quantised else ForceReading.NOISY
+        self._frame = SurfaceFrame(params.surface_pose)
+        self._topics: ControllerTopics | None = None
+        self._thread: threading.Thread | None = None
+        self._closing = threading.Event()
+        self._late = 0
+        self._place: Vector | None = None  # along the surface, at the last step
+        self._command: tuple[ArmCommand, int] | None = None  # and when it came
+        self._commanded: Vector = REST
+        self._moved_ns = self._sent_ns = 0
+        self._rise_from_m: float | None = None
+        self._pressing = False  # a compliance controller was commanded a force
+        self._lost = ''  # a fault that stays until the arm is recovered or connected again
+        self._restart()
+
+    def connect(self) -> None:
+        """Wait for the first pose, the first force and a controller that listens, and begin to command.
+
+        Raises
+        ------
+        DeviceError
+            If one of them does not come within `connect_timeout_s`; it names which.
+        """
+        self.close()
+        self._restart()
+        topics = self._open_topics(self._params)
+        try:
+            self._wait_for_controllers(topics)
+        except DeviceError:
+            topics.close()
+            raise
+        self._closing.clear()
+        self._topics = topics
+        if self._own_thread:
+            self._thread = threading.Thread(target=self._run, name='ros_controllers', daemon=True)
+            self._thread.start()
+
+    def close(self) -> None:
+        """Command zero velocity, and leave the topics."""
+        self._command = None
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+        topics, self._topics = self._topics, None
+        if topics is not None:
+            self._stop_pressing(topics)
+            topics.send_velocity(REST)
+            topics.close()
+
+    def state(self) -> ArmState:
+        """Return the newest state."""
+        self._connected()
+        if self._thread is not None and not self._thread.is_alive():
+            raise DeviceError('the thread that commands the arm has ended through an internal error; see the log')
+        return self._state
+
+    def command(self, command: ArmCommand) -> None:
+        """Follow a command from the next period on.
+
+        A command with a force lifts the finger first until the force sensor is zeroed, which takes proven free air.
+
+        Raises
+        ------
+        CommandRefused
+            If a number is not finite or out of its range; the arm stops.
+        DeviceError
+            If the arm is not connected.
+        """
+        self._connected()
+        self._params.check(command, self.stop)
+        self._command = (command, self._clock())
+
+    def stop(self) -> None:
+        """Command zero velocity from the next period on."""
+        self._command = None
+
+    def recover(self) -> None:
+        """Clear a fault; the force sensor is zeroed again before the next contact.
+
+        Whoever calls this has made sure that the arm may move.
+
+        Raises
+        ------
+        DeviceError
+            If the fault is still there.
+        """
+        self._connected()
+        self.stop()
+        self._lost = self._tool.misplaced = ''
+        self._tool.zero.forget()
+        self._follow.restart()
+        if fault := self._fault(self._clock()):
+            raise DeviceError(f'the arm did not recover: {fault}')
+
+    @property
+    def zeroed(self) -> bool:
+        """Whether the force sensor was zeroed since the arm was connected or recovered."""
+        return self._tool.zero.zeroed
+
+    @property
+    def counts(self) -> Mapping[str, int]:
+        """Totals of this connection, and the measured lag of the controller in ms, 0 until it is measured."""
+        self._connected()
+        lag_s = self._velocity.lag_s
+        return {
+            'zeroed': self._tool.zero.zeroings,
+            'late_periods': self._late,
+            'lag_ms': 0 if math.isnan(lag_s) else round(1e3 * lag_s),
+        }
+
+    def step(self) -> None:
+        """Take what was measured, and send what the newest command needs now."""
+        topics = self._connected()
+        now_ns = self._clock()
+        held_s = (now_ns - self._sent_ns) * 1e-9 if self._sent_ns else 0.0
+        self._sent_ns = now_ns
+        self._take(topics, now_ns)
+        if not self._lost:
+            self._lost = self._lost_controller(topics, now_ns, held_s)
+        fault = self._fault(now_ns)
+        if fault:
+            self._command = None
+            self._tool.zero.forget()
+        self._state = self._tool.state(fault)
+        if fault:
+            self._halt(topics, now_ns)
+        else:
+            self._carry_out(topics, self._due(now_ns), now_ns, held_s)
+
+    def _restart(self) -> None:
+        params = self._params
+        loop = replace(params, loop_delay_s=min(0.1, params.loop_delay_s + params.force_smoothing_s))
+        self._tool = ToolState(params)
+        self._velocity = CommandedVelocity(loop, 1.0 / params.rate_hz)
+        self._follow = FollowWatch(params.follow_m)
+        self._state = self._tool.state('')
+        self._place = self._command = self._rise_from_m = None
+        self._commanded = REST
+        self._moved_ns = self._sent_ns = 0
+        self._pressing = False
+        self._lost = ''
+
+    def _connected(self) -> ControllerTopics:
+        if self._topics is None:
+            raise DeviceError(NOT_CONNECTED)
+        return self._topics
+
+    def _wait_for_controllers(self, topics: ControllerTopics) -> None:
+        params, tool = self._params, self._tool
+        end_s = time.monotonic() + params.connect_timeout_s
+        while True:
+            self._take(topics, self._clock())
+            missing = {
+                f"no pose comes on '{params.pose_topic}'": tool.pose_ns == 0,
+                f"no force comes on '{params.wrench_topic}'": tool.force_ns == 0,
+                f"nobody listens on '{params.twist_topic}'": topics.listeners() == 0,
+            }
+            faults = [what for what, is_missing in missing.items() if is_missing]
+            if not faults:
+                self._state = tool.state('')
+                return
+            if tool.misplaced or time.monotonic() > end_s:
+                raise DeviceError(
+                    f'{tool.misplaced or "; ".join(faults)}. Check that the controllers are active, that they use '
+                    'these topics, and that ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE are those of the robot'
+                )
+            time.sleep(POLL_S)
+
+    def _take(self, topics: ControllerTopics, now_ns: int) -> None:
+        """Take over what came; the pose first, as it tells how the force is turned."""
+        pose = topics.newest_pose()
+        if pose is not None:
+            self._tool.take_pose(now_ns, pose)
+        force = topics.newest_force()
+        if force is not None and self._tool.pose_ns:
+            self._tool.take_force(now_ns, force, moving=self._commanded != REST)
+
+    def _lost_controller(self, topics: ControllerTopics, now_ns: int, held_s: float) -> str:
+        """Return in a sentence that the controller is lost, '' if it is not."""
+        topic = self._params.twist_topic
+        if topics.listeners() == 0:
+            return f"nobody listens on '{topic}' any more: the controller has ended"
+        if self._commanded == REST:
+            self._follow.restart()
+            return ''
+        late = self._follow.update(now_ns, self._tool.state('').position, self._commanded, held_s)
+        return late and f"{late}: the controller on '{topic}' is not active or holds back, or something is in the way"
+
+    def _fault(self, now_ns: int) -> str:
+        tool = self._tool
+        return self._lost or tool.misplaced or stale(self._params, now_ns, tool.pose_ns, tool.force_ns)
+
+    def _due(self, now_ns: int) -> ArmCommand | None:
+        """Return the command that holds now, None if none does."""
+        command = self._command
+        if command is None or (now_ns - command[1]) * 1e-9 > self._params.command_timeout_s:
+            return None
+        return self._lifted_first(command[0])
+
+    def _lifted_first(self, command: ArmCommand) -> ArmCommand | None:
+        """Return the command, or what comes before it as long as the force sensor is not zeroed."""
+        zero, height_m = self._tool.zero, self._state.position[2]
+        if command.force_n is None or zero.zeroed:
+            self._rise_from_m = None
+            return command
+        if zero.in_free_air:
+            return None  # at rest it is zeroed
+        if self._rise_from_m is None:
+            self._rise_from_m = height_m
+        if height_m - self._rise_from_m > MAX_RISES * self._params.zero_rise_m:
+            self._lost = UNSTEADY
+            return None
+        return ArmCommand(normal_m_s=RISE_M_S)
+
+    def _carry_out(self, topics: ControllerTopics, command: ArmCommand | None, now_ns: int, held_s: float) -> None:
+        state = self._state
+        self._note_way(state)
+        if command is not None and command.force_n is not None:
+            self._tool.zero.presume_contact()
+            self._press(topics, command)
+        else:
+            self._stop_pressing(topics)
+        velocity = self._chosen(command or STANDSTILL, state, held_s)
+        if velocity == REST and (command is None or command.force_n is None):
+            self._halt(topics, now_ns)
+        else:
+            self._send(topics, velocity, now_ns)
+
+    def _press(self, topics: ControllerTopics, command: ArmCommand) -> None:
+        if self._params.target_wrench_topic:
+            topics.send_force(self._frame.to_base((0.0, 0.0, -(command.force_n or 0.0))))
+            self._pressing = True
+
+    def _stop_pressing(self, topics: ControllerTopics) -> None:
+        if self._pressing:
+            topics.send_force(REST)
+            self._pressing = False
+
+    def _chosen(self, command: ArmCommand, state: ArmState, held_s: float) -> Vector:
+        if command.force_n is not None and self._params.target_wrench_topic:
+            command = replace(command, force_n=None, normal_m_s=0.0)
+        return self._velocity.choose(command, state, held_s)
+
+    def _note_way(self, state: ArmState) -> None:
+        if self._place is not None:
+            self._velocity.travelled(math.dist(state.position[:2], self._place[:2]))
+        self._place = state.position
+
+    def _send(self, topics: ControllerTopics, velocity: Vector, now_ns: int) -> None:
+        self._commanded, self._moved_ns = velocity, now_ns
+        in_base = self._frame.to_base(velocity)
+        if self._params.twist_frame_id == self._params.tool_frame_id:
+            x, y, z = (self._tool.rotation.T @ in_base).tolist()
+            in_base = (x, y, z)
+        topics.send_velocity(in_base)
+
+    def _halt(self, topics: ControllerTopics, now_ns: int) -> None:
+        """Command zero velocity, for a while: a controller may hold the last velocity for ever."""
+        self._commanded = REST
+        self._stop_pressing(topics)
+        if self._moved_ns and now_ns - self._moved_ns <= HALTING_NS:
+            topics.send_velocity(REST)
+
+    def _run(self) -> None:
+        topics = self._connected()
+        period_s = 1.0 / self._params.rate_hz
+        due_s = time.monotonic()
+        try:
+            while not self._closing.is_set():
+                self.step()
+                due_s += period_s
+                left_s = due_s - time.monotonic()
+                if left_s < -period_s:
+                    self._late += 1
+                    due_s = time.monotonic()
+                self._closing.wait(max(0.0, left_s))
+        finally:
+            # Also when a bug ends the loop: no arm is left moving.
+            self._stop_pressing(topics)
+            topics.send_velocity(REST)

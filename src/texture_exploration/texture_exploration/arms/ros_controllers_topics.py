@@ -1,0 +1,52 @@
+"""What an arm driven by ROS controllers exchanges with them, without ROS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from texture_exploration.arms.protocol import Vector
+
+
+@dataclass(frozen=True)
+class PoseSample:
+    """A measured pose: `position_m` in the frame `frame_id`, `rotation` as the quaternion x, y, z, w.
+
+    `stamp_ns` is the time of its header, on the clock of the sender; 0 if there is none.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    position_m: Vector
+    rotation: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class ForceSample:
+    """A measured force, N, in the frame `frame_id`; `stamp_ns` as of a pose."""
+
+    stamp_ns: int
+    frame_id: str
+    force_n: Vector
+
+
+class ControllerTopics(Protocol):
+    """The topics of the controllers; `texture_exploration.ros.controller_topics` makes them."""
+
+    def newest_pose(self) -> PoseSample | None:
+        """Return the newest pose that came since the last call, None if none did."""
+
+    def newest_force(self) -> ForceSample | None:
+        """Return the newest force that came since the last call, None if none did."""
+
+    def listeners(self) -> int:
+        """Return how many nodes listen to the commanded velocities."""
+
+    def send_velocity(self, velocity_m_s: Vector) -> None:
+        """Command a velocity in the frame `twist_frame_id`."""
+
+    def send_force(self, force_n: Vector) -> None:
+        """Command the force of the tool on its surroundings in the base frame; no effect without such a topic."""
+
+    def close(self) -> None:
+        """Wait until what was sent has arrived, at most for a fraction of a second, and leave."""

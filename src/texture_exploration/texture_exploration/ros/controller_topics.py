@@ -1,0 +1,127 @@
+"""The topics of ROS controllers, taken by whoever polls them: no executor, no callbacks, one thread.
+
+A context of its own makes the arm independent of the node that owns it: zero velocity can still be sent when that node
+is shut down. Names follow the namespace and the remappings of the process.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import rclpy
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+
+from texture_core.ros.time import to_ns
+from texture_exploration.arms.protocol import Vector
+from texture_exploration.arms.ros_controllers_params import RosControllersParams
+from texture_exploration.arms.ros_controllers_topics import ForceSample, PoseSample
+from texture_exploration.ros.twist_guard import TwistGuard
+
+NODE = 'arm_topics'
+COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # fits every subscriber
+MEASURED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # fits every publisher
+MOST = 10  # messages that are taken at once: only the newest counts
+ARRIVAL_S = 0.2
+
+
+class RosTopics:
+    """See `texture_exploration.arms.ros_controllers_topics.ControllerTopics`.
+
+    Parameters
+    ----------
+    params
+        Names of topics and frames.
+    """
+
+    def __init__(self, params: RosControllersParams) -> None:
+        self._params = params
+        self._context = Context()
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self._node = Node(
+            NODE,
+            context=self._context,
+            cli_args=['--ros-args', '-r', f'__node:={NODE}'],  # the process may rename its own node
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        node = self._node
+        self._twists = node.create_publisher(TwistStamped, params.twist_topic, COMMAND_QOS)
+        wrench_topic = params.target_wrench_topic
+        self._wrenches = node.create_publisher(WrenchStamped, wrench_topic, COMMAND_QOS) if wrench_topic else None
+        self._poses = node.create_subscription(PoseStamped, params.pose_topic, _ignore, MEASURED_QOS)
+        self._forces = node.create_subscription(WrenchStamped, params.wrench_topic, _ignore, MEASURED_QOS)
+        self._frame_id = params.twist_frame_id or params.base_frame_id
+        self._guard = TwistGuard(self._twists.topic_name, self._frame_id)
+
+    def newest_pose(self) -> PoseSample | None:
+        """Return the newest pose that came since the last call, None if none did."""
+        message = _newest(self._poses)
+        if message is None:
+            return None
+        at, turned = message.pose.position, message.pose.orientation
+        return PoseSample(
+            to_ns(message.header.stamp),
+            message.header.frame_id,
+            (at.x, at.y, at.z),
+            (turned.x, turned.y, turned.z, turned.w),
+        )
+
+    def newest_force(self) -> ForceSample | None:
+        """Return the newest force that came since the last call, None if none did."""
+        message = _newest(self._forces)
+        if message is None:
+            return None
+        force = message.wrench.force
+        return ForceSample(to_ns(message.header.stamp), message.header.frame_id, (force.x, force.y, force.z))
+
+    def listeners(self) -> int:
+        """Return how many nodes listen to the commanded velocities, and can also be reached by the guard."""
+        return min(self._twists.get_subscription_count(), self._guard.reached)
+
+    def send_velocity(self, velocity_m_s: Vector) -> None:
+        """Command a velocity."""
+        message = TwistStamped()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.frame_id = self._frame_id
+        linear = message.twist.linear
+        linear.x, linear.y, linear.z = velocity_m_s
+        self._twists.publish(message)
+
+    def send_force(self, force_n: Vector) -> None:
+        """Command a force of the tool on its surroundings in the base frame."""
+        if self._wrenches is None:
+            return
+        message = WrenchStamped()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.frame_id = self._params.base_frame_id
+        force = message.wrench.force
+        force.x, force.y, force.z = force_n
+        self._wrenches.publish(message)
+
+    def close(self) -> None:
+        """Wait until what was sent has arrived, and leave."""
+        self._twists.wait_for_all_acked(Duration(seconds=ARRIVAL_S))
+        self._guard.dismiss()
+        self._node.destroy_node()
+        rclpy.try_shutdown(context=self._context)
+
+
+def _newest(subscription: Any) -> Any:
+    """Return the newest message that waits, None if there is none."""
+    newest = None
+    with subscription.handle:
+        for _ in range(MOST):
+            taken = subscription.handle.take_message(subscription.msg_type, False)
+            if taken is None:
+                break
+            newest = taken[0]
+    return newest
+
+
+def _ignore(_message: Any) -> None:
+    """Nobody spins this node."""

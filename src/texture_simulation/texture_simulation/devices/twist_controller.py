@@ -1,0 +1,198 @@
+"""An arm behind a velocity controller: it follows late, with its own limits, and presses on an elastic surface."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.finger_state import FingerState
+from texture_core.parameters import param
+from texture_core.rotation import rotation_matrix
+
+STEP_NS = 1_000_000
+MAX_STEPS = 100  # in one go, after the machine was busy
+GRAVITY_M_S2 = 9.81
+STICTION_M_S = 5e-4  # below this speed friction grows in proportion: it has no direction at rest
+TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)  # quaternion x, y, z, w: the tool's z axis points against that of the base
+TOOL_AXES = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class TwistControllerParams:
+    """The emulated controller, its arm, its force sensor and the surface under the finger."""
+
+    lag_s: float = param(
+        0.02,
+        'Sets the time after which a commanded velocity comes into effect; a larger value makes the arm later.',
+        unit='s',
+        low=0.0,
+        high=0.2,
+    )
+    jitter_s: float = param(
+        0.002,
+        'Sets the largest random delay that is added to the lag and to the period of the measurements.',
+        unit='s',
+        low=0.0,
+        high=0.1,
+    )
+    max_speed_m_s: float = param(
+        0.25, 'Sets the highest speed of the arm; faster commands are scaled down.', unit='m/s', low=0.001, high=3.0
+    )
+    max_acceleration_m_s2: float = param(
+        10.0,
+        'Sets the highest acceleration of the arm; a larger value follows commands faster.',
+        unit='m/s²',
+        low=0.1,
+        high=150.0,
+    )
+    command_timeout_s: float = param(
+        0.1,
+        'Sets how long a command holds without a new one; 0 holds the last one for ever.',
+        unit='s',
+        low=0.0,
+        high=5.0,
+    )
+    active: bool = param(True, 'Lets the controller follow commands; false makes it listen without moving the arm.')
+    start_height_m: float = param(
+        0.01, 'Sets the height of the finger above the surface at the start.', unit='m', low=0.0, high=0.2
+    )
+    surface_x_m: float = param(0.4, 'Sets the x coordinate of the centre of the surface in the base frame.', unit='m')
+    surface_y_m: float = param(0.0, 'Sets the y coordinate of the centre of the surface in the base frame.', unit='m')
+    surface_z_m: float = param(0.1, 'Sets the z coordinate of the centre of the surface in the base frame.', unit='m')
+    surface_rx_rad: float = param(
+        0.0, 'Sets the x component of the rotation vector of the surface in the base frame.', unit='rad'
+    )
+    surface_ry_rad: float = param(
+        0.0, 'Sets the y component of the rotation vector of the surface in the base frame.', unit='rad'
+    )
+    stiffness_n_m: float = param(
+        2000.0,
+        'Sets the stiffness of finger and surface in contact; 0 removes the surface.',
+        unit='N/m',
+        low=0.0,
+        high=200000.0,
+    )
+    friction: float = param(
+        0.3, 'Sets the coefficient of Coulomb friction; a larger value drags the finger more.', low=0.0, high=3.0
+    )
+    tool_mass_kg: float = param(
+        0.2, 'Sets the mass of the tool, whose weight the force sensor shows.', unit='kg', low=0.0, high=20.0
+    )
+    force_offset_n: float = param(1.5, 'Sets the offset of the force sensor on each axis.', unit='N')
+    force_noise_n: float = param(
+        0.002, 'Sets the standard deviation of the noise of the force sensor.', unit='N', low=0.0, high=5.0
+    )
+    compliance_m_s_n: float = param(
+        0.002,
+        'Sets the speed per force error with which the arm yields to a commanded force; a larger value settles faster.',
+        unit='m/s/N',
+        low=0.0,
+        high=1.0,
+    )
+    seed: int = param(1, 'Sets the seed of noise and jitter; equal seeds give equal noise.', low=0)
+
+
+class EmulatedTwistArm:
+    """The arm: commands in, pose and force out; time goes by `advance`.
+
+    Parameters
+    ----------
+    params
+        See `TwistControllerParams`; may be replaced while it runs.
+    now_ns
+        The time.
+
+    Attributes
+    ----------
+    params : TwistControllerParams
+    position, velocity : (3,)
+        Of the fingertip in the base frame, m and m/s.
+    """
+
+    def __init__(self, params: TwistControllerParams, now_ns: int) -> None:
+        self.params = params
+        self._rng = np.random.default_rng(params.seed)
+        self._axes = rotation_matrix((params.surface_rx_rad, params.surface_ry_rad, 0.0))
+        self._origin = np.array([params.surface_x_m, params.surface_y_m, params.surface_z_m])
+        self.position: Array = self._origin + params.start_height_m * self._axes[:, 2]
+        self.velocity: Array = np.zeros(3)
+        self._coming: deque[tuple[int, Array]] = deque()
+        self._wanted: Array = np.zeros(3)
+        self._pressing: Array = np.zeros(3)
+        self._since_ns = self._now_ns = now_ns
+
+    def command(self, now_ns: int, velocity_m_s: Array) -> None:
+        """Take a velocity in the base frame, (3,), m/s; it comes into effect later."""
+        if self.params.active:
+            delay_s = self.params.lag_s + self.jitter_s()
+            self._coming.append((now_ns + round(delay_s * 1e9), velocity_m_s))
+
+    def press(self, force_n: Array) -> None:
+        """Take the force of the tool on its surroundings, (3,), N, to which the arm yields from now on; 0: none."""
+        self._pressing = force_n
+
+    def jitter_s(self) -> float:
+        """Return a random delay."""
+        return float(self._rng.uniform(0.0, self.params.jitter_s)) if self.params.jitter_s else 0.0
+
+    def advance(self, now_ns: int) -> None:
+        """Let time pass; what a busy machine has missed for too long is left out."""
+        steps = (now_ns - self._now_ns) // STEP_NS
+        if steps > MAX_STEPS:
+            self._now_ns = now_ns - MAX_STEPS * STEP_NS
+            steps = MAX_STEPS
+        for _ in range(steps):
+            self._now_ns += STEP_NS
+            self._step(STEP_NS * 1e-9)
+
+    @property
+    def force_n(self) -> Array:
+        """Force of the surface on the finger in the base frame, (3,), N: elastic, with Coulomb friction."""
+        params, normal = self.params, self._axes[:, 2]
+        depth_m = -float((self.position - self._origin) @ normal)
+        pressing_n = params.stiffness_n_m * max(0.0, depth_m)
+        along = self.velocity - (self.velocity @ normal) * normal
+        speed = math.sqrt(float(along @ along))
+        force: Array = pressing_n * normal - params.friction * pressing_n * along / max(speed, STICTION_M_S)
+        return force
+
+    def reading_n(self) -> Array:
+        """Return what the force sensor shows in the frame of the tool, (3,): with weight, offset and noise."""
+        weight = np.array([0.0, 0.0, -self.params.tool_mass_kg * GRAVITY_M_S2])
+        noise = self.params.force_noise_n * self._rng.standard_normal(3)
+        reading: Array = TOOL_AXES.T @ (self.force_n + weight) + self.params.force_offset_n + noise
+        return reading
+
+    def finger(self) -> FingerState:
+        """Return the true state of the finger in the frame of the surface."""
+        x, y, z = (self._axes.T @ (self.position - self._origin)).tolist()
+        vx, vy, vz = (self._axes.T @ self.velocity).tolist()
+        return FingerState(self._now_ns, x, y, z, vx, vy, vz, float(self.force_n @ self._axes[:, 2]))
+
+    def _step(self, dt_s: float) -> None:
+        params = self.params
+        while self._coming and self._coming[0][0] <= self._now_ns:
+            self._since_ns, self._wanted = self._coming.popleft()
+        if params.command_timeout_s and self._now_ns - self._since_ns > params.command_timeout_s * 1e9:
+            self._wanted = np.zeros(3)
+        wanted = self._wanted + self._yielding()
+        speed = math.sqrt(float(wanted @ wanted))
+        if speed > params.max_speed_m_s:
+            wanted = wanted * (params.max_speed_m_s / speed)
+        change = wanted - self.velocity
+        size, most = math.sqrt(float(change @ change)), params.max_acceleration_m_s2 * dt_s
+        self.velocity = wanted if size <= most else self.velocity + change * (most / size)
+        self.position = self.position + self.velocity * dt_s
+
+    def _yielding(self) -> Array:
+        """Return the velocity with which the arm presses as commanded, along the commanded force."""
+        size = math.sqrt(float(self._pressing @ self._pressing))
+        if size == 0.0:
+            return np.zeros(3)
+        direction = self._pressing / size
+        yielding: Array = self.params.compliance_m_s_n * (size + float(self.force_n @ direction)) * direction
+        return yielding

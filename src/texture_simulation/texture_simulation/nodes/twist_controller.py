@@ -1,0 +1,137 @@
+"""The node of an emulated arm behind a velocity controller: what is known of it are its topics."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from rclpy.node import Node
+
+from texture_core.finger_state import FingerSender
+from texture_core.parameters import param
+from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
+from texture_core.ros.parameters import declare, on_change
+from texture_core.ros.run import run
+from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
+
+
+@dataclass(frozen=True)
+class ControllerTopicParams:
+    """Names of the topics and frames, which are those of `ur_robot_driver` by default."""
+
+    twist_topic: str = param('twist_controller/twist', 'Sets the topic of the commanded velocities.')
+    target_wrench_topic: str = param('target_wrench', 'Sets the topic of the commanded force.')
+    pose_topic: str = param('tcp_pose_broadcaster/pose', 'Sets the topic of the measured pose.')
+    wrench_topic: str = param('force_torque_sensor_broadcaster/wrench', 'Sets the topic of the measured force.')
+    base_frame_id: str = param('base', 'Sets the name of the base frame; commands in other frames are ignored.')
+    tool_frame_id: str = param('tool0_controller', 'Sets the name of the frame of the measured force.')
+    rate_hz: float = param(
+        250.0,
+        'Sets the rate of pose and force; a higher rate costs more computing time.',
+        unit='Hz',
+        low=10.0,
+        high=1e3,
+    )
+    publish_pose: bool = param(True, 'Publishes the pose; false emulates a pose broadcaster that has ended.')
+    publish_wrench: bool = param(True, 'Publishes the force; false emulates a force broadcaster that has ended.')
+    finger_port: int = param(
+        0,
+        'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
+        low=0,
+        high=65535,
+    )
+
+
+class TwistControllerNode(Node):
+    """Follow TwistStamped, publish PoseStamped and WrenchStamped; all parameters but the topics may be changed."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__('twist_controller', **kwargs)
+        self._topics = declare(self, ControllerTopicParams, changeable=True)
+        self._arm = EmulatedTwistArm(declare(self, TwistControllerParams, changeable=True), time.monotonic_ns())
+        on_change(self, TwistControllerParams, partial(setattr, self._arm, 'params'))
+        on_change(self, ControllerTopicParams, partial(setattr, self, '_topics'))
+        self._lock = threading.Lock()  # of the arm
+        self._ignored = 0
+        topics = self._topics
+        self._poses = self.create_publisher(PoseStamped, topics.pose_topic, 1)
+        self._wrenches = self.create_publisher(WrenchStamped, topics.wrench_topic, 1)
+        self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
+        self.create_subscription(WrenchStamped, topics.target_wrench_topic, self._on_wrench, 1)
+        self._emulator = FingerSender(topics.finger_port)
+        self._closing = threading.Event()
+        Diagnostics(self, self._report)
+        self._thread = threading.Thread(target=self._run, name='arm', daemon=True)
+        self._thread.start()
+
+    def shutdown(self) -> None:
+        """Let time stand still."""
+        self._closing.set()
+        self._thread.join()
+        self._emulator.close()
+
+    def _on_twist(self, message: TwistStamped) -> None:
+        # As the twist controller of ur_robot_driver: a velocity in another frame is ignored.
+        if message.header.frame_id != self._topics.base_frame_id:
+            self._ignored += 1
+            return
+        linear = message.twist.linear
+        with self._lock:
+            self._arm.command(time.monotonic_ns(), np.array([linear.x, linear.y, linear.z]))
+
+    def _on_wrench(self, message: WrenchStamped) -> None:
+        force = message.wrench.force
+        with self._lock:
+            self._arm.press(np.array([force.x, force.y, force.z]))
+
+    def _run(self) -> None:
+        period_s = 1.0 / self._topics.rate_hz
+        due_s = time.monotonic()
+        while not self._closing.is_set():
+            due_s = max(due_s + period_s, time.monotonic() - period_s)
+            self._closing.wait(max(0.0, due_s + self._arm.jitter_s() - time.monotonic()))
+            self._publish()
+
+    def _publish(self) -> None:
+        with self._lock:
+            self._arm.advance(time.monotonic_ns())
+            position, reading, finger = self._arm.position, self._arm.reading_n(), self._arm.finger()
+        stamp = self.get_clock().now().to_msg()
+        if self._topics.publish_pose:
+            self._poses.publish(_pose(stamp, self._topics.base_frame_id, position.tolist()))
+        if self._topics.publish_wrench:
+            self._wrenches.publish(_wrench(stamp, self._topics.tool_frame_id, reading.tolist()))
+        self._emulator.send(finger)
+
+    def _report(self) -> DiagnosticReport:
+        numbers = {'force_n': self._arm.finger().force_n, 'ignored commands': self._ignored}
+        if not self._thread.is_alive():
+            return 'ERROR', 'the emulated arm ended; see the log and start the node again', numbers
+        return 'OK', 'the emulated arm runs', numbers
+
+
+def _pose(stamp: Any, frame_id: str, position: list[float]) -> PoseStamped:
+    message = PoseStamped()
+    message.header.stamp, message.header.frame_id = stamp, frame_id
+    place, turned = message.pose.position, message.pose.orientation
+    place.x, place.y, place.z = position
+    turned.x, turned.y, turned.z, turned.w = TOOL_DOWN
+    return message
+
+
+def _wrench(stamp: Any, frame_id: str, reading: list[float]) -> WrenchStamped:
+    message = WrenchStamped()
+    message.header.stamp, message.header.frame_id = stamp, frame_id
+    force = message.wrench.force
+    force.x, force.y, force.z = reading
+    return message
+
+
+def main() -> None:
+    """Run the node."""
+    run(TwistControllerNode)
