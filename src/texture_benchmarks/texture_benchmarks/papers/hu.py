@@ -64,12 +64,12 @@ PROTOCOL = Protocol(
                     BOTH, windows=WHOLE, learner=TWO, features={'spectrum': {'scale': 'log'}}, label=LOG, splits=FEW
                 ),
                 Method(BOTH, windows=WHOLE, learner={**TWO, 'centre': 'features'}, label=CENTRED, splits=FEW),
-                replace(OURS, splits=FEW),
+                replace(OURS, splits=2),
             ),
         ),
     ),
-    divide=drawn(2 / 3, 20),
-    split='20 random draws of 200 of the 300 places for training',
+    divide=drawn(2 / 3, 10),
+    split='10 random draws of 200 of the 300 places for training',
     anchor=Anchor(
         TASK,
         BOTH,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +13,9 @@ from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
 from texture_benchmarks.papers.method_result import MethodResult
 from texture_benchmarks.papers.paper_charts import accuracy_chart, confusions_chart
 from texture_benchmarks.papers.protocol import Finding, Method, MethodResults, Protocol, RecognitionTask, Table
+from texture_benchmarks.papers.recipe_digest import digest_of
 from texture_benchmarks.papers.trial import NONE, TunedRecipes, outcomes, searched, without_ours
 from texture_core.arrays import AnyArray
-from texture_estimation.recipe import load_recipe
 from texture_simulation.scene import load_scene
 
 TUNED = '-tuned'
@@ -44,7 +42,7 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
         split=f'{protocol.split}{SEARCHED if tuned else ""}',
         numbers={
             'seed': experiment.seed,
-            'recipes': digests(method.recipe for task in protocol.tasks for method in task.methods),
+            'recipes': {m.recipe: digest_of(m.recipe) for task in protocol.tasks for m in task.methods},
             'difficulty': _difficulty(protocol, found),
             'tasks': {task.name: {m.name: _figures(m, found[task.name, m.name]) for m in task.methods}
                       for task in protocol.tasks},
@@ -54,17 +52,6 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
         charts=_charts(protocol, found, name, experiment.out),
         lines=(*_lines(protocol, found, checked), *_tuning_lines(tuned, experiment.out)),
     )  # fmt: skip
-
-
-def digests(recipes: Iterable[str]) -> dict[str, str]:
-    """Return what tells the present definition of each recipe from another one, in eight letters."""
-    return {name: digest(load_recipe(name).as_mapping()) for name in sorted(set(recipes))}
-
-
-def digest(definition: Mapping[str, Any]) -> str:
-    """Return what tells a definition from another one, in eight letters; words that describe it do not count."""
-    counted = {name: value for name, value in definition.items() if name != 'description'}
-    return hashlib.sha256(json.dumps(counted, sort_keys=True).encode()).hexdigest()[:8]
 
 
 def _slides(outcome: MethodResult) -> int:

@@ -12,7 +12,8 @@ from scipy.stats import norm
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
 from texture_benchmarks.papers.interval import mean
 from texture_benchmarks.papers.protocol import Finding
-from texture_benchmarks.papers.report import digest, finding_as_json
+from texture_benchmarks.papers.recipe_digest import digest_of
+from texture_benchmarks.papers.report import finding_as_json
 from texture_benchmarks.papers.roughness_answers import Answers
 from texture_benchmarks.papers.roughness_charts import Series, coverage_chart, grades_chart
 from texture_benchmarks.papers.roughness_report import lines
@@ -79,7 +80,7 @@ def run(experiment: Experiment) -> ExperimentResult:
     }
     numbers: dict[str, Any] = {
         'seed': experiment.seed,
-        'recipes': {recipe: _digest(recipe) for recipe in RECIPES.values()},
+        'recipes': {recipe: digest_of(recipe) for recipe in RECIPES.values()},
         'paper': {name: dict(zip(COLUMNS, row, strict=True)) for name, row in PAPER.items()},
         'one_person': ONE_PERSON,
         'targets': TARGETS,
@@ -130,17 +131,13 @@ def _table_2(setup: Setup, recipes: Mapping[str, RoughnessRecipe]) -> Experiment
         split=f"by texture, the paper's: {len(train)} for training, {len(test)} for test",
         numbers={
             'seed': setup.seed,
-            'recipes': {recipe: _digest(recipe) for name, recipe in RECIPES.items() if name in recipes},
+            'recipes': {recipe: digest_of(recipe) for name, recipe in RECIPES.items() if name in recipes},
             'regressors': {
                 name: {part: one.figures() for part, one in parts.items()} for name, parts in answers.items()
             },
             'findings': [finding_as_json(finding) for finding in findings(answers)],
         },
     )
-
-
-def _digest(recipe: str) -> str:
-    return digest(load_roughness_recipe(recipe).as_mapping())
 
 
 def findings(answers: Mapping[str, Mapping[str, Answers]]) -> list[Finding]:

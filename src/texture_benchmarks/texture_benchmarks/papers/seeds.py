@@ -14,18 +14,20 @@ from scipy.stats import t
 
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult, Run
 from texture_benchmarks.papers.interval import Interval
-from texture_benchmarks.papers.protocol import FEW
+from texture_benchmarks.papers.recipe_digest import digest_of
 from texture_benchmarks.papers.report import VERDICTS
 from texture_core.errors import InvalidParameter
 
 LEVEL = 0.95
+SPLITS = 2  # of a further seed: what differs between seeds are the slides
 
 
 def over_seeds(run: Run, name: str, experiment: Experiment, count: int) -> ExperimentResult:
     """Run an experiment with so many seeds, and add means and intervals over them to the result of the first.
 
-    The first seed is run as the experiment asks. Each further one is run on at most five splits, without our own
-    recipes, and kept in the folder `seeds`; one that is there already, with the same recipes, is not run again.
+    The first seed is run as the experiment asks, and written. Each further one is run on at most two splits, without
+    our own recipes, and kept in the folder `seeds`. What is there already, with the recipes as they are now, is not run
+    again.
 
     Raises
     ------
@@ -34,22 +36,39 @@ def over_seeds(run: Run, name: str, experiment: Experiment, count: int) -> Exper
     """
     if count < 2:
         raise InvalidParameter(f'{count} seeds were asked for; two or more are needed for an interval over seeds')
-    first = run(experiment)
-    further = replace(experiment, splits=FEW, papers_only=True, tune=False)
-    others = [
-        _kept(run, name, replace(further, seed=experiment.seed + number), first.numbers['recipes'])
-        for number in range(1, count)
-    ]
+    first = _first(run, name, experiment)
+    further = replace(experiment, splits=SPLITS, papers_only=True, tune=False)
+    others = [_kept(run, name, replace(further, seed=experiment.seed + number)) for number in range(1, count)]
     numbers = with_seeds(first.numbers, others)
     return replace(first, numbers=numbers, lines=(*first.lines, *lines(numbers)))
 
 
-def _kept(run: Run, name: str, experiment: Experiment, recipes: Mapping[str, str]) -> Mapping[str, Any]:
+def _first(run: Run, name: str, experiment: Experiment) -> ExperimentResult:
+    """Return the result of the first seed, as it was written if it was."""
+    path = experiment.out / f'{name}.json'
+    if path.is_file() and not experiment.quick and not experiment.tune:
+        content = json.loads(path.read_text(encoding='utf-8'))
+        numbers = content['numbers']
+        if numbers.get('seed') == experiment.seed and is_current(numbers):
+            texts = {key: content[key] for key in ('name', 'measured', 'data', 'split')}
+            return ExperimentResult(**texts, numbers=numbers, charts=tuple(map(Path, content['charts'])))
+    result = run(experiment)
+    result.write(experiment.out)
+    return result
+
+
+def is_current(numbers: Mapping[str, Any]) -> bool:
+    """Return whether numbers are those of the recipes as they are defined now."""
+    recipes = numbers.get('recipes', {})
+    return bool(recipes) and all(digest_of(recipe) == stored for recipe, stored in recipes.items())
+
+
+def _kept(run: Run, name: str, experiment: Experiment) -> Mapping[str, Any]:
     """Return the numbers of one further seed, from the folder if they are there."""
     path = experiment.out / 'seeds' / f'{name}-{experiment.seed}{"-reduced" if experiment.quick else ""}.json'
     if path.is_file():
         numbers: Mapping[str, Any] = json.loads(path.read_text(encoding='utf-8'))
-        if all(recipes.get(recipe) == digest for recipe, digest in numbers['recipes'].items()):
+        if is_current(numbers):
             return numbers
     with tempfile.TemporaryDirectory() as folder:
         numbers = run(replace(experiment, out=Path(folder))).numbers
