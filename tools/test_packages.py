@@ -21,6 +21,7 @@ KEYS = {
     'aiohttp': 'python3-aiohttp',
     'argcomplete': 'python3-argcomplete',
     'apsw': 'python3-apsw',
+    'h5py': 'python3-h5py',
     'hypothesis': 'python3-hypothesis',
     'joblib': 'python3-joblib',
     'lz4': 'python3-lz4',
@@ -34,15 +35,15 @@ KEYS = {
     'yaml': 'python3-yaml',
 }
 # rosdep knows no key for these; docker/requirements.in and tools/requirements.in bring them.
-KEYLESS = {'cobs', 'distributed', 'nltk', 'playwright', 'pymoo', 'pywt', 'skops', 'threadpoolctl'}
+KEYLESS = {'cobs', 'distributed', 'nltk', 'playwright', 'pyarrow', 'pymoo', 'pywt', 'skops', 'threadpoolctl'}
 # What comes with Python or another package, and the libraries of robots that are chosen by name at run time.
 OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_receive'}
 # What some modules of a package use and its manifest leaves out, so that colcon builds the rest without it: to record
 # and to read bags is possible with the messages, the core, the drivers and texture_recordings alone.
 OPTIONAL = {
     'texture_recordings': {
-        'python3-scipy': {'importers.ntp21'},
-        'texture_features': {'commands.segment', 'segment', 'slide_dataset', 'slide_samples'},
+        'python3-scipy': {'importers.ntp21', 'tables.readers.wav_file'},
+        'texture_features': {'commands.segment', 'segment', 'slide_dataset', 'slide_samples', 'tables.borders'},
     }
 }
 # What launch files need, which no module imports.
@@ -83,7 +84,7 @@ LAYERS: Mapping[str, Layer] = {
         of('msgs', 'core', 'features'),
         tests=of('drivers'),
         never=LEARNING | DRAWING | SCIPY,
-        late={'texture_recordings.importers.ntp21': SCIPY},
+        late={'texture_recordings.importers.ntp21': SCIPY, 'texture_recordings.tables.readers.wav_file': SCIPY},
     ),
     'texture_simulation': Layer(of('msgs', 'core', 'drivers', 'recordings'), never=LEARNING | DRAWING),
     'texture_exploration': Layer(of('msgs', 'core'), tests=of('features', 'simulation'), never=LEARNING | DRAWING),

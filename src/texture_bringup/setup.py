@@ -37,6 +37,11 @@ def commands() -> list[str]:
     return [f'{module.rstrip("_")} = {NAME}.commands.{module}' for module in modules('commands')]
 
 
+def extras() -> dict[str, list[str]]:
+    """Return the libraries of each extra: <export><extra name="hdf5">h5py</extra></export> in package.xml."""
+    return {'test': ['pytest'], **{item.get('name'): item.text.split() for item in PACKAGE.iter('extra')}}
+
+
 def on_path() -> list[str]:
     """Return the files of bin/, which are installed to where the shell finds them."""
     return sorted(str(path.relative_to(HERE)) for path in HERE.glob('bin/*'))
@@ -59,7 +64,7 @@ setup(
         ('bin', on_path()),
     ],
     install_requires=['setuptools'],
-    extras_require={'test': ['pytest']},
+    extras_require=extras(),
     zip_safe=False,
     entry_points={'console_scripts': executables(), 'texture.commands': commands()},
     options={'develop': {'script_dir': f'$base/lib/{NAME}'}, 'install': {'install_scripts': f'$base/lib/{NAME}'}},

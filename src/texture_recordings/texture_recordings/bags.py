@@ -158,12 +158,32 @@ def read_bag(
         yield short_name(message.topic), message.log_ns, value
 
 
+def read_foreign(path: str | Path, chosen: Callable[[Connection], bool]) -> Iterator[RawMessage]:
+    """Yield messages of a bag that the suite did not record, undecoded, in the order of their log times.
+
+    Parameters
+    ----------
+    path
+        The bag.
+    chosen
+        Says of a connection whether its messages are wanted.
+
+    Raises
+    ------
+    InvalidData
+        If there is no bag or it is damaged.
+    """
+    return _read(Path(path), chosen, None, None, None, foreign=True)
+
+
 def _read(
     path: Path,
     chosen: Callable[[Connection], bool],
     namespace: str | None,
     start_ns: int | None,
     stop_ns: int | None,
+    *,
+    foreign: bool = False,
 ) -> Iterator[RawMessage]:
     if not is_bag(path):
         raise InvalidData(_no_bag(path))
@@ -177,7 +197,8 @@ def _read(
             for storage in getattr(reader.storage, 'storages', [reader.storage]):
                 if hasattr(storage, 'chunks'):
                     check_index(storage)
-            connections = [c for c in _of_namespace(path, reader.connections, namespace) if chosen(c)]
+            own = reader.connections if foreign else _of_namespace(path, reader.connections, namespace)
+            connections = [c for c in own if chosen(c)]
             if not connections or not reader.message_count:
                 return
             missing = sum(connection.msgcount for connection in connections)

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from texture_core.catalogue import find
 from texture_core.command_options import add_channels, add_seed, add_slides
+from texture_core.errors import InvalidParameter
 from texture_recordings.importers.catalogue import IMPORTS
+from texture_recordings.tables.import_tables import import_tables
+from texture_recordings.tables.mapping import load_mapping
+from texture_recordings.tables.readers.catalogue import MAPPED
+
+USAGE = 'texture import DATA_SET SOURCE OUT, or texture import {table,bag} MAPPING SOURCE OUT'
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
-    parser.add_argument('data_set', help=f'one of {", ".join(IMPORTS)}')
-    parser.add_argument('source', help='folder that holds the recordings')
-    parser.add_argument('out', help='folder for the bags')
+    parser.usage = f'{USAGE} [options]'
+    parser.add_argument('data_set', help=f'one of {", ".join(IMPORTS)}; or {" or ".join(MAPPED)}, with a mapping')
+    parser.add_argument(
+        'places', nargs='+', metavar='PLACE', help='the mapping file, if there is one; the source; the folder for bags'
+    )
     parser.add_argument('--materials', nargs='+', default=(), metavar='NAME', help='only these; all if not given')
     add_slides(parser)
     add_channels(parser)
@@ -22,8 +31,23 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Import, and name the bags."""
-    importer = find(IMPORTS, options.data_set, 'data set')
-    bags = importer(options.source, options.out, options.slides, options.materials, channels=options.channels or 'all')
-    for bag in bags:
+    mapped = options.data_set in MAPPED
+    if len(options.places) != 2 + mapped:
+        raise InvalidParameter(f'{len(options.places)} places were given after {options.data_set}; write {USAGE}')
+    for bag in _import_mapped(options) if mapped else _import_known(options):
         print(bag)
     return 0
+
+
+def _import_known(options: argparse.Namespace) -> list[Path]:
+    importer = find(IMPORTS, options.data_set, 'data set')
+    source, out = options.places
+    return importer(source, out, options.slides, options.materials, channels=options.channels or 'all')
+
+
+def _import_mapped(options: argparse.Namespace) -> list[Path]:
+    mapping, source, out = options.places
+    report = import_tables(load_mapping(mapping), source, out, MAPPED[options.data_set])
+    for line in report.lines():
+        print(line)
+    return report.bags

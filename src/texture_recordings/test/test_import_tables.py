@@ -1,0 +1,202 @@
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_tables import MAPPING, RATE_HZ, STROKE_ROWS, recordings, write_csv
+
+from texture_core.errors import InvalidData, InvalidParameter, TextureError
+from texture_recordings.slide_dataset import SlideDataset
+from texture_recordings.tables.import_tables import import_tables
+from texture_recordings.tables.mapping import TableMapping, load_mapping, mapping_from
+from texture_recordings.tables.report import ImportReport
+
+FIRST_STROKE = 40  # row of the first stroke, after rest
+
+
+@pytest.fixture
+def mapping(tmp_path: Path) -> TableMapping:
+    return mapping_of(tmp_path)
+
+
+def mapping_of(folder: Path, *changes: tuple[str, str]) -> TableMapping:
+    text = MAPPING
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / 'mapping.yaml').write_text(text)
+    return load_mapping(folder / 'mapping.yaml')
+
+
+def run(folder: Path, mapping: TableMapping, broken: dict[int, str] | None = None) -> ImportReport:
+    return import_tables(mapping, write_csv(folder / 'in', recordings(), broken), folder / 'out')
+
+
+def test_a_csv_of_others_becomes_labelled_slides_with_their_conditions(tmp_path: Path, mapping: TableMapping) -> None:
+    report = run(tmp_path, mapping)
+    dataset = SlideDataset.from_bags([tmp_path / 'out'])
+    assert report.slides == {'linen': 6, 'oak board': 6, 'cork_thick': 6}
+    assert sorted(path.name for path in report.bags) == ['2031-05-01', '2031-05-02']
+    assert len(dataset) == 18
+    assert set(dataset.condition('session')) == {'2031-05-01', '2031-05-02'}
+    np.testing.assert_allclose([slide.speed_m_s for slide in dataset], 0.02)
+    first_day = dataset.select(where=lambda slide: slide.session == '2031-05-01')
+    np.testing.assert_allclose([slide.force_n for slide in first_day], 150 * 9.80665e-3, rtol=0.01)
+
+
+def test_samples_are_those_of_the_file_scaled_and_in_their_order(tmp_path: Path, mapping: TableMapping) -> None:
+    run(tmp_path, mapping)
+    dataset = SlideDataset.from_bags([tmp_path / 'out']).select(labels=['linen'])
+    given = [
+        one.stroke(number)[:, :3] * 1e-3 for one in recordings() if one.material == 'linen' for number in (1, 2, 3)
+    ]
+    read, _ = dataset.to_numpy()
+    assert [samples.shape for samples in read] == [(STROKE_ROWS, 3)] * 6
+    for one, other in zip(given, read, strict=True):
+        np.testing.assert_allclose(other, one, atol=1e-6)
+    batch = dataset[0].signals['signal'][0]
+    assert (batch.channels, batch.units, batch.sensor) == (('x', 'y', 'z'), ('g',) * 3, 'accelerometer')
+    assert batch.sampling_rate_hz == pytest.approx(RATE_HZ, rel=0.005)
+
+
+def test_the_jitter_is_measured(tmp_path: Path, mapping: TableMapping) -> None:
+    stream = run(tmp_path, mapping).streams['signal']
+    # The difference of two uniform errors of ±1.5 ms: 1.5·√(2/3) ms rms, 3 ms at most.
+    assert stream.jitter_s == pytest.approx(1.22e-3, rel=0.1)
+    assert 2e-3 < stream.jitter_max_s <= 3.1e-3
+    assert stream.lost == stream.gaps == stream.disordered == 0
+
+
+def test_malformed_rows_are_counted_and_named_by_file_row_and_column(tmp_path: Path, mapping: TableMapping) -> None:
+    broken = {
+        FIRST_STROKE + 10: '5000500.00;stroke 1;oops;1.0;2.0;150.0',
+        FIRST_STROKE + 20: 'a line from the logger',
+        FIRST_STROKE + 30: '5000700.00;stroke 1;1.0;1.0;2.0;nan',
+    }
+    report = run(tmp_path, mapping, broken)
+    assert report.malformed_rows == 3 * 6
+    # Two lines stand above the first row, and lines count from 1.
+    assert report.examples[:3] == [
+        "'2031-05-01 cork_thick v20.csv', row 53, column 'acc_x': 'oops' is no finite number",
+        "'2031-05-01 cork_thick v20.csv', row 63, column 'all': 1 cells, 6 are needed",
+        "'2031-05-01 cork_thick v20.csv', row 73, column 'grip': 'nan' is no finite number",
+    ]
+    assert sum(report.slides.values()) == 18  # a malformed row is no border
+    samples, _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()
+    assert np.isnan(samples[0]).any(axis=1).nonzero()[0].tolist() == [10, 20]
+
+
+def test_short_holes_are_interpolated_if_wanted(tmp_path: Path) -> None:
+    mapping = mapping_of(tmp_path, ('unit: g\n', 'unit: g\n    repair_s: 0.02\n'))
+    report = run(
+        tmp_path, mapping, {FIRST_STROKE + 10: 'x;stroke 1;1;1;2;150', FIRST_STROKE + 11: 'x;stroke 1;x;1;2;150'}
+    )
+    assert report.streams['signal'].repaired == 1 * 6  # an unreadable time alone makes no sample bad
+    [samples, *_], _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()
+    assert samples[11, 0] == pytest.approx((samples[10, 0] + samples[12, 0]) / 2, abs=1e-6)
+
+
+def test_a_gap_in_time_is_a_jump_of_the_index_and_counted(tmp_path: Path, mapping: TableMapping) -> None:
+    recorded = recordings(files=1, jitter_ms=0.5)
+    for one in recorded:
+        one.time_ms[FIRST_STROKE + 100 :] += 70.0  # seven samples are missing
+    report = import_tables(mapping, write_csv(tmp_path / 'in', recorded), tmp_path / 'out')
+    assert (report.streams['signal'].gaps, report.streams['signal'].lost) == (3, 21)
+    batches = SlideDataset.from_bags([tmp_path / 'out'])[0].signals['signal']
+    jumps = [b.first_sample - a.next_sample for a, b in pairwise(batches)]
+    assert sorted(jumps)[-2:] == [0, 7]
+
+
+def test_times_that_go_back_within_a_slide_are_left_out_and_counted(tmp_path: Path, mapping: TableMapping) -> None:
+    recorded = recordings(files=1, jitter_ms=0.0)
+    recorded[0].time_ms[FIRST_STROKE + 50] -= 500.0
+    report = import_tables(mapping, write_csv(tmp_path / 'in', recorded), tmp_path / 'out')
+    assert report.streams['signal'].disordered == 1
+
+
+def test_interpolation_believes_the_times(tmp_path: Path) -> None:
+    mapping = mapping_of(
+        tmp_path,
+        ('{column: t, unit: ms}', '{column: t, unit: ms, spacing: interpolated}'),
+        ('unit: g\n', 'unit: g\n    rate_hz: 100\n'),
+    )
+    recorded = recordings(files=1, jitter_ms=3.0)
+    for one in recorded:  # a ramp by the times as stamped
+        one.channels[:, 0] = one.time_ms - 5e6
+    import_tables(mapping, write_csv(tmp_path / 'in', recorded), tmp_path / 'out')
+    samples, _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy()
+    np.testing.assert_allclose(np.diff(samples[0][:, 0]), 0.01, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'sentence'),
+    [
+        ("['acc_*']", '[acc_x, acc_w]', r"v20.csv': no column 'acc_w'; did you mean 'acc_[xyz]'\?"),
+        ('{column: t, unit: ms}', '{column: time, unit: ms}', "no column 'time'"),
+        ('{column: t, unit: ms}', '{column: t, unit: s}\n    rate_hz: 100', '0.1 Hz by its times, 100 Hz are'),
+        ("['acc_*']", '[phase]', r"910 malformed rows of 910, first row 3, column 'phase': 'rest' is no"),
+        ('[stroke 1, stroke 2, stroke 3]', '[stroke]', "column 'phase' has none of the values stroke; it has rest"),
+        ('{column: material}', '{column: materiel}', "no column 'materiel'; did you mean 'material'"),
+        ('.csv', '.dat', "has the form '{day} {material} v{speed}.dat'"),
+        ('speed: {column: speed, unit: mm/s}', 'speed: {column: day}', "'day' is '2031-05-01' in its name"),
+    ],
+)  # fmt: skip
+def test_a_mapping_that_does_not_fit_is_refused_with_the_place(
+    tmp_path: Path, old: str, new: str, sentence: str
+) -> None:
+    with pytest.raises(TextureError, match=sentence):
+        run(tmp_path, mapping_of(tmp_path, (old, new)))
+
+
+def test_a_label_that_changes_within_a_slide_is_refused_with_its_row(tmp_path: Path) -> None:
+    mapping = mapping_of(
+        tmp_path, ('label: {column: material}', 'label: {column: phase}'),
+        ('slides: {by: column, column: phase, values: [stroke 1, stroke 2, stroke 3]}', 'slides: {by: file}'),
+    )  # fmt: skip
+    with pytest.raises(InvalidData, match=r"row 43, column 'phase': the label changes from 'rest' to 'stroke 1'"):
+        run(tmp_path, mapping)
+
+
+@pytest.mark.parametrize(
+    ('content', 'sentence'),
+    [
+        ({}, 'the streams are none; name signal or signal_static'),
+        ({'streams': {'fast': {'columns': ['a']}}}, 'the streams are fast'),
+        ({'streams': {'signal': {'columns': []}}}, "the stream 'signal' has no columns"),
+        ({'streams': {'signal': {'columns': ['a']}}}, 'the label has not one origin'),
+        ({'streams': {'signal': {'colums': ['a']}}}, "no parameter 'colums'; did you mean 'columns'"),
+        ({'streams': {'signal': {'columns': 'a'}}}, "'columns' is 'a'; a list is needed"),
+        (
+            {'streams': {'signal': {'columns': ['a'], 'time': {'unit': 'h'}}}},
+            'time: parameter .unit. is .h.; allowed is',
+        ),
+        ({'slides': {'by': 'label'}}, 'mapping, slides: .* allowed is one of file, column, pause, time, detection'),
+        ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
+        ({'files': '{a}{b}.csv'}, 'fields without text between'),
+        ([], 'a mapping of parameter names to values is needed'),
+    ],
+)
+def test_a_mapping_that_makes_no_sense_is_refused_with_a_sentence(content: object, sentence: str) -> None:
+    with pytest.raises(InvalidParameter, match=sentence):
+        mapping_from(content)
+
+
+def test_a_column_in_braces_and_whole_numbers_are_names() -> None:
+    mapping = mapping_from({'streams': {'signal': {'columns': [0, 1, '3-5']}}, 'label': {'value': 7}})
+    assert mapping.streams['signal'].columns == ['0', '1', '3-5']
+    assert mapping.label.value == '7'
+
+
+def test_nothing_is_overwritten(tmp_path: Path, mapping: TableMapping) -> None:
+    run(tmp_path, mapping)
+    with pytest.raises(InvalidData, match='a bag is never overwritten'):
+        run(tmp_path, mapping)
+
+
+def test_an_import_that_fails_leaves_no_half_of_it(tmp_path: Path, mapping: TableMapping) -> None:
+    recorded = recordings()
+    folder = write_csv(tmp_path / 'in', recorded)
+    (folder / f'{recorded[-1].name}.csv').write_text('t;phase;acc_x\n1;rest;2\n')
+    with pytest.raises(InvalidData, match=r"no column 'acc_y'|no column 'grip'"):
+        import_tables(mapping, folder, tmp_path / 'out')
+    assert list((tmp_path / 'out').iterdir()) == []

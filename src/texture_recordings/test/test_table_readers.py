@@ -1,0 +1,230 @@
+"""Every reader of the catalogue passes the same checks by being listed."""
+
+import struct
+import sys
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
+import pytest
+import scipy.io
+from scipy.io import wavfile
+
+from texture_core.errors import InvalidData
+from texture_recordings.tables.mapping import TableMapping, mapping_from
+from texture_recordings.tables.name_template import NameTemplate
+from texture_recordings.tables.readers.catalogue import READERS
+from texture_recordings.tables.table import Table
+
+X = np.round(np.sin(np.arange(60.0)) * 0.5, 4)
+Y = np.round(np.cos(np.arange(60.0)) * 0.5, 4)
+ARRAYS = {'x': X, 'y': Y}
+
+
+def mapping(**content: object) -> TableMapping:
+    return mapping_from({'streams': {'signal': {'columns': ['x']}}, 'label': {'value': 'cork'}, **content})
+
+
+def write_csv(path: Path) -> None:
+    rows = '\n'.join(f'{x}\t{y}' for x, y in zip(X, Y, strict=True))
+    path.write_text(f'x\ty\n{rows}\n')
+
+
+def write_hdf5(path: Path) -> None:
+    with h5py.File(path, 'w') as file:
+        for name, array in ARRAYS.items():
+            file.create_dataset(name, data=array, compression='gzip')
+
+
+# How a file of each kind is made that holds x and y as its first two columns.
+WRITERS: dict[str, Callable[[Path], object]] = {
+    '.csv': write_csv,
+    '.tsv': write_csv,
+    '.txt': write_csv,
+    '.npz': lambda path: np.savez_compressed(path, **ARRAYS),
+    '.npy': lambda path: np.save(path, np.stack([X, Y], axis=1)),
+    '.mat': lambda path: scipy.io.savemat(path, ARRAYS, do_compression=True),
+    '.wav': lambda path: wavfile.write(path, 1000, np.stack([X, Y], axis=1)),
+    '.h5': write_hdf5,
+    '.hdf5': write_hdf5,
+    '.parquet': lambda path: pa.parquet.write_table(pa.table(ARRAYS), path),
+}
+
+
+def tables(path: Path, chosen: TableMapping | None = None) -> list[Table]:
+    return list(READERS[path.suffix](path, path.name, chosen or mapping()))
+
+
+def made(folder: Path, suffix: str) -> Path:
+    path = folder / f'recording{suffix}'
+    WRITERS[suffix](path)
+    return path
+
+
+each = pytest.mark.parametrize('suffix', READERS)
+
+
+@each
+def test_columns_are_read_as_they_were_written(tmp_path: Path, suffix: str) -> None:
+    reader = READERS[suffix](made(tmp_path, suffix), 'a', mapping())
+    table = next(iter(reader))
+    x, y = table.names[:2]
+    read = table.read([x, y], [x])
+    np.testing.assert_allclose(read.numbers[x], X, atol=1e-6)
+    np.testing.assert_allclose(read.numbers[y], Y, atol=1e-6)
+    assert read.texts[x].shape == X.shape
+    assert not read.malformed
+
+
+@each
+def test_a_file_that_is_something_else_is_refused_with_a_sentence_that_names_it(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f'other{suffix}'
+    path.write_bytes(b'')
+    with pytest.raises(InvalidData, match=f"'other{suffix}'"):
+        tables(path)
+    (tmp_path / f'folder{suffix}').mkdir()
+    with pytest.raises(InvalidData, match=f"'folder{suffix}'"):
+        tables(tmp_path / f'folder{suffix}')
+
+
+@each
+def test_a_damaged_file_is_read_or_refused(tmp_path: Path, suffix: str) -> None:
+    content = made(tmp_path, suffix).read_bytes()
+    rng = np.random.default_rng(0)
+    path = tmp_path / f'damaged{suffix}'
+    for _ in range(60):
+        data = bytearray(content[: int(rng.integers(1, len(content)))] if rng.random() < 0.3 else content)
+        for place in rng.integers(0, len(data), rng.integers(1, 6)).tolist():
+            data[place] = int(rng.integers(256))
+        path.write_bytes(data)
+        try:
+            for table in READERS[suffix](path, path.name, mapping()):
+                table.read(list(table.names), list(table.names))
+        except InvalidData as error:
+            assert path.name in str(error)
+
+
+@each
+def test_a_column_that_is_missing_is_refused_with_the_nearest(tmp_path: Path, suffix: str) -> None:
+    table = next(iter(READERS[suffix](made(tmp_path, suffix), 'a', mapping())))
+    with pytest.raises(InvalidData, match="'a': no column 'wrong'"):
+        table.chosen(['wrong'])
+    assert table.chosen(['*']) == list(table.names)
+
+
+@pytest.mark.parametrize(('suffix', 'name'), [('.h5', 'h5py'), ('.parquet', 'pyarrow.parquet')])
+def test_a_missing_library_is_told_in_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str, name: str
+) -> None:
+    path = made(tmp_path, suffix)
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(InvalidData, match=f"need the library '{name.split('.', maxsplit=1)[0]}"):
+        tables(path)
+
+
+def test_objects_in_arrays_are_refused_and_nothing_is_run(tmp_path: Path) -> None:
+    np.save(tmp_path / 'a.npy', np.array([{'a': 1}], dtype=object), allow_pickle=True)
+    np.savez(tmp_path / 'a.npz', x=np.array([{'a': 1}], dtype=object))
+    for name in ('a.npy', 'a.npz'):
+        with pytest.raises(InvalidData, match='Python objects, which would run code'):
+            tables(tmp_path / name)
+
+
+def test_a_matlab_file_that_claims_huge_dimensions_is_refused(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / 'a.mat', {'x': X})
+    content = bytearray((tmp_path / 'a.mat').read_bytes())
+    at = content.index(struct.pack('<ii', 1, 60))
+    content[at : at + 8] = struct.pack('<ii', 2**30, 2**30)
+    (tmp_path / 'a.mat').write_bytes(content)
+    with pytest.raises(InvalidData, match="array 'x' of shape"):
+        tables(tmp_path / 'a.mat')
+
+
+def test_a_matlab_file_that_unpacks_without_end_is_refused(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / 'a.mat', {'x': X})
+    head = (tmp_path / 'a.mat').read_bytes()[:128]
+    packed = zlib.compress(bytes(100_000_000))
+    (tmp_path / 'a.mat').write_bytes(head + struct.pack('<II', 15, len(packed)) + packed)
+    with pytest.raises(InvalidData, match='unpacks to more than'):
+        tables(tmp_path / 'a.mat')
+
+
+def test_structs_of_matlab_are_folders_and_row_vectors_are_columns(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / 'a.mat', {'run': {'acc': np.stack([X, Y], axis=1), 't': X[None], 'speed': 20.0}})
+    [table] = tables(tmp_path / 'a.mat', mapping(tables='run'))
+    assert list(table.names) == ['acc.0', 'acc.1', 't']
+    assert table.fields['speed'] == '20.0'
+
+
+def test_arrays_of_a_form_are_a_table_each_with_what_their_names_hold(tmp_path: Path) -> None:
+    arrays = {f'{name}/speed{speed}': np.stack([X, Y], axis=1) for name in ('cork', 'felt') for speed in (20, 40)}
+    np.savez(tmp_path / 'a.npz', **arrays, notes=np.zeros(3))
+    found = tables(tmp_path / 'a.npz', mapping(tables='{material}/speed{speed}'))
+    assert [table.fields for table in found][1] == {'material': 'cork', 'speed': '40'}
+    assert len(found) == 4
+    with pytest.raises(InvalidData, match=r"no array of the form 'run\{n\}'; it has cork"):
+        tables(tmp_path / 'a.npz', mapping(tables='run{n}'))
+
+
+def test_trials_of_a_three_dimensional_array_follow_each_other(tmp_path: Path) -> None:
+    samples = np.arange(4 * 5 * 2.0).reshape(4, 5, 2)
+    np.savez(tmp_path / 'a.npz', X=samples, y=np.array([0, 1, 1, 0]))
+    [table] = tables(tmp_path / 'a.npz')
+    read = table.read(['X.0', 'X.1'], ['y', 'trial'])
+    np.testing.assert_array_equal(read.numbers['X.1'], samples[..., 1].ravel())
+    assert read.texts['y'].tolist() == ['0'] * 5 + ['1'] * 10 + ['0'] * 5
+    assert read.texts['trial'].tolist()[4:6] == ['0', '1']
+
+
+def test_links_out_of_an_hdf5_file_are_not_followed(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / 'secret.h5', 'w') as other:
+        other['x'] = X
+    with h5py.File(tmp_path / 'a.h5', 'w') as file:
+        file['y'] = Y
+        file['x'] = h5py.ExternalLink('secret.h5', '/x')
+    [table] = tables(tmp_path / 'a.h5')
+    assert list(table.names) == ['y']
+
+
+@pytest.mark.parametrize(
+    ('text', 'form'),
+    [
+        ('a;b\n1,5;2\n3,25;4\n', {'decimal': ','}),
+        ('// note\n1.5 2\n3.25 4\n', {'comment': '//', 'header': False}),
+        ('units\na|b\n"1.5"|2\n3.25|4\n', {'skip_rows': 1}),
+        ('\ufeffa,b\r\n1.5,2\r\n\r\n3.25,4\r\n', {}),
+    ],
+)
+def test_text_files_of_several_kinds_are_read(tmp_path: Path, text: str, form: dict[str, object]) -> None:
+    (tmp_path / 'a.csv').write_text(text, newline='')
+    [table] = tables(tmp_path / 'a.csv', mapping(format=form))
+    assert list(table.names) == (['0', '1'] if form.get('header') is False else ['a', 'b'])
+    assert table.read([table.names[0]], []).numbers[table.names[0]].tolist() == [1.5, 3.25]
+
+
+def test_a_quote_that_is_never_closed_spoils_its_own_row_alone(tmp_path: Path) -> None:
+    (tmp_path / 'a.csv').write_text('a,b\n1,2\n"3,4\n5,6\n')
+    [table] = tables(tmp_path / 'a.csv')
+    read = table.read(['a', 'b'], [])
+    assert [row.row for row in read.malformed] == [3]
+    assert read.numbers['b'][[0, 2]].tolist() == [2, 6]
+
+
+@pytest.mark.parametrize(
+    ('template', 'name', 'fields'),
+    [
+        ('{m}_run{n}.csv', 'wood_oak_run03.csv', {'m': 'wood_oak', 'n': '03'}),
+        ('{m}/*.csv', 'felt/a b.csv', {'m': 'felt'}),
+        ('{m}/*.csv', 'felt.csv', None),
+        ('data.csv', 'data.csv', {}),
+        ('{m}.csv', '.csv', None),
+        ('{m}_{}.csv', 'felt_.csv', {'m': 'felt'}),
+        ('*', 'a.csv', {}),
+    ],
+)
+def test_a_template_takes_names_apart(template: str, name: str, fields: dict[str, str] | None) -> None:
+    assert NameTemplate(template).match(name) == fields
