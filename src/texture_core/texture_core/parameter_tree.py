@@ -29,6 +29,11 @@ def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
     where
         Place for the error sentence, such as "mapping 'my.yaml'".
 
+    Returns
+    -------
+    cls
+        With every value checked.
+
     Raises
     ------
     InvalidParameter

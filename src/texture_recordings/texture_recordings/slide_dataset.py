@@ -20,6 +20,7 @@ from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_features.labelled_features import LabelledFeatures
 from texture_features.windowing.windows import WindowEvent, WindowParams, cut_recording
 from texture_recordings.motion_of_states import motion_made
+from texture_recordings.parquet_export import write_parquet
 from texture_recordings.slide_samples import SlideSamples
 from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, number_slides, parse_selection
 
@@ -364,6 +365,25 @@ class SlideDataset:
             If a slide has no samples of the topic or lost some.
         """
         return [slide.samples for slide in self.samples(topic)], self.labels
+
+    def to_parquet(self, path: str | Path, topic: str = 'signal') -> None:
+        """Write the samples of one topic as a Parquet file, a row each, with slide, surface, time and conditions.
+
+        Parameters
+        ----------
+        path
+            File to write.
+        topic
+            Signal to write.
+
+        Raises
+        ------
+        InvalidData
+            If a slide has no samples of the topic or lost some, slides differ in channels, or pyarrow is missing.
+        InvalidParameter
+            If the file exists or cannot be written.
+        """
+        write_parquet(self.samples(topic), path)
 
 
 def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent]:

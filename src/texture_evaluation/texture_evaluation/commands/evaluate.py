@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from contextlib import nullcontext
+from pathlib import Path
 
 from texture_core.command_options import add_channels, add_seed, add_slides
-from texture_core.errors import ModelMismatch
+from texture_core.errors import InvalidParameter, ModelMismatch
+from texture_core.resources import folder
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search.parallel import dask_backend
-from texture_evaluation.cross_validation.cross_validate import CrossValidation, cross_validate
+from texture_evaluation.cross_validation.comparison import PairedComparison, compare_all
+from texture_evaluation.cross_validation.comparison_chart import comparison_chart
+from texture_evaluation.cross_validation.cross_validate import CrossValidation, cross_validate, write_json
 from texture_evaluation.cross_validation.splits import parse_split
 from texture_evaluation.evaluate import EvaluationReport, evaluate
 from texture_evaluation.train import FAST_TOPIC, with_channels
@@ -20,8 +25,11 @@ from texture_recordings.slide_dataset import SlideDataset
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument('model', help='a trained model; with --cross-validate the name or path of a recipe')
-    parser.add_argument('bags', nargs='+', help='labelled bags, or folders of bags')
+    parser.add_argument(
+        'bags', nargs='+', help='labelled bags, or folders of bags; with --cross-validate more recipes may come first'
+    )
     parser.add_argument('--json', metavar='FILE', help='write the figures there, too')
+    parser.add_argument('--chart', metavar='FILE', help='with --cross-validate: draw the recipes there, as PNG')
     parser.add_argument(
         '--cross-validate',
         metavar='SPLIT',
@@ -53,18 +61,89 @@ def run(options: argparse.Namespace) -> int:
 
 
 def run_cross_validation(options: argparse.Namespace) -> int:
-    """Cross-validate, print a table, and write the figures if asked to."""
+    """Cross-validate one recipe or several, print tables and comparisons, and write and draw them if asked to."""
     split = parse_split(options.cross_validate, options.seed)
-    recipe = with_channels(load_recipe(options.model), options.channels or 'all')
-    dataset = SlideDataset.from_bags(options.bags, options.slides, topics=recipe.feature_set.topics)
+    names, bags = recipes_and_bags([options.model, *options.bags])
+    recipes = [with_channels(load_recipe(name), options.channels or 'all') for name in names]
+    topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
+    dataset = SlideDataset.from_bags(bags, options.slides, topics=tuple(topics))
     with dask_backend(options.dask) if options.dask else nullcontext():
         n_jobs = None if options.dask else options.jobs
-        result = cross_validate(recipe, dataset, split.splitter, n_jobs, groups=split.groups)
-    for line in table(result, split.name):
+        results = [cross_validate(recipe, dataset, split.splitter, n_jobs, groups=split.groups) for recipe in recipes]
+    for line in (line for result in results for line in table(result, split.name)):
         print(line)
+    compared = compare_all(results)
+    for one in compared:
+        print(sentence(one))
     if options.json:
-        result.write(options.json)
+        write_all(results, compared, options.json)
+    if options.chart:
+        title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
+        print(comparison_chart(results, title, options.chart))
     return 0
+
+
+def recipes_and_bags(given: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the recipes and the bags among arguments: the first is a recipe, and others before the first bag are.
+
+    Raises
+    ------
+    InvalidParameter
+        If no bag is left.
+    """
+    known = {path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml')}
+    count = 1
+    while count < len(given) and not _is_bags(given[count], known):
+        count += 1
+    if count == len(given):
+        raise InvalidParameter(f'{", ".join(given)} are recipes; name the bags behind them')
+    return list(given[:count]), list(given[count:])
+
+
+def _is_bags(text: str, recipes: set[str]) -> bool:
+    path = Path(text)
+    return path.is_dir() or path.suffix == '.mcap' or (text not in recipes and path.suffix != '.yaml')
+
+
+def sentence(one: PairedComparison) -> str:
+    """Return a comparison in words."""
+    slides, windows = (
+        f'{100 * value:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f})'
+        for value, (low, high) in (
+            (one.slide_difference, one.slide_interval),
+            (one.window_difference, one.window_interval),
+        )
+    )
+    return (
+        f"'{one.second}' against '{one.first}' on {one.n_slides} slides: slides {slides}, windows {windows}; "
+        f'{one.only_second} slides are right by it alone, {one.only_first} by the other alone: '
+        f'p = {one.p_value_adjusted:.2g} (exact McNemar test)'
+    )
+
+
+def write_all(results: Sequence[CrossValidation], compared: Sequence[PairedComparison], path: str) -> None:
+    """Write the figures of one recipe, or of several with their comparisons, as JSON.
+
+    Parameters
+    ----------
+    results
+        One for each recipe.
+    compared
+        Comparisons with the first recipe.
+    path
+        File to write.
+
+    Raises
+    ------
+    InvalidParameter
+        If the file cannot be written.
+    """
+    if len(results) == 1:
+        results[0].write(path)
+        return
+    write_json(
+        {'recipes': [result.as_json() for result in results], 'comparisons': [one.as_json() for one in compared]}, path
+    )
 
 
 def table(result: CrossValidation, split: str) -> list[str]:

@@ -134,8 +134,13 @@ class CrossValidation:
         InvalidParameter
             If the file cannot be written.
         """
-        with writing(path):
-            Path(path).write_text(json.dumps(self.as_json(), indent=1) + '\n', encoding='utf-8')
+        write_json(self.as_json(), path)
+
+
+def write_json(content: Mapping[str, Any], path: str | Path) -> None:
+    """Write figures as JSON; InvalidParameter if the file cannot be written."""
+    with writing(path):
+        Path(path).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
 
 
 def figures(results: Sequence[SlideResult]) -> dict[str, Any]:

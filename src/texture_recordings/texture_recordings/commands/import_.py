@@ -30,7 +30,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Import, and name the bags."""
+    """Import, and name the bags.
+
+    Raises
+    ------
+    InvalidParameter
+        If a place is missing or one too many.
+    """
     mapped = options.data_set in MAPPED
     if len(options.places) != 2 + mapped:
         raise InvalidParameter(f'{len(options.places)} places were given after {options.data_set}; write {USAGE}')

@@ -51,6 +51,11 @@ def import_tables(
     readers
         Reader by the ending of a file's name.
 
+    Returns
+    -------
+    ImportReport
+        The bags, and what was counted.
+
     Raises
     ------
     InvalidData

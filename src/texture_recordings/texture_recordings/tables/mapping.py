@@ -148,7 +148,14 @@ class SlideConditions:
 
 @dataclass(frozen=True)
 class TableMapping:
-    """What becomes of the columns of tables."""
+    """What becomes of the columns of tables.
+
+    Examples
+    --------
+    >>> mapping = mapping_from({'streams': {'signal': {'columns': ['ax']}}, 'label': {'column': 'material'}})
+    >>> mapping.slides.by, mapping.streams['signal'].columns
+    ('file', ['ax'])
+    """
 
     files: str = param('*', "Gives the template of the paths below the source, such as '{material}/run{run}.csv'.")
     tables: str = param(

@@ -59,7 +59,17 @@ class ImportReport:
     streams: dict[str, StreamCounts] = field(default_factory=dict)
 
     def note(self, place: str, count: int, rows: Iterable[MalformedRow]) -> None:
-        """Count malformed rows of a table, and keep the first ones."""
+        """Count malformed rows of a table, and keep the first ones.
+
+        Parameters
+        ----------
+        place
+            File, and array in it.
+        count
+            Number of malformed rows.
+        rows
+            The first of them.
+        """
         self.malformed_rows += count
         if count:
             self.examples += [f"'{place}', {row}" for row in rows][: EXAMPLES - len(self.examples)]

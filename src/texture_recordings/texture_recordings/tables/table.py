@@ -25,7 +25,13 @@ MAX_RANGE = 10_000
 
 @dataclass(frozen=True)
 class MalformedRow:
-    """A row that cannot be read, for a sentence."""
+    """A row that cannot be read, for a sentence.
+
+    Examples
+    --------
+    >>> print(MalformedRow(17, 'force', "'n/a' is no finite number"))
+    row 17, column 'force': 'n/a' is no finite number
+    """
 
     row: int
     column: str
@@ -79,6 +85,12 @@ class Table:
         Sampling rate if the file states it, else 0.
     clocks
         Name of the column of time by the name of a column, where the file states that.
+
+    Examples
+    --------
+    >>> table = Table('a.csv', ('t', 'taxel1', 'taxel2'), read=lambda numbers, texts: Columns({}, {}))
+    >>> table.chosen(['taxel*'])
+    ['taxel1', 'taxel2']
     """
 
     place: str
@@ -123,7 +135,13 @@ class TableReader(Protocol):
 
 
 def check_size(values: int, place: str) -> None:
-    """Raise InvalidData if a table has more values than are read at once."""
+    """Raise an error if a table has more values than are read at once.
+
+    Raises
+    ------
+    InvalidData
+        If they are too many.
+    """
     if values > MAX_VALUES:
         raise InvalidData(f"'{place}' has more than {MAX_VALUES // 1_000_000} million values; split it into files")
 

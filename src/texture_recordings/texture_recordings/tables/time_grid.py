@@ -28,6 +28,12 @@ class GridRows:
         Number of gaps, and of samples lost in them.
     disordered
         Number of rows left out because their time does not come after that of all rows before.
+
+    Examples
+    --------
+    >>> rows = on_grid(np.zeros((4, 1)), np.array([0.0, 0.01, 0.05, 0.06]), 100.0, gap=1.75, interpolated=False)
+    >>> rows.index.tolist(), rows.gaps, rows.lost
+    ([0, 1, 5, 6], 1, 3)
     """
 
     samples: Array
@@ -39,7 +45,18 @@ class GridRows:
 
 
 def estimated_rate_hz(time_s: Array) -> float:
-    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other."""
+    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other.
+
+    Parameters
+    ----------
+    time_s : (n,)
+        Time of each row, NaN where it is unknown.
+
+    Examples
+    --------
+    >>> estimated_rate_hz(np.array([0.0, 0.011, 0.019, 0.03, 0.53, 0.54]))
+    100.0
+    """
     steps = np.diff(time_s[np.isfinite(time_s)])
     steps = steps[steps > 0]
     if not len(steps):
@@ -63,6 +80,11 @@ def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float,
         Steps longer than so many intervals are gaps.
     interpolated
         Whether samples are interpolated at the times of the grid; else they are taken as evenly spaced between gaps.
+
+    Returns
+    -------
+    GridRows
+        Rows whose time comes after that of all before.
     """
     if time_s is None or len(samples) < 2:
         return GridRows(samples, np.arange(len(samples)), np.empty(0))

@@ -36,6 +36,11 @@ def tables_of(
     mapping
         Says what is a table, and whether arrays are transposed.
 
+    Yields
+    ------
+    Table
+        In the order of the names.
+
     Raises
     ------
     InvalidData
@@ -111,7 +116,7 @@ def _joined(name: str, part: str) -> str:
 
 
 def table_columns(columns: Mapping[str, AnyArray], place: str, numbers: Sequence[str], texts: Sequence[str]) -> Columns:
-    """Return columns as numbers and texts; InvalidData if numbers are asked for where texts are.
+    """Return columns as numbers and texts.
 
     Parameters
     ----------
@@ -121,6 +126,16 @@ def table_columns(columns: Mapping[str, AnyArray], place: str, numbers: Sequence
         File, and array in it, for sentences.
     numbers, texts
         Names of the columns.
+
+    Returns
+    -------
+    Columns
+        NaN for numbers that are not finite.
+
+    Raises
+    ------
+    InvalidData
+        If numbers are asked for where texts are.
     """
     read, malformed = {}, []
     for name in numbers:

@@ -12,9 +12,9 @@ import numpy as np
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
 from texture_core.files import Budget, FileRefused, open_regular, unpacked_limit
+from texture_recordings.optional_library import library
 from texture_recordings.tables.mapping import TableMapping
 from texture_recordings.tables.readers.arrays import tables_of
-from texture_recordings.tables.readers.optional_library import library
 from texture_recordings.tables.table import Table
 
 MAX_DATASETS, MAX_DEPTH = 20_000, 20
@@ -22,12 +22,52 @@ BROKEN = (OSError, ValueError, RuntimeError, KeyError, TypeError, OverflowError,
 
 
 def read_hdf5(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the tables of an HDF5 file; see `TableReader`."""
+    """Yield the tables of an HDF5 file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    place
+        Its name for sentences.
+    mapping
+        Says how the file is read and what is wanted of it.
+
+    Yields
+    ------
+    Table
+        Its columns are read when asked for.
+
+    Raises
+    ------
+    InvalidData
+        If it is no such file, is damaged, or holds more than the limit.
+    """
     yield from _tables(path, place, mapping, reverse=False)
 
 
 def read_matlab_hdf5(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the tables of a MATLAB file of version 7.3, which is HDF5 with all dimensions in reverse order."""
+    """Yield the tables of a MATLAB file of version 7.3, which is HDF5 with all dimensions in reverse order.
+
+    Parameters
+    ----------
+    path
+        The file.
+    place
+        Its name for sentences.
+    mapping
+        Says how the file is read and what is wanted of it.
+
+    Yields
+    ------
+    Table
+        Its columns are read when asked for.
+
+    Raises
+    ------
+    InvalidData
+        If it is no such file, is damaged, or holds more than the limit.
+    """
     yield from _tables(path, place, mapping, reverse=True)
 
 

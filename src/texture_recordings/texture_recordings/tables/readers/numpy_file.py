@@ -13,7 +13,27 @@ from texture_recordings.tables.table import Table
 
 
 def read_npz(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the tables of an .npz file; see `TableReader`."""
+    """Yield the tables of an .npz file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    place
+        Its name for sentences.
+    mapping
+        Says how the file is read and what is wanted of it.
+
+    Yields
+    ------
+    Table
+        Its columns are read when asked for.
+
+    Raises
+    ------
+    InvalidData
+        If it is no such file, is damaged, or holds more than the limit.
+    """
     try:
         with open_regular(path) as opened:
             content = Arrays(opened)
@@ -23,7 +43,27 @@ def read_npz(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
 
 
 def read_npy(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the one table of an .npy file, whose columns count from 0; see `TableReader`."""
+    """Yield the one table of an .npy file, whose columns count from 0.
+
+    Parameters
+    ----------
+    path
+        The file.
+    place
+        Its name for sentences.
+    mapping
+        Says how the file is read and what is wanted of it.
+
+    Yields
+    ------
+    Table
+        Its columns are read when asked for.
+
+    Raises
+    ------
+    InvalidData
+        If it is no such file, is damaged, or holds more than the limit.
+    """
     try:
         with open_regular(path) as opened:
             array = read_array(opened, Budget(unpacked_limit(path.stat().st_size)), records=True)

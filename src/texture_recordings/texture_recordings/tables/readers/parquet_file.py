@@ -12,16 +12,36 @@ import numpy as np
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
 from texture_core.files import open_regular
+from texture_recordings.optional_library import library
 from texture_recordings.tables.mapping import TableMapping
 from texture_recordings.tables.readers.arrays import table_columns
-from texture_recordings.tables.readers.optional_library import library
 from texture_recordings.tables.table import Columns, Table, check_size
 
 BROKEN = (OSError, ValueError, KeyError, TypeError, NotImplementedError, OverflowError, MemoryError)
 
 
 def read_parquet(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the one table of a Parquet file; see `TableReader`."""
+    """Yield the one table of a Parquet file.
+
+    Parameters
+    ----------
+    path
+        The file.
+    place
+        Its name for sentences.
+    mapping
+        Says how the file is read and what is wanted of it.
+
+    Yields
+    ------
+    Table
+        Its columns are read when asked for.
+
+    Raises
+    ------
+    InvalidData
+        If it is no such file, is damaged, or holds more than the limit.
+    """
     parquet = library('pyarrow.parquet', 'Parquet files', 'parquet')
     try:
         with open_regular(path) as opened:

@@ -20,6 +20,11 @@ def library(name: str, files: str, extra: str) -> Any:
     extra
         Name of the extra of texture_recordings that brings it.
 
+    Returns
+    -------
+    module
+        The library.
+
     Raises
     ------
     InvalidData
