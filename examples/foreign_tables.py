@@ -31,24 +31,46 @@ class Recording:
         return self.channels[[phase == f'stroke {number}' for phase in self.phases]]
 
 
-def recordings(files: int = 2, seed: int = 0, jitter_ms: float = 1.5) -> list[Recording]:
-    """Return files of each material: three strokes between which the finger rests."""
+def recordings(
+    files: int = 2, seed: int = 0, jitter_ms: float = 1.5, noise: float = 0.05, spread: float = 0.0
+) -> list[Recording]:
+    """Return files of each material: three strokes between which the finger rests.
+
+    Parameters
+    ----------
+    files
+        Number of files of each material.
+    seed
+        Seed of all that is random.
+    jitter_ms
+        Largest error of a time.
+    noise
+        Noise of the accelerations, as a multiple of the amplitude of the material's tone.
+    spread
+        Standard deviation of the material's frequency from stroke to stroke, as a fraction of it.
+    """
     rng = np.random.default_rng(seed)
-    return [_recording(rng, material, number, jitter_ms) for material in TONES_HZ for number in range(1, files + 1)]
+    return [
+        _recording(rng, material, number, (jitter_ms, noise, spread))
+        for material in TONES_HZ
+        for number in range(1, files + 1)
+    ]
 
 
-def _recording(rng: np.random.Generator, material: str, number: int, jitter_ms: float) -> Recording:
-    phases = ['rest'] * IDLE_ROWS
+def _recording(rng: np.random.Generator, material: str, number: int, errors: tuple[float, float, float]) -> Recording:
+    jitter_ms, noise, spread = errors
+    phases, tones_hz = ['rest'] * IDLE_ROWS, [0.0] * IDLE_ROWS
     for stroke in range(1, STROKES + 1):
         phases += [f'stroke {stroke}'] * STROKE_ROWS + ['rest'] * IDLE_ROWS
-    time_s = np.arange(len(phases)) / RATE_HZ
-    sliding = np.array([phase != 'rest' for phase in phases])
-    phase = 2 * np.pi * (TONES_HZ[material] * time_s + rng.random())
+        tone_hz = TONES_HZ[material] * (1.0 + spread * rng.normal())
+        tones_hz += [tone_hz] * STROKE_ROWS + [0.0] * IDLE_ROWS
+    phase = 2 * np.pi * (np.cumsum(tones_hz) / RATE_HZ + rng.random())
+    sliding = np.array(tones_hz) > 0
     tone = np.stack([np.sin(phase), 0.5 * np.cos(phase), 0.3 * np.sin(2 * phase)], axis=1)
-    noise = rng.normal(scale=0.05, size=(len(phases), 3))
+    errors_mg = rng.normal(scale=noise, size=(len(phases), 3))
     grip = 120.0 + 30.0 * number + rng.normal(scale=0.5, size=len(phases))
-    channels = np.column_stack([200.0 * (tone * sliding[:, None] + noise), grip]).round(3)
-    time_ms = 5e6 + 1000.0 * time_s + rng.uniform(-jitter_ms, jitter_ms, len(phases))
+    channels = np.column_stack([200.0 * (tone * sliding[:, None] + errors_mg), grip]).round(3)
+    time_ms = 5e6 + 1000.0 * np.arange(len(phases)) / RATE_HZ + rng.uniform(-jitter_ms, jitter_ms, len(phases))
     return Recording(f'2031-05-0{number} {material} v20', material, channels, phases, time_ms.round(2))
 
 
@@ -88,4 +110,6 @@ def write_csv(folder: Path, recorded: list[Recording], broken: dict[int, str] | 
 
 
 if __name__ == '__main__':
-    write_csv(Path(sys.argv[1]), recordings(files=4))
+    # As they come from a logger: a bad cell, a line that is no row, and materials that are hard to tell apart.
+    broken = {60: '5000600.00;stroke 1;oops;1.0;2.0;150.0', 400: 'logger restarted'}
+    write_csv(Path(sys.argv[1]), recordings(files=4, noise=1.0, spread=0.25), broken)

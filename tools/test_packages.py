@@ -134,7 +134,7 @@ def top(modules: Iterable[str]) -> set[str]:
 def imports(package: Path, folder: str) -> set[str]:
     """Return what the modules in a folder of a package import from outside Python and the package."""
     files = list((package / folder).rglob('*.py'))
-    beside = {path.stem for path in files} if folder == 'test' else set()
+    beside = {path.stem for path in (*files, *ROOT.glob('examples/*.py'))} if folder == 'test' else set()
     return set().union(*(top(at_once | late) for at_once, late in map(imported, files))) - {package.name} - beside
 
 

@@ -96,7 +96,7 @@ def test_a_csv_of_others_becomes_a_table_a_comparison_and_a_chart(
     (tmp_path / 'mapping.yaml').write_text(MAPPING)
     import_tables(load_mapping(tmp_path / 'mapping.yaml'), write_csv(tmp_path / 'in', recordings()), tmp_path / 'bags')
     names = []
-    for name, feature in (('bands', 'log_bands'), ('level', 'level')):
+    for name, feature in (('bands', 'log_bands'), ('level', 'mean')):
         (tmp_path / f'{name}.yaml').write_text(SMALL % feature)
         names.append(str(tmp_path / f'{name}.yaml'))
     parser = argparse.ArgumentParser()

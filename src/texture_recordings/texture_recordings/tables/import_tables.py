@@ -30,6 +30,7 @@ MAX_FILES = 100_000
 STATE_S = 0.1  # a state so often where a condition changes along a slide
 SAME_RATE = 1.05  # files of one stream may differ by this factor
 LONGEST_GAP_S = 3600.0
+SAME_TIME_S = 1e-9
 
 
 def import_tables(
@@ -133,6 +134,7 @@ class _Stream:
     time_s: Array
     timed: bool  # whether times were recorded
     rate_hz: float
+    clock: str  # column of time that the file states for it
 
 
 class _TableSlides:
@@ -148,22 +150,34 @@ class _TableSlides:
 
     def slides(self) -> Iterator[tuple[str, ImportedSlide]]:
         """Yield session and slide."""
-        reference = next(iter(self._streams.values()))
         borders = self._mapping.slides
-        keys = self._text(borders.column) if borders.by == 'column' else None
-        if keys is not None:
-            reference = next((s for s in self._streams.values() if len(s.samples) == len(keys)), reference)
-        rows = SlideRows(reference.time_s, reference.samples, reference.rate_hz, keys, self._table.place)
-        for number, span in enumerate(spans(rows, borders), 1):
+        reference, found = self._spans()
+        for number, span in enumerate(found, 1):
             if (span.stop - span.start) / reference.rate_hz < max(borders.min_s, 2.0 / reference.rate_hz):
                 self._report.short_slides += 1
                 continue
             yield self._slide(reference, span, number)
 
+    def _spans(self) -> tuple[_Stream, list[slice]]:
+        """Return the stream by which slides are cut, and its rows of each slide."""
+        borders, place = self._mapping.slides, self._table.place
+        reference = next(iter(self._streams.values()))
+        keys = self._text(borders.column) if borders.by == 'column' else None
+        if keys is None:
+            rows = SlideRows(reference.time_s, reference.samples, reference.rate_hz, None, place)
+            return reference, spans(rows, borders)
+        clock = self._table.clocks.get(borders.column, '')
+        same = [one for one in self._streams.values() if len(one.samples) == len(keys) and one.clock == clock]
+        if same:
+            return same[0], spans(SlideRows(same[0].time_s, same[0].samples, same[0].rate_hz, keys, place), borders)
+        times = self._times_of(borders.column, len(keys))
+        rows = SlideRows(times, keys[:, None], estimated_rate_hz(times), keys, place)
+        return reference, [_rows_between(reference.time_s, *_ends(times, span)) for span in spans(rows, borders)]
+
     def _slide(self, reference: _Stream, span: slice, number: int) -> tuple[str, ImportedSlide]:
         times = reference.time_s[span]
         begin_s, end_s = float(np.nanmin(times)), float(np.nanmax(times)) + 1.0 / reference.rate_hz
-        cut = _Cut(len(reference.samples), span, begin_s, end_s)
+        cut = _Cut(len(reference.samples), reference.clock, span, begin_s, end_s)
         surface = self._label(cut)
         session = self._value(self._mapping.session, cut, 'session') if self._mapping.session else surface
         slide = ImportedSlide(
@@ -176,7 +190,7 @@ class _TableSlides:
         return session, slide
 
     def _samples(self, name: str, stream: _Stream, cut: _Cut) -> StreamSamples:
-        rows = cut.rows(len(stream.samples), stream.time_s)
+        rows = cut.rows(len(stream.samples), stream.clock, stream.time_s)
         samples, times = stream.samples[rows], stream.time_s[rows]
         if not len(samples):
             raise InvalidData(
@@ -230,7 +244,9 @@ class _TableSlides:
         else:
             time_s = np.arange(len(samples)) / rate_hz
         channels = tuple(params.channels) or tuple(names)
-        return _Stream(params, channels, samples, time_s, bool(time_column), rate_hz)
+        return _Stream(
+            params, channels, samples, time_s, bool(time_column), rate_hz, self._table.clocks.get(names[0], '')
+        )
 
     def _rate_hz(self, name: str, params: StreamColumns, time_column: str) -> float:
         """Return the rate of a stream: as stated, else that of the first file, from which later ones differ little."""
@@ -309,7 +325,7 @@ class _TableSlides:
         texts = self._text(name)
         if texts is None:
             return self._fields[name]
-        rows = cut.rows(len(texts), self._times_of(name, len(texts)))
+        rows = cut.rows(len(texts), self._table.clocks.get(name, ''), self._times_of(name, len(texts)))
         own = texts[rows]
         if not len(own):
             raise InvalidData(f"'{self._table.place}': column '{name}' has no value during a slide; name another")
@@ -358,7 +374,7 @@ class _TableSlides:
             return np.array([cut.begin_s]), np.array([_number(text, self._table.place, quantity.column)]) * factor
         values = self._columns.numbers[quantity.column]
         times = self._times_of(quantity.column, len(values))
-        rows = cut.rows(len(values), times)
+        rows = cut.rows(len(values), self._table.clocks.get(quantity.column, ''), times)
         return times[rows], values[rows] * factor
 
 
@@ -367,16 +383,29 @@ class _Cut:
     """A slide: rows of the stream by which it was cut, and its time."""
 
     length: int
+    clock: str
     span: slice
     begin_s: float
     end_s: float
 
-    def rows(self, length: int, time_s: Array) -> slice:
-        """Return the rows of a column: the same ones if it has as many rows, else those of the time of the slide."""
-        if length == self.length:
+    def rows(self, length: int, clock: str, time_s: Array) -> slice:
+        """Return the rows of a column: the same ones if it has the same clock, else those of the time of the slide."""
+        if length == self.length and clock == self.clock:
             return self.span
-        inside = np.flatnonzero((time_s >= self.begin_s - 1e-9) & (time_s < self.end_s - 1e-9))
-        return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0, 0)
+        return _rows_between(time_s, self.begin_s, self.end_s)
+
+
+def _rows_between(time_s: Array, begin_s: float, end_s: float) -> slice:
+    inside = np.flatnonzero((time_s >= begin_s - SAME_TIME_S) & (time_s < end_s - SAME_TIME_S))
+    return slice(int(inside[0]), int(inside[-1]) + 1) if len(inside) else slice(0, 0)
+
+
+def _ends(time_s: Array, span: slice) -> tuple[float, float]:
+    """Return the time of the first row, and of the row after the last."""
+    if span.stop <= span.start:
+        return 0.0, 0.0
+    after = time_s[span.stop] if span.stop < len(time_s) else 2 * time_s[-1] - time_s[max(0, len(time_s) - 2)]
+    return float(time_s[span.start]), float(after)
 
 
 def _mean(times: Array, values: Array, begin_s: float, end_s: float) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from texture_core.arrays import AnyArray, Array
 
 SIGNIFICANT = 4  # digits of an estimated rate: the resolution of time stamps allows no more
+ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for that one
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,9 @@ def estimated_rate_hz(time_s: Array) -> float:
     if not len(steps):
         return float('nan')
     usual = steps[steps < 1.75 * np.median(steps)]
-    return float(f'{1.0 / usual.mean():.{SIGNIFICANT}g}')
+    rate_hz = 1.0 / float(usual.mean())
+    simple = float(f'{rate_hz:.2g}')
+    return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
 
 
 def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float, interpolated: bool) -> GridRows:
