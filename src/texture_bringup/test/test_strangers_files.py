@@ -863,6 +863,11 @@ BOMBS: dict[str, tuple[str, str, Callable[[Path], bytes]]] = {
     'a line of the vendor': ('vendor recording', 'good.csv', lambda _: b'1;' * (MB5 // 2)),
     'groups of a launch file': ('launch file', 'good.xml', lambda _: b'<launch>' + b'<group>' * (MB5 // 7)),
     'settings of 200 kB': ('settings', 'good.yaml', lambda _: b'channels: [' + b'1,' * 99_000 + b']'),
+    'settings of numbers': ('settings', 'good.yaml', lambda _: b'channels: [' + b'1,' * 49_000 + b']'),
+    'settings of mappings': ('settings', 'good.yaml', lambda _: b'channels: [' + b'a:,' * 33_000 + b']'),
+    'settings of deep lists': (
+        'settings', 'good.yaml', lambda _: b'channels: [' + (b'[' * 45 + b']' * 45 + b',') * 1080 + b']',
+    ),
     'settings of 5 MB': ('settings', 'good.yaml', lambda _: b'- 1\n' * (MB5 // 4)),
     'a scene of aliases': ('scene', 'good.yaml', lambda _: (LAUGHS + 'surfaces: {x: *j}').encode()),
     'a checkpoint of small lists': (

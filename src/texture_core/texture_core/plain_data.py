@@ -15,7 +15,7 @@ from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidParameter
 from texture_core.files import MB, FileRefused, read_text
 
-MAX_CHARACTERS = 200_000  # of YAML; the longest settings in use have a tenth
+MAX_CHARACTERS = 100_000  # of YAML, which take 3 s at worst; the longest settings in use have a tenth
 MAX_VALUES = 200_000  # with every alias written out
 MAX_DEPTH = 50  # of lists and mappings within each other, in YAML and JSON
 MAX_CARD_BYTES = 5 * MB
