@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
+from texture_benchmarks.motion.chart import robot_table
 from texture_benchmarks.motion.trial import radius_error_m
 from texture_benchmarks.result import BenchmarkOptions
 
@@ -44,3 +45,9 @@ def test_the_error_of_a_radius_is_the_largest_distance_from_the_circle() -> None
     places = 0.3 + 0.02 * np.column_stack([np.cos(angle), np.sin(angle)])
     assert radius_error_m(places, 0.02) == pytest.approx(0.0, abs=1e-12)
     assert radius_error_m(places, 0.0195) == pytest.approx(0.0005)
+
+
+def test_the_table_shows_in_bold_what_misses_its_target():
+    numbers = {'linear_slide': {'force_rms': 0.05, 'speed_error': 1.5, 'mean_speed_error': 0.5}}
+    table = robot_table({'hand': {'200 N/m': numbers}}, {'force_rms': 0.05, 'speed_error': 0.02})
+    assert table.splitlines()[-1] == '| hand | 200 N/m | linear_slide | 5.00 |  | **150.00** | 50.00 |  |'

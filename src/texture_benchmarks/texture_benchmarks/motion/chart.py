@@ -35,10 +35,23 @@ COLUMNS = (
 
 
 def robot_table(robots: Mapping[str, Mapping[str, Any]], targets: Mapping[str, float]) -> str:
-    """Return a Markdown table of what each robot kept; `robots` is as in the JSON of the bench."""
+    """Return a Markdown table of what each robot kept, bold where it misses a target.
+
+    Parameters
+    ----------
+    robots
+        As in the JSON of the benchmark.
+    targets
+        By number; at most so much is asked.
+    """
     asked = [f'{times * targets[name]:g}' if name in targets else '' for name, _, times in COLUMNS]
     rows = [
-        [robot, stiffness, motion, *(_cell(numbers.get(name), times) for name, _, times in COLUMNS)]
+        [
+            robot,
+            stiffness,
+            motion,
+            *(_against_target(numbers.get(name), times, targets.get(name)) for name, _, times in COLUMNS),
+        ]
         for robot, by_stiffness in robots.items()
         for stiffness, motions in by_stiffness.items()
         for motion, numbers in motions.items()
@@ -244,6 +257,11 @@ def _hazard_cell(trials: Iterable[ForceControlMetrics]) -> str:
 
 def _cell(value: float | None, times: float) -> str:
     return '' if value is None else f'{times * value:.2f}'
+
+
+def _against_target(value: float | None, times: float, target: float | None) -> str:
+    missed = value is not None and target is not None and not value <= target
+    return f'**{_cell(value, times)}**' if missed else _cell(value, times)
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
