@@ -85,6 +85,17 @@ def test_a_texture_is_added_and_removed_from_the_command_line(classifier, capsys
     assert classify_slide(classifier, 'slide-3') != 'silk'
 
 
+def test_a_texture_is_removed_by_its_label_from_the_command_line(classifier, capsys):
+    classify_slide(classifier, 'slide-4')
+    assert main(['add', 'oak']) == 0
+    assert classify_slide(classifier, 'slide-5') == 'oak'
+    assert main(['remove', 'oka']) == 2
+    assert "did you mean 'oak'?" in capsys.readouterr().err
+    assert main(['remove', 'oak']) == 0
+    assert "removed 1 slide of 'oak'; 2 textures, 0 slides added" in capsys.readouterr().out
+    assert classify_slide(classifier, 'slide-6') != 'oak'
+
+
 @pytest.mark.parametrize('arguments', [['add'], ['add', 'silk', '--undo']])
 def test_what_to_add_must_be_given(arguments, capsys):
     assert main(arguments) == 2

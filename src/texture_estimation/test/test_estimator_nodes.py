@@ -228,6 +228,24 @@ def test_a_texture_is_learnt_from_one_exploration_kept_and_undone(graph, model, 
     assert not node.call(Trigger, 'remove_last_added').success
 
 
+def test_a_texture_is_removed_by_its_label_and_stays_removed_after_a_restart(graph, model, cloth_slide, tmp_path):
+    path = model.save(tmp_path / 'm')
+    node = NodeUnderTest(graph, Classifier, path)
+    node.ask(cloth_slide)
+    for label in ('silk', 'felt'):
+        node.ask([dataclasses.replace(v, exploration_id=label) for v in cloth_slide])
+        assert node.call(srv.AddTexture, 'add_texture', label=label).success
+    answer = node.call(srv.RemoveTexture, 'remove_texture', label='silk')
+    assert (answer.success, answer.slides) == (True, 1)
+    assert "removed 1 slide of 'silk'; 4 textures, 1 slide added" in answer.message
+    assert load_model(path).labels == model.labels
+    answer = node.call(srv.RemoveTexture, 'remove_texture', label='felt')
+    assert 'stays as it was trained; 4 textures, 0 slides added' in answer.message
+    refused = node.call(srv.RemoveTexture, 'remove_texture', label='felt')
+    assert not refused.success
+    assert 'no added slides' in refused.message
+
+
 def test_what_cannot_be_added_is_answered_with_a_sentence(graph, model, tmp_path):
     node = NodeUnderTest(graph, Classifier)
     assert 'no model is loaded' in node.call(srv.AddTexture, 'add_texture', label='silk').message

@@ -4,7 +4,7 @@ import json
 import numpy as np
 import pytest
 
-from texture_core.errors import InvalidData, ModelMismatch
+from texture_core.errors import InvalidData, ModelMismatch, TextureError
 from texture_core.features import FeatureVector
 from texture_estimation.incremental.incremental_classifier import EXPLORATIONS, IncrementalClassifier
 from texture_estimation.model import load_model
@@ -166,3 +166,71 @@ def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_resta
     assert again.model.active_domain.deviation(fast) == ''
     again.remove_last()
     assert again.model.active_domain == domain
+
+
+@pytest.fixture
+def three_added(model, examples, silk, tmp_path):
+    """Return a classifier to which silk, oak, more wood and more silk were added in this order, and its path."""
+    path = model.save(tmp_path / 'surfaces')
+    incremental_classifier = IncrementalClassifier(load_model(path), path)
+    for number, (label, values) in enumerate(
+        (('silk', silk), ('oak', -silk), ('wood', examples.values[examples.labels == 'wood'][:4]), ('silk', silk + 0.1))
+    ):
+        measured(incremental_classifier, values, f'e{number}')
+        incremental_classifier.add(label)
+    return incremental_classifier, path
+
+
+def test_a_texture_is_removed_by_its_label_with_all_its_slides_live_and_stored(three_added, model, silk, examples):
+    incremental_classifier, path = three_added
+    removed = incremental_classifier.remove('silk')
+    assert [(slide.label, slide.exploration_id) for slide in removed] == [('silk', 'e0'), ('silk', 'e3')]
+    assert incremental_classifier.model.labels == load_model(path).labels == (*model.labels, 'oak')
+    assert incremental_classifier.model.decide(-silk) == ['oak'] * len(silk)
+    np.testing.assert_allclose(
+        load_model(path).predict_log_proba(examples.values),
+        incremental_classifier.model.predict_log_proba(examples.values),
+        atol=1e-5,
+    )
+
+
+def test_what_is_added_after_a_removal_replaces_no_stored_slide(three_added, model, silk):
+    incremental_classifier, path = three_added
+    incremental_classifier.remove('silk')
+    measured(incremental_classifier, 2 * silk, 'e9')
+    incremental_classifier.add('cork')
+    again = load_model(path)
+    assert [slide.exploration_id for slide in again.added_slides] == ['e1', 'e2', 'e9']
+    later = IncrementalClassifier(again, path)
+    assert [later.remove_last().exploration_id for _ in range(3)] == ['e9', 'e2', 'e1']
+    assert load_model(path).labels == model.labels
+
+
+def test_slides_added_to_a_trained_texture_are_removed_and_the_texture_stays_as_trained(three_added, model):
+    incremental_classifier, path = three_added
+    assert [slide.exploration_id for slide in incremental_classifier.remove(' wood ')] == ['e2']
+    assert load_model(path).labels == (*model.labels, 'silk', 'oak')
+    assert len(incremental_classifier.model.examples_of('wood')) == len(model.examples_of('wood'))
+
+
+@pytest.mark.parametrize(
+    ('label', 'sentence'),
+    [
+        ('sillk', r"no added texture 'sillk'; did you mean 'silk'\? Known: oak, silk, wood"),
+        ('cloth', "'cloth' is of the training, .* train the model again without it. Can be removed: oak, silk, wood"),
+        (' ', 'no label was given; name the texture to remove. Can be removed: oak, silk, wood'),
+    ],
+)
+def test_a_texture_that_was_not_added_is_not_removed(three_added, model, label, sentence):
+    incremental_classifier, path = three_added
+    before = incremental_classifier.model
+    label = label if label != 'cloth' else next(name for name in model.labels if name != 'wood')
+    with pytest.raises(TextureError, match=sentence.replace('cloth', label) if label.strip() else sentence):
+        incremental_classifier.remove(label)
+    assert incremental_classifier.model is before
+    assert len(load_model(path).added_slides) == 4
+
+
+def test_with_nothing_added_a_removal_says_so(model):
+    with pytest.raises(InvalidData, match='has no added slides that could be removed'):
+        IncrementalClassifier(model).remove('silk')

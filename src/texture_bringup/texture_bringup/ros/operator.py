@@ -243,8 +243,21 @@ class Operator:
         answer = self._ask_classifier(srv.AddTexture, 'add_texture', request, deadline_s)
         return int(answer.examples), str(answer.message)
 
+    def remove(self, label: str, deadline_s: float = 30.0) -> str:
+        """Remove all slides that were added as a texture; return what happened in a sentence.
+
+        Raises
+        ------
+        LaunchFailed
+            If no classifier answers.
+        InvalidData
+            If none could be removed, with the reason.
+        """
+        request = srv.RemoveTexture.Request(label=label)
+        return str(self._ask_classifier(srv.RemoveTexture, 'remove_texture', request, deadline_s).message)
+
     def remove_last_added(self, deadline_s: float = 30.0) -> str:
-        """Let the classifier remove the slide that was added last; return what happened. Raises as `learn` does."""
+        """Let the classifier remove the slide that was added last; return what happened. Raises as `add` does."""
         return str(self._ask_classifier(Trigger, 'remove_last_added', Trigger.Request(), deadline_s).message)
 
     def _listen_to_features(self) -> list[FeatureVector]:

@@ -34,6 +34,15 @@ class AddedSlide:
         Features of its windows.
     conditions
         How it was made, as far as it is known.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = write_added_slide(f'{folder}/model', 1, AddedSlide('oak', 'slide', np.ones((3, 1))), 'a1')
+    ...     [slide] = read_added_slides(f'{folder}/model', 'a1', ('mean',))
+    >>> slide.label, slide.values.shape
+    ('oak', (3, 1))
     """
 
     label: str
@@ -73,6 +82,11 @@ def write_added_slide(model: str | Path, number: int, added_slide: AddedSlide, f
     path.parent.mkdir(parents=True, exist_ok=True)
     model_files.replace(path, (json.dumps(content) + '\n').encode())
     return path
+
+
+def stored_numbers(model: str | Path) -> list[int]:
+    """Return the numbers of the stored slides of a model, rising; those of removed slides are missing."""
+    return sorted(int(path.stem) for path in _folder(model).glob('*.json') if path.stem.isdecimal())
 
 
 def remove_added_slide(model: str | Path, number: int) -> None:

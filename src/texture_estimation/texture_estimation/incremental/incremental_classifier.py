@@ -9,10 +9,16 @@ from pathlib import Path
 import numpy as np
 
 from texture_core.arrays import Array
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData
 from texture_core.features import FeatureVector
 from texture_core.labels import checked_label
-from texture_estimation.incremental.added_slides import AddedSlide, remove_added_slide, write_added_slide
+from texture_estimation.incremental.added_slides import (
+    AddedSlide,
+    remove_added_slide,
+    stored_numbers,
+    write_added_slide,
+)
 from texture_estimation.model import TextureModel
 from texture_features.slide_conditions import RunningConditions
 
@@ -34,12 +40,30 @@ class IncrementalClassifier:
     ------
     ModelMismatch
         If the model holds no training examples.
+
+    Examples
+    --------
+    >>> from texture_estimation.classification.training import train
+    >>> from texture_estimation.recipe import Recipe
+    >>> from texture_features.labelled_features import LabelledFeatures
+    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': 'naive_bayes'}, 'tiny')
+    >>> labels = np.repeat(['cork', 'felt'], 20)
+    >>> slides = np.char.add(labels, np.tile(np.repeat(['/1', '/2', '/3', '/4'], 5), 2))
+    >>> values = (labels == 'felt')[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> model = train(recipe, LabelledFeatures(values, labels, slides, ('mean',), 'a1', 0.5, 0.1))
+    >>> classifier = IncrementalClassifier(model)
+    >>> classifier.observe(FeatureVector(0, 'new', 0.5, 0.1, ('mean',), np.array([3.0]), feature_set='a1'))
+    >>> classifier.add('oak'), classifier.model.labels
+    (1, ('cork', 'felt', 'oak'))
+    >>> classifier.remove_last().label, classifier.model.labels
+    ('oak', ('cork', 'felt'))
     """
 
     def __init__(self, model: TextureModel, path: str | Path | None = None) -> None:
         self.model = model
         self._ridge_classifier = model.ridge_classifier()
         self._path = path
+        self._numbers = stored_numbers(path) if path is not None else []  # of the files, one for each added slide
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
         self._conditions: dict[str, RunningConditions] = {}  # of the same explorations
 
@@ -77,7 +101,9 @@ class IncrementalClassifier:
         self._refuse_second_label(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
         if self._path is not None:
-            write_added_slide(self._path, len(self.model.added_slides) + 1, added_slide, self.model.feature_set)
+            number = self._numbers[-1] + 1 if self._numbers else 1
+            write_added_slide(self._path, number, added_slide, self.model.feature_set)
+            self._numbers.append(number)
         self._update((*self.model.added_slides, added_slide), label)
         return len(self._ridge_classifier.examples_of(self.model.labels.index(label)))
 
@@ -101,9 +127,62 @@ class IncrementalClassifier:
             raise InvalidData(f"model '{self.model.name}' has no added slides that could be removed")
         *before, last = self.model.added_slides
         if self._path is not None:
-            remove_added_slide(self._path, len(self.model.added_slides))
+            remove_added_slide(self._path, self._numbers[-1])
+            del self._numbers[-1]
         self._update(tuple(before), last.label)
         return last
+
+    def remove(self, label: str) -> tuple[AddedSlide, ...]:
+        """Remove all slides that were added as a label, from the model and from its folder, and return them.
+
+        A texture of the training stays as it was trained.
+
+        Raises
+        ------
+        InvalidData
+            If there is no label, no slide was added at all, or none to this texture of the training.
+        UnknownName
+            If no slide was added under this label, with the nearest label.
+        OSError
+            If a file cannot be removed; the slides whose files are still there stay in the model.
+        """
+        label = checked_label(label)
+        self._refuse_removal(label)
+        kept = list(self.model.added_slides)
+        removed = []
+        try:
+            for place in reversed([place for place, slide in enumerate(kept) if slide.label == label]):
+                if self._path is not None:
+                    remove_added_slide(self._path, self._numbers[place])
+                    del self._numbers[place]
+                removed.append(kept.pop(place))
+        finally:
+            self._start_again(tuple(kept))
+        return tuple(reversed(removed))
+
+    def _refuse_removal(self, label: str) -> None:
+        added = sorted({slide.label for slide in self.model.added_slides})
+        if not added:
+            raise InvalidData(f"model '{self.model.name}' has no added slides that could be removed")
+        allowed = f'Can be removed: {", ".join(added)}'
+        if not label:
+            raise InvalidData(f'no label was given; name the texture to remove. {allowed}')
+        if label in added:
+            return
+        if label in self.model.trained_labels:
+            raise InvalidData(
+                f"'{label}' is of the training, and no slide was added to it; to remove it, "
+                f'train the model again without it. {allowed}'
+            )
+        raise unknown_name(label, added, 'added texture')
+
+    def _start_again(self, added_slides: tuple[AddedSlide, ...]) -> None:
+        """Compute the incremental classifier anew: without a label in the middle, the numbers of the others change."""
+        updated = dataclasses.replace(self.model.with_added_slides(added_slides), incremental_predictor=None)
+        self._ridge_classifier = updated.ridge_classifier()
+        self.model = dataclasses.replace(
+            updated, incremental_predictor=self._ridge_classifier.predictor if added_slides else None
+        )
 
     def _update(self, added_slides: tuple[AddedSlide, ...], label: str) -> None:
         """Update the model to these added slides; only those of one label differ from before."""

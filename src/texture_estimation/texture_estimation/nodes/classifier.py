@@ -41,6 +41,7 @@ class Classifier(EstimatorNode):
         super().__init__('classifier', **kwargs)
         self.create_service(srv.AddTexture, 'add_texture', self._on_add)
         self.create_service(Trigger, 'remove_last_added', self._on_remove_last)
+        self.create_service(srv.RemoveTexture, 'remove_texture', self._on_remove)
 
     def _load(self, path: str) -> EvidenceAccumulator:
         model = load_model(path) if path else None
@@ -83,6 +84,19 @@ class Classifier(EstimatorNode):
         )
         return answer
 
+    def _on_remove(self, request: srv.RemoveTexture.Request, answer: srv.RemoveTexture.Response) -> Any:
+        try:
+            removed = self._require_incremental().remove(request.label)
+        except (TextureError, OSError) as error:
+            answer.message = str(error)
+            return answer
+        answer.success = True
+        answer.slides = len(removed)
+        model = self._use_updated_model()
+        stays = ' which stays as it was trained;' if removed[0].label in model.labels else ''
+        answer.message = f"removed {_slides(len(removed))} of '{removed[0].label}';{stays} " + _known(model)
+        return answer
+
     def _require_incremental(self) -> IncrementalClassifier:
         if self._incremental_classifier is None:
             raise ModelMismatch(
@@ -101,8 +115,11 @@ class Classifier(EstimatorNode):
 
 
 def _known(model: TextureModel) -> str:
-    trained = len(model.added_slides)
-    return f'{len(model.labels)} textures, {trained} {"slide" if trained == 1 else "slides"} added since the training'
+    return f'{len(model.labels)} textures, {_slides(len(model.added_slides))} added since the training'
+
+
+def _slides(number: int) -> str:
+    return f'{number} {"slide" if number == 1 else "slides"}'
 
 
 def main() -> None:
