@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from check_docstrings import ROOT, check, classes_without_example
+from check_docstrings import ROOT, check, check_examples, classes_without_example
 
 HEAD = 'from numpy.typing import NDArray\n\n'
 
@@ -71,3 +71,7 @@ def test_a_class_without_a_doctest_is_found_unless_another_one_shows_it(tmp_path
 
 def test_every_docstring_of_the_repository_says_what_a_caller_needs() -> None:
     assert not check(ROOT / 'src')
+
+
+def test_every_public_class_of_features_estimation_and_recordings_has_an_example() -> None:
+    assert not check_examples(ROOT / 'src')

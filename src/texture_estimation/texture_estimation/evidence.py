@@ -55,6 +55,21 @@ class EvidenceAccumulator:
     ----------
     model
         Trained model; with None each final estimate says that no model is loaded.
+
+    Examples
+    --------
+    >>> from texture_estimation.classification.training import train
+    >>> from texture_estimation.recipe import Recipe
+    >>> from texture_features.labelled_features import LabelledFeatures
+    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': 'naive_bayes'}, 'tiny')
+    >>> labels = np.repeat(['cork', 'felt'], 20)
+    >>> slides = np.char.add(labels, np.tile(np.repeat(['/1', '/2', '/3', '/4'], 5), 2))
+    >>> values = (labels == 'felt')[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> model = train(recipe, LabelledFeatures(values, labels, slides, ('mean',), 'a1', 0.5, 0.1))
+    >>> evidence = EvidenceAccumulator(model)
+    >>> window = FeatureVector(0, 'slide', 0.5, 0.1, ('mean',), np.array([0.98]), feature_set='a1')
+    >>> evidence.update(window).label, evidence.update(FeatureVector(0, 'slide', 0.0, 0.1, last=True)).final
+    ('felt', True)
     """
 
     def __init__(self, model: TextureModel | None) -> None:

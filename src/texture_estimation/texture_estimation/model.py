@@ -70,6 +70,20 @@ class TextureModel:
         Predictor since slides were added; None if none were.
     domain
         Conditions under which the model was trained; outside them it decides nothing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texture_estimation.classification.training import train
+    >>> from texture_estimation.recipe import Recipe
+    >>> from texture_features.labelled_features import LabelledFeatures
+    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': 'naive_bayes'}, 'tiny')
+    >>> labels = np.repeat(['cork', 'felt'], 20)
+    >>> slides = np.char.add(labels, np.tile(np.repeat(['/1', '/2', '/3', '/4'], 5), 2))
+    >>> values = (labels == 'felt')[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> model = train(recipe, LabelledFeatures(values, labels, slides, ('mean',), 'a1', 0.5, 0.1))
+    >>> model.labels, model.decide(np.array([[0.05], [0.02]]))
+    (('cork', 'felt'), ['cork', 'cork'])
     """
 
     name: str

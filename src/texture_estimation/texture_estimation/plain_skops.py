@@ -18,7 +18,16 @@ MAX_SCHEMA_BYTES = 5_000_000
 
 
 class NotPlain(Exception):
-    """Something else than plain values and arrays."""
+    """Something else than plain values and arrays.
+
+    Examples
+    --------
+    >>> try:
+    ...     raise NotPlain("it holds a function")
+    ... except NotPlain as error:
+    ...     print(error)
+    it holds a function
+    """
 
 
 def read_plain_skops(file: Archive) -> dict[str, Any] | None:

@@ -27,7 +27,13 @@ AUGMENTABLE = ('mlp',)
 
 @dataclass(frozen=True)
 class TrainingParams:
-    """How the examples for training are cut."""
+    """How the examples for training are cut.
+
+    Examples
+    --------
+    >>> TrainingParams(hop_s=0.1).hop_s
+    0.1
+    """
 
     hop_s: float = param(
         0.25,
@@ -40,7 +46,13 @@ class TrainingParams:
 
 @dataclass(frozen=True)
 class DecisionParams(TrainingParams):
-    """How the examples for training are cut, how they count, and how rarely decisions made with them may err."""
+    """How the examples for training are cut, how they count, and how rarely decisions made with them may err.
+
+    Examples
+    --------
+    >>> DecisionParams(speed_margin=0.2).domain_margins.speed
+    0.2
+    """
 
     start_weight: int = param(
         1,
@@ -100,7 +112,14 @@ class DecisionParams(TrainingParams):
 
 @dataclass(frozen=True)
 class Recipe:
-    """What turns a signal into a decision, before any training."""
+    """What turns a signal into a decision, before any training.
+
+    Examples
+    --------
+    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}, 'learner': 'svm_rbf'}, 'mine')
+    >>> recipe.feature_set.topics, recipe.evidence_name
+    (('signal',), 'soft_vote')
+    """
 
     name: str
     feature_set: FeatureSet

@@ -27,6 +27,12 @@ class SignalLevel(NamedTuple):
         Mean over all windows, in the unit of the signal.
     lowest, highest
         Of the means over the first windows, however many.
+
+    Examples
+    --------
+    >>> level = SignalLevel('signal/dynamic', rms=12.0, lowest=11.5, highest=13.0)
+    >>> level.lowest <= level.rms <= level.highest
+    True
     """
 
     channel: str

@@ -51,7 +51,17 @@ COMPUTED = re.compile(r'\bAS\s*\(|\bVIEW\b|\bVIRTUAL\b|\bTRIGGER\b', re.IGNORECA
 
 
 class CheckedPath(type(Path())):  # type: ignore[misc]
-    """A path from which only regular files are read, whoever opens them; files of text are short."""
+    """A path from which only regular files are read, whoever opens them; files of text are short.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = CheckedPath(folder, 'metadata.yaml')
+    ...     _ = Path(path).write_bytes(b'version: 9')
+    ...     print(path.read_text())
+    version: 9
+    """
 
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
         """Open the file for reading bytes."""

@@ -54,6 +54,20 @@ class BagWriter:
     ------
     InvalidData
         If something exists at `path`, or it cannot be made.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tempfile import TemporaryDirectory
+    >>> from texture_core.signal import TactileSignal
+    >>> from texture_recordings.bags import read_bag
+    >>> batch = TactileSignal(5, 'finger', ('pac',), (), 1000.0, 0, np.array([[1.0], [2.0]], dtype=np.float32))
+    >>> with TemporaryDirectory() as folder:
+    ...     with BagWriter(f'{folder}/bag') as bag:
+    ...         bag.write('signal', batch, log_ns=7)
+    ...     [(topic, log_ns, signal)] = read_bag(f'{folder}/bag')
+    >>> topic, log_ns, signal.samples[:, 0].tolist()
+    ('signal', 7, [1.0, 2.0])
     """
 
     def __init__(self, path: str | Path, namespace: str = '/') -> None:

@@ -33,7 +33,14 @@ BROKEN = (
 
 
 class RawMessage(NamedTuple):
-    """One message as it lies in a bag."""
+    """One message as it lies in a bag.
+
+    Examples
+    --------
+    >>> message = RawMessage('/signal', 'texture_msgs/msg/TactileSignal', 7, b'')
+    >>> message.topic, message.log_ns
+    ('/signal', 7)
+    """
 
     topic: str
     msgtype: str

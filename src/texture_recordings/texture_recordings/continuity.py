@@ -8,7 +8,18 @@ from texture_core.signal import TactileSignal
 
 
 class Continuity:
-    """Count lost samples and restarts of streams, from the running index of their batches."""
+    """Count lost samples and restarts of streams, from the running index of their batches.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> continuity = Continuity()
+    >>> for first_sample in (0, 10, 25, 0):  # five samples are missing, then the driver was started again
+    ...     samples = np.zeros((10, 1), dtype=np.float32)
+    ...     continuity.update('signal', TactileSignal(0, 'finger', ('pac',), (), 1000.0, first_sample, samples))
+    >>> continuity.lost['signal'], continuity.restarts['signal']
+    (5, 1)
+    """
 
     def __init__(self) -> None:
         self.samples: Counter[str] = Counter()

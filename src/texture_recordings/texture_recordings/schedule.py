@@ -14,6 +14,12 @@ class Schedule:
         How many times faster than recorded.
     longest_pause_s
         Longer pauses between messages, such as those between two slides, are cut to this; s of the recording.
+
+    Examples
+    --------
+    >>> schedule = Schedule(rate=2.0, longest_pause_s=1.0)
+    >>> [schedule.due_s(second * NANOSECONDS) for second in (0, 1, 60)]  # the pause of 59 s is cut to one
+    [0.0, 0.5, 1.0]
     """
 
     def __init__(self, rate: float, longest_pause_s: float) -> None:

@@ -32,6 +32,14 @@ class SlideSamples:
         Of the samples.
     speed_m_s, force_n, direction_rad
         Means over the states of the slide (the first direction); NaN if unknown.
+
+    Examples
+    --------
+    >>> from texture_recordings.slide_dataset import SlideDataset
+    >>> dataset = SlideDataset.from_arrays({'signal': [np.ones((100, 1))]}, ['cork'], {'signal': 100.0}, speed_m_s=0.05)
+    >>> [slide] = dataset.samples('signal')
+    >>> slide.surface, slide.windows(count=50).samples.shape
+    ('cork', (50, 1))
     """
 
     slide: LabelledSlide

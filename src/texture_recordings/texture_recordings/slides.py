@@ -53,6 +53,12 @@ class LabelledSlide:
         Batches of each topic in the order of time; empty if only the places of the slides were read.
     states
         Exploration states, in the order of time.
+
+    Examples
+    --------
+    >>> slide = LabelledSlide(Path('monday.mcap'), 'id', 'cork', number=3, start_ns=0, stop_ns=None)
+    >>> slide.name, slide.session
+    ('cork/3', 'monday')
     """
 
     bag: Path

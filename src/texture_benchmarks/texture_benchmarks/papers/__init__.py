@@ -37,6 +37,20 @@ def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult,
 def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[ExperimentResult, Path]:
     """Run one experiment with so many seeds from its own on; return what `run_experiment` does.
 
+    Parameters
+    ----------
+    name
+        Name of the experiment.
+    experiment
+        First seed, folder and options.
+    count
+        Number of seeds.
+
+    Returns
+    -------
+    (ExperimentResult, Path)
+        Means and intervals over the seeds, and the file they are in.
+
     Raises
     ------
     TextureError

@@ -29,6 +29,22 @@ def over_seeds(run: Run, name: str, experiment: Experiment, count: int) -> Exper
     our own recipes, and kept in the folder `seeds`. What is there already, with the recipes as they are now, is not run
     again.
 
+    Parameters
+    ----------
+    run
+        Runs the experiment with one seed.
+    name
+        Name of the experiment.
+    experiment
+        First seed, folder and options.
+    count
+        Number of seeds, at least 2.
+
+    Returns
+    -------
+    ExperimentResult
+        That of the first seed, with means and intervals over all.
+
     Raises
     ------
     InvalidParameter

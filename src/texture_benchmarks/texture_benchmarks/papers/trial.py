@@ -100,6 +100,8 @@ def of_task(
         Whether fewer slides will do.
     tuned
         Recipes that were searched for.
+    splits
+        Number of splits that are run; 0 for all.
 
     Yields
     ------

@@ -85,6 +85,12 @@ class SoftVote:
 
     Independent windows would count as their number n. Windows of one slide share force, place and contact, and count
     as n^tempering_exponent; the exponent is fitted on held-out slides.
+
+    Examples
+    --------
+    >>> mean = np.log(np.array([0.8, 0.2]))
+    >>> SoftVote().posterior(mean, effective_windows=2.0, tempering_exponent=1.0).round(3).tolist()  # 0.8² : 0.2²
+    [0.941, 0.059]
     """
 
     group: ClassVar[int] = 0
@@ -111,6 +117,13 @@ class MajorityVote:
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section IV.B: a scan of 500 ms is cut
     into five parts, and the answer that at least three of them give is the answer.
+
+    Examples
+    --------
+    >>> rule = MajorityVote(share=0.6, windows=5)
+    >>> votes = rule.window_evidence(np.log(np.array([[0.9, 0.1], [0.8, 0.2], [0.7, 0.3], [0.2, 0.8]])))
+    >>> rule.posterior(votes.mean(axis=0), effective_windows=4.0, tempering_exponent=1.0).round(2).tolist()
+    [0.75, 0.25]
     """
 
     share: float = param(
@@ -169,6 +182,14 @@ class GroupedEvidence:
         Length of the evidence of a window.
     group
         Windows of a group; 0 sums over all.
+
+    Examples
+    --------
+    >>> grouped = GroupedEvidence(n_labels=2, group=2)
+    >>> for vote in ([1.0, 0.0], [1.0, 0.0], [0.0, 1.0]):
+    ...     grouped.add(np.array(vote), new_s=0.1)
+    >>> grouped.mean.tolist(), grouped.time_s  # the second group is not complete yet
+    ([1.0, 0.0], 0.2)
     """
 
     def __init__(self, n_labels: int, group: int = 0) -> None:
@@ -176,7 +197,15 @@ class GroupedEvidence:
         self._newest = self._decides = _Sum(np.zeros(n_labels))
 
     def add(self, evidence: Array, new_s: float) -> None:
-        """Add the evidence of a window, (n_labels,), which adds so much new sliding time."""
+        """Add the evidence of a window, (n_labels,), which adds so much new sliding time.
+
+        Parameters
+        ----------
+        evidence : (n_labels,)
+            Evidence of the window.
+        new_s
+            Sliding time that no window before it covers.
+        """
         if self._group and self._newest.count == self._group:
             self._newest = _Sum(np.zeros(len(evidence)))
         self._newest.evidence += evidence

@@ -41,6 +41,12 @@ class SlideTrace:
         Of its novelty; (n_windows, 0) where none were computed.
     disturbance
         Kind of the disturbance; '' for none.
+
+    Examples
+    --------
+    >>> trace = SlideTrace(0, np.log([[0.7, 0.3], [0.8, 0.2]]), np.array([1.0, 1.2]), np.zeros((2, 0)))
+    >>> bool((trace.means.argmax(axis=1) == trace.truth).all())
+    True
     """
 
     truth: int

@@ -49,6 +49,13 @@ class RandomFourierFeatures:
     hidden : (n_features, n_hidden)
     hidden_offset : (n_hidden,)
         Of the network; n_hidden 0 without one.
+
+    Examples
+    --------
+    >>> random_features = RandomFourierFeatures.over(np.arange(10.0)[:, None], None)
+    >>> features = random_features(np.array([2.0]))
+    >>> features.shape == (COSINES + 1,), features[-1].item()
+    (True, 1.0)
     """
 
     cosines: Array
@@ -102,6 +109,15 @@ class RidgePredictor:
         Predictor of the training, for the first labels.
     kept : (n_kept,)
         Numbers of the labels for which it is used.
+
+    Examples
+    --------
+    >>> values = np.repeat([0.0, 1.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((20, 1))
+    >>> codes, slides = np.repeat([0, 1], 10), np.repeat(np.arange(4), 5)
+    >>> trained = lambda rows: log_softmax(np.concatenate([-(rows**2), -((rows - 1.0) ** 2)], axis=-1))
+    >>> classifier = RidgeClassifier(values, codes, slides, trained=trained)
+    >>> isinstance(classifier.predictor, RidgePredictor), classifier.predictor(values).shape
+    (True, (20, 2))
     """
 
     random_features: RandomFourierFeatures
@@ -133,6 +149,16 @@ class RidgeClassifier:
         Predictor of their labels from the training.
     parameters
         Of the network that was trained on them, or None.
+
+    Examples
+    --------
+    >>> values = np.repeat([0.0, 1.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((20, 1))
+    >>> codes, slides = np.repeat([0, 1], 10), np.repeat(np.arange(4), 5)
+    >>> trained = lambda rows: log_softmax(np.concatenate([-(rows**2), -((rows - 1.0) ** 2)], axis=-1))
+    >>> classifier = RidgeClassifier(values, codes, slides, trained=trained)
+    >>> classifier.set_examples(2, np.full((5, 1), 3.0))  # a third label
+    >>> classifier.predictor(np.array([[0.0], [1.0], [3.0]])).argmax(axis=1).tolist()
+    [0, 1, 2]
     """
 
     def __init__(

@@ -23,6 +23,12 @@ class TrainingExamples:
     values : (n, n_features) float32
     codes, slides : (n,)
         Number of the label, 0…, and of the slide of each.
+
+    Examples
+    --------
+    >>> examples = TrainingExamples.of(np.arange(4.0)[:, None], np.array([0, 0, 1, 1]), np.arange(4))
+    >>> examples.of_label(1).tolist()
+    [[2.0], [3.0]]
     """
 
     values: NDArray[np.float32]

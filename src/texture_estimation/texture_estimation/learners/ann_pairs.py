@@ -31,6 +31,16 @@ class AnnPairs:
     Trained by the Levenberg-Marquardt method with early stopping on every seventh slide, as MATLAB does by default.
 
     Source: Roberge et al., "Textures recognition through tactile exploration", section III.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = AnnPairs().fit(values, codes, groups)
+    >>> predictor = AnnPairs.predictor(fitted.parameters)
+    >>> isinstance(predictor, PairNetworksPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     hidden: int = param(

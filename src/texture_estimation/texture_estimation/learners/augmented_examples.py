@@ -36,6 +36,15 @@ class AugmentedExamples:
         Number of each of these.
     augmentation
         Ranges and shares.
+
+    Examples
+    --------
+    >>> nothing = np.zeros((0, 2), dtype=np.float32)
+    >>> none = np.zeros(0, dtype=np.intp)
+    >>> zeros, slides = np.zeros((2, 2)), np.arange(2)
+    >>> augmented = AugmentedExamples(nothing, none, none, none, zeros[0], zeros, slides, Augmentation())
+    >>> augmented.without(np.array([1])).slides.tolist()
+    [0]
     """
 
     values: Inputs
@@ -71,6 +80,19 @@ class AugmentedBatches:
         What is drawn besides.
     mean, scale : (n_features,)
         Of the standardisation.
+
+    Examples
+    --------
+    >>> inputs = np.ones((4, 2), dtype=np.float32)
+    >>> none = np.zeros(0, dtype=np.intp)
+    >>> changes = Augmentation(gain_probability=0.0, slide_jitter=0.0, clean_share=1.0)
+    >>> zeros, slides = np.zeros((2, 2)), np.arange(2)
+    >>> augmented = AugmentedExamples(inputs[:0], none, none, none, zeros[0], zeros, slides, changes)
+    >>> rng = np.random.default_rng(0)
+    >>> batches = AugmentedBatches(inputs, np.arange(4) // 2, augmented, rng, mean=zeros[0], scale=np.ones(2))
+    >>> drawn, codes = batches.draw(3)
+    >>> drawn.shape, codes.shape
+    ((3, 2), (3,))
     """
 
     def __init__(

@@ -25,6 +25,16 @@ class EmMixture:
     A label that no cluster is named after is never recognised.
 
     Source: Kaboli et al. 2015, section V.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = EmMixture().fit(values, codes, groups)
+    >>> predictor = EmMixture.predictor(fitted.parameters)
+    >>> isinstance(predictor, MixturePredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     clusters_per_label: int = param(

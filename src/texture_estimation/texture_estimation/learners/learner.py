@@ -60,6 +60,13 @@ class FoldFit:
         Numbers of the slides that it has not seen.
     parameters
         As in the model file, calibrated like the final ones.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> fold = FoldFit(held_out=np.array([3]), parameters={'mean': 0.0})  # learnt without slide 3
+    >>> fold.held_out.tolist()
+    [3]
     """
 
     held_out: Codes
@@ -80,6 +87,12 @@ class Fitted:
         How the probabilities were calibrated, in words for the model's card.
     folds
         What the learner has learnt without each part of the slides; () if it does not say.
+
+    Examples
+    --------
+    >>> fitted = Fitted({'mean': 0.0}, held_out=None, note='not calibrated')
+    >>> fitted.folds
+    ()
     """
 
     parameters: Mapping[str, Any]

@@ -35,6 +35,16 @@ class Mlp:
     hardly with the labels. Noise on the standardised inputs takes the place of an early stop (Bishop 1995).
 
     Source: Adam of Kingma & Ba 2015 with a rate that falls like a cosine; one temperature (Guo et al. 2017).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = Mlp().fit(values, codes, groups)
+    >>> predictor = Mlp.predictor(fitted.parameters)
+    >>> isinstance(predictor, MlpPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     hidden: int = param(

@@ -23,6 +23,16 @@ class NaiveBayes:
     """Each feature is distributed for each label independently of the others.
 
     Source: Jamali & Sammut 2010, section IV.B.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = NaiveBayes().fit(values, codes, groups)
+    >>> predictor = NaiveBayes.predictor(fitted.parameters)
+    >>> isinstance(predictor, GaussianNaiveBayesPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     smoothing: float = param(
@@ -130,6 +140,13 @@ class HistogramNaiveBayesPredictor:
         Ascending.
     log_shares : (n_features, n_bins, n_labels)
     log_priors : (n_labels,)
+
+    Examples
+    --------
+    >>> edges, shares = np.array([[0.5]]), np.array([[[0.9, 0.2], [0.1, 0.8]]])  # below and above ½, for two labels
+    >>> predictor = HistogramNaiveBayesPredictor(edges, np.log(shares), np.log([0.5, 0.5]))
+    >>> np.exp(predictor(np.array([0.3]))).round(2).tolist()  # 0.9 : 0.2
+    [0.82, 0.18]
     """
 
     edges: Array

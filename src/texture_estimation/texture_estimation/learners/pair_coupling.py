@@ -34,6 +34,12 @@ class PairCoupling:
         Pairs in the order (0, 1), (0, 2), …, (1, 2), …; a positive decision value speaks for the first.
     temperature
         Above 1: the probabilities are drawn together.
+
+    Examples
+    --------
+    >>> coupling = PairCoupling(2, slopes=np.array([2.0]), offsets=np.array([0.0]), temperature=1.0)
+    >>> np.exp(coupling(np.array([0.5]))).round(3).tolist()  # 1 / (1 + exp(-2 · 0.5))
+    [0.731, 0.269]
     """
 
     n_labels: int

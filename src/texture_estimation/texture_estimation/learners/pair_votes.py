@@ -21,6 +21,12 @@ class PairVotes:
     ----------
     n_labels
         At least 2.
+
+    Examples
+    --------
+    >>> votes = PairVotes(3)  # pairs (0, 1), (0, 2), (1, 2)
+    >>> votes.won(np.array([True, True, False])).tolist()
+    [2.0, 0.0, 1.0]
     """
 
     n_labels: int

@@ -24,6 +24,16 @@ class PassiveAggressive:
 
     Source: Crammer et al. 2006, PA-I: section 4 (one label against the others), section 8 (all labels together);
     Kaboli et al. 2015, section V.B.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = PassiveAggressive().fit(values, codes, groups)
+    >>> predictor = PassiveAggressive.predictor(fitted.parameters)
+    >>> isinstance(predictor, LinearPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
@@ -64,6 +74,13 @@ class OnlineLinearClassifier:
         Weights, and the bias last.
     c
         How far one example may move a plane.
+
+    Examples
+    --------
+    >>> online = OnlineLinearClassifier(np.zeros((2, 2)))
+    >>> online.update(np.array([1.0]), code=0)
+    >>> online.planes.tolist()  # both planes are now at a distance of 1 from it
+    [[0.5, 0.5], [-0.5, -0.5]]
     """
 
     planes: Array
@@ -97,6 +114,13 @@ class CrammerSingerClassifier:
         Weights, and the bias last.
     c
         How far one example may move a plane.
+
+    Examples
+    --------
+    >>> online = CrammerSingerClassifier(np.zeros((2, 2)))
+    >>> online.update(np.array([1.0]), code=0)
+    >>> (online.planes @ [1.0, 1.0]).tolist()  # the true label scores higher by 1
+    [0.5, -0.5]
     """
 
     planes: Array

@@ -172,6 +172,16 @@ class SklearnPredictor:
         Number of labels, of which the estimator may lack some.
     temperature
         Divisor of the logarithms.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> learner = SklearnLearner('sklearn.linear_model:LogisticRegression')
+    >>> predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
+    >>> isinstance(predictor, SklearnPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     estimator: Any

@@ -28,6 +28,16 @@ class SvmLinear:
     of those that tie. No slide is on both sides of a split.
 
     Source: Kaboli et al. 2015, section V.A: 5 folds, 10 repeats, 20 values.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = SvmLinear(repeats=1).fit(values, codes, groups)
+    >>> predictor = SvmLinear.predictor(fitted.parameters)
+    >>> isinstance(predictor, LinearPairsPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     folds: int = param(5, 'Sets the number of cross-validation folds; more folds take longer to train.', low=2, high=50)

@@ -28,6 +28,16 @@ class SvmMaxWins:
     The label that wins most pairs is taken; ties are broken by the clearer decisions.
 
     Source: Hu et al. 2014, section 4: 99 % of the variance, for each of two directions, joined.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = SvmMaxWins().fit(values, codes, groups)
+    >>> predictor = SvmMaxWins.predictor(fitted.parameters)
+    >>> isinstance(predictor, PcaSvmPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     variance: float = param(

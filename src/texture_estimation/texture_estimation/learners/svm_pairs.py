@@ -27,6 +27,16 @@ class SvmPairs:
     The kernel is exp(-|x - s|² / kernel_scale²), MATLAB's sense of the scale: gamma = 1 / kernel_scale².
 
     Source: Roberge et al., "Textures recognition through tactile exploration", sections III.C and IV.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = SvmPairs().fit(values, codes, groups)
+    >>> predictor = SvmPairs.predictor(fitted.parameters)
+    >>> isinstance(predictor, SvmPairsPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
     """
 
     box_constraint: float = param(

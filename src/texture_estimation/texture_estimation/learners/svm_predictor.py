@@ -33,6 +33,20 @@ class SvmPredictor:
         Of the kernel exp(-gamma |x - s|²).
     coupling
         From decision values to probabilities.
+
+    Examples
+    --------
+    >>> from sklearn.preprocessing import StandardScaler
+    >>> from sklearn.svm import SVC
+    >>> from texture_estimation.learners.pair_coupling import uncalibrated
+    >>> values, codes = np.random.default_rng(0).standard_normal((30, 2)), np.arange(30) % 3
+    >>> scaler = StandardScaler().fit(values)
+    >>> svc = SVC(gamma=0.5, decision_function_shape='ovo').fit(scaler.transform(values), codes)
+    >>> predictor = export(scaler, svc, uncalibrated(3))
+    >>> isinstance(predictor, SvmPredictor)
+    True
+    >>> np.allclose(predictor.decisions(values), svc.decision_function(scaler.transform(values)))
+    True
     """
 
     mean: Array

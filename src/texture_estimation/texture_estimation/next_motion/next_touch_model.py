@@ -41,6 +41,13 @@ class ClassConditionalGaussian:
     Parameters
     ----------
     means : (n_textures, n_axes)
+
+    Examples
+    --------
+    >>> alike, apart = (ClassConditionalGaussian(np.array([[0.0], [distance]])) for distance in (0.0, 100.0))
+    >>> prior = np.log([0.5, 0.5])
+    >>> round(alike.least_information(prior), 3), round(apart.least_information(prior), 3)  # nothing, and log 2
+    (0.0, 0.693)
     """
 
     means: Array
@@ -117,6 +124,18 @@ class NextTouchModel:
         slide of one texture under one motion has the covariance 1.
     gaussians
         Class-conditional Gaussians of each motion.
+
+    Examples
+    --------
+    >>> across, along = (SlideMotion('linear_slide', angle_rad, 0.05, 1.0, 1.0) for angle_rad in (0.0, 1.57))
+    >>> rng = np.random.default_rng(0)
+    >>> textures, motions = ['cork', 'felt'] * 20, [across, across, along, along] * 10
+    >>> differs = np.array([t == 'felt' and m is across for t, m in zip(textures, motions)])  # only across the ridges
+    >>> values = 2.0 * differs[:, None] + 0.1 * rng.standard_normal((40, 1))
+    >>> model = NextTouchModel.fit(values, textures, motions)
+    >>> touch = model.best_motion(model.uniform_log_prior, [across, along])
+    >>> isinstance(touch, NextTouch), touch.motion.direction_rad
+    (True, 0.0)
     """
 
     textures: tuple[str, ...]

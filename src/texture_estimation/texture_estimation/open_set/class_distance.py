@@ -39,6 +39,15 @@ class ClassDistance:
         Number of the class of each, ascending.
     centre, weights : (n_directions,)
         Mean of the classes, projected, and one over the variance about it.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> classes = np.repeat([0, 1], 10)
+    >>> means = 5.0 * classes[:, None] + 0.1 * rng.standard_normal((20, 2))
+    >>> distance = ClassDistance.fit(means, classes)
+    >>> distance.score(np.array([0.0, 0.0]), 0) < distance.score(np.array([0.0, 0.0]), 1)
+    True
     """
 
     projection: Array

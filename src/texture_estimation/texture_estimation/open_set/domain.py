@@ -34,6 +34,11 @@ class DomainMargins:
         Largest angle to a direction of the training.
     level
         Relative margin of the signal level.
+
+    Examples
+    --------
+    >>> DomainMargins(speed=0.2).speed
+    0.2
     """
 
     speed: float = 0.15

@@ -49,6 +49,14 @@ class NoveltyDetector:
         Largest novelty score of known surfaces at the false rejection rate: of all scores, and of the distances alone.
     distances_only
         Whether the distances alone count: the other scores of an incremental classifier are of another size.
+
+    Examples
+    --------
+    >>> held_out = [np.random.default_rng(0).standard_normal((99, 3))] * len(EFFECTIVE_WINDOWS)
+    >>> detector = NoveltyDetector.fit({}, held_out, false_rejection_rate=0.1)
+    >>> scores = [detector.novelty_score(row.tolist(), 1.0) for row in held_out[0]]
+    >>> sum(score > detector.threshold(1.0) for score in scores) <= 10  # of 99
+    True
     """
 
     distances: Mapping[str, ClassDistance]
@@ -186,6 +194,17 @@ class SlideNovelty:
         By space, as in `NoveltyDetector`.
     n_labels
         Number of labels of the classifier.
+
+    Examples
+    --------
+    >>> classes = np.repeat([0, 1], 10)
+    >>> means = 5.0 * classes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((20, 2))
+    >>> distances = {'features': ClassDistance.fit(means, classes)}
+    >>> novelty = SlideNovelty(distances, n_labels=2)
+    >>> novelty.add(np.array([5.0, 5.0]), None, label=1, effective_windows=1.0)
+    >>> own, other = novelty.scores(1, log_odds=1.0), novelty.scores(0, log_odds=1.0)
+    >>> len(own) == len(other)
+    True
     """
 
     def __init__(self, distances: Mapping[str, ClassDistance], n_labels: int) -> None:

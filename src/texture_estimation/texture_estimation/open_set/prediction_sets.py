@@ -29,6 +29,12 @@ class PredictionSets:
     effective_window_counts, thresholds
         Effective window count, and the smallest probability of a texture in the set; empty if the held-out slides were
         too few for the coverage.
+
+    Examples
+    --------
+    >>> sets = PredictionSets(0.9, effective_window_counts=(1.0,), thresholds=(0.15,))
+    >>> sets.members(np.array([0.2, 0.7, 0.1]), effective_windows=1.0)
+    [1, 0]
     """
 
     coverage: float = 0.95

@@ -36,6 +36,12 @@ class StoppingRule:
         Effective window count at which a slide is stopped whatever the confidence.
     novelty_score
         Largest novelty score at which a slide is stopped.
+
+    Examples
+    --------
+    >>> rule = StoppingRule(confidence=0.95, max_windows=10.0)
+    >>> rule.certain(0.9, 2.0), rule.certain(0.96, 2.0), rule.certain(0.5, 10.0)
+    (False, True, True)
     """
 
     confidence: float = 0.95
@@ -80,6 +86,13 @@ class SlideCourse:
         0 without a novelty detector.
     disturbance
         Kind of the disturbance; '' for none.
+
+    Examples
+    --------
+    >>> right = np.array([False, True])
+    >>> course = SlideCourse(np.array([0.6, 0.99]), right, np.array([1.0, 1.2]), np.array([True, True]), np.zeros(2))
+    >>> fit_open_set_rule([course] * 30, wrong=0.02).certain(0.99, 1.2)
+    True
     """
 
     confidences: Array

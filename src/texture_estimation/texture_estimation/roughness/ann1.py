@@ -24,6 +24,15 @@ class Ann1:
     `transfer` gives either.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
+    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
+    >>> predictor = Ann1.predictor(Ann1().fit(values, grades, textures))
+    >>> isinstance(predictor, NetworkRegressorPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    (True, True)
     """
 
     hidden: int = param(

@@ -18,7 +18,14 @@ STICK_SLIP, LEVEL = 'peak_to_median_power', 'log_variance'
 
 @dataclass(frozen=True)
 class CheckParams:
-    """What makes a window unusable; both margins are beyond what was met in the training."""
+    """What makes a window unusable; both margins are beyond what was met in the training.
+
+    Examples
+    --------
+    >>> checks = Checks(CheckParams(min_force_n=0.1), ('mean',), {})
+    >>> 'force' in checks.refusal(FeatureVector(0, 'a', 0.5, 0.1, ('mean',), np.zeros(1), force_n=0.01))
+    True
+    """
 
     min_force_n: float = param(0.05, 'Smallest force that counts as contact.', unit='N', low=0.0, high=100.0)
     stick_slip_margin: float = param(

@@ -27,6 +27,24 @@ class RoughnessAccumulator:
     ----------
     model
         What grades each window; None answers the end of every slide with a sentence that no model is loaded.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texture_estimation.roughness.recipe import RoughnessRecipe
+    >>> from texture_estimation.roughness.training import train_grades
+    >>> from texture_estimation.roughness.grades import Grades
+    >>> from texture_features.labelled_features import LabelledFeatures
+    >>> inputs = {'signal': {'features': ['mean']}}
+    >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
+    >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
+    >>> values = np.repeat([1.0, 2.0, 3.0, 4.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> examples = LabelledFeatures(values, labels, np.char.add(labels, '/1'), ('signal/mean',), 'a1', 0.5, 0.1)
+    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 3.0, 'jute': 4.0}))
+    >>> grader = RoughnessAccumulator(model)
+    >>> window = FeatureVector(0, 'slide', 0.5, 0.1, ('signal/mean',), np.array([2.0]), feature_set='a1')
+    >>> abs(grader.update(window).grade - 2.0) < 0.5
+    True
     """
 
     def __init__(self, model: RoughnessModel | None) -> None:

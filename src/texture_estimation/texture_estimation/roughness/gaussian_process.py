@@ -33,6 +33,15 @@ class GaussianProcess:
     maximise the marginal likelihood times a wide prior.
 
     Source: Rasmussen & Williams 2006, sections 2.2 and 5.4.1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
+    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
+    >>> predictor = GaussianProcess.predictor(GaussianProcess().fit(values, grades, textures))
+    >>> isinstance(predictor, GaussianProcessPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    (True, True)
     """
 
     curved: bool = param(True, 'Whether a nonlinear (RBF) term is added; false: Bayesian linear regression.')

@@ -31,6 +31,12 @@ class Grades:
         From 1 (smooth) to 5 (rough), by texture.
     splits
         'train' or 'test', by texture; empty if the table does not say.
+
+    Examples
+    --------
+    >>> grades = Grades({'silk': 1.2, 'jute': 4.6}, {'silk': 'train', 'jute': 'test'})
+    >>> grades.of('jute'), grades.used_for('train')
+    (4.6, ('silk',))
     """
 
     grades: Mapping[str, float]

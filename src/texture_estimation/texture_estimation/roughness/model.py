@@ -33,6 +33,12 @@ class Calibration:
         Standard deviation, in grades, of what the regressor does not know of.
     within_std
         Standard deviation of the windows of one texture around their mean, in grades.
+
+    Examples
+    --------
+    >>> calibration = Calibration(scale=2.0, within_std=0.3)
+    >>> float(calibration.window_std(np.array(0.2))).__round__(2)  # √((2 · 0.2)² + 0.3²)
+    0.5
     """
 
     scale: float = 1.0
@@ -93,6 +99,22 @@ class RoughnessModel:
         Of the training textures.
     training
         Facts about the training, for the card.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texture_estimation.roughness.recipe import RoughnessRecipe
+    >>> from texture_estimation.roughness.training import train_grades
+    >>> from texture_estimation.roughness.grades import Grades
+    >>> from texture_features.labelled_features import LabelledFeatures
+    >>> inputs = {'signal': {'features': ['mean']}}
+    >>> recipe = RoughnessRecipe.from_mapping({'inputs': inputs, 'regressor': 'gaussian_process'}, 'tiny')
+    >>> labels = np.repeat(['silk', 'felt', 'cork', 'jute'], 10)
+    >>> values = np.repeat([1.0, 2.0, 3.0, 4.0], 10)[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))
+    >>> examples = LabelledFeatures(values, labels, np.char.add(labels, '/1'), ('signal/mean',), 'a1', 0.5, 0.1)
+    >>> model = train_grades(recipe, examples, Grades({'silk': 1.0, 'felt': 2.0, 'cork': 3.0, 'jute': 4.0}))
+    >>> abs(float(model.grade(np.array([2.0]))[0]) - 2.0) < 0.5
+    True
     """
 
     name: str

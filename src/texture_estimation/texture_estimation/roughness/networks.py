@@ -30,6 +30,13 @@ class RegressionNetworks:
     out_bias : (n_networks,)
     linear : ()
         Whether the hidden layers are linear, not sigmoid.
+
+    Examples
+    --------
+    >>> zero, one = np.zeros(1), np.ones(1)
+    >>> networks = RegressionNetworks(zero, one, one[None], zero, one[None], zero)
+    >>> networks(np.array([[0.5]])).round(3).tolist()  # tanh(0.5)
+    [[0.462]]
     """
 
     mean: Array

@@ -49,7 +49,14 @@ class CalibrationParams(TrainingParams):
 
 @dataclass(frozen=True)
 class RoughnessRecipe:
-    """What turns a signal into a grade, before any training."""
+    """What turns a signal into a grade, before any training.
+
+    Examples
+    --------
+    >>> recipe = RoughnessRecipe.from_mapping({'inputs': {'signal': {'features': ['hjorth']}}}, 'mine')
+    >>> recipe.training == CalibrationParams(), recipe.evidence == EvidenceParams()
+    (True, True)
+    """
 
     name: str
     feature_set: FeatureSet

@@ -21,6 +21,15 @@ class Svm5:
     """An RBF machine for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
 
     Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
+    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
+    >>> predictor = Svm5.predictor(Svm5().fit(values, grades, textures))
+    >>> isinstance(predictor, VotingSvmsPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    (True, True)
     """
 
     c: float = param(

@@ -25,7 +25,14 @@ SCALES = (0.05, 20.0)
 
 @dataclass(frozen=True, eq=False)
 class HeldOutGrades:
-    """What a regressor says of windows of textures that it has not seen, (n,) each; NaN where it gives no grade."""
+    """What a regressor says of windows of textures that it has not seen, (n,) each; NaN where it gives no grade.
+
+    Examples
+    --------
+    >>> held = HeldOutGrades(np.array([1.0, 2.0, np.nan]), np.ones(3), np.ones(3), np.array([0, 0, 1]))
+    >>> held.graded.grades.tolist()
+    [1.0, 2.0]
+    """
 
     grades: Array
     stds: Array

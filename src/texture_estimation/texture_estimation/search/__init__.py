@@ -9,11 +9,13 @@ Four things make a search, and any of them may be another one:
 the grades come.
 - `ParallelMap`: where the work is done. `serial_map`, `threaded_map()`, `dask_map(address)`.
 
->>> space = RecipeSpace.load('ets-roughness-svm5', load_roughness_recipe('ets-roughness-svm5'))
->>> task = RoughnessTask(read_grades('ets_roughness'))
->>> with threaded_map() as parallel_map:
-...     found = optimise(space, SearchSlides(scans), SearchParams(), task, parallel_map=parallel_map)
->>> found.best.recipe, found.best.fitness  # a RoughnessRecipe, evaluated by its own regressor on every half
+From slides as plain arrays, `scans`, to a recipe::
+
+    space = RecipeSpace.load('ets-roughness-svm5', load_roughness_recipe('ets-roughness-svm5'))
+    task = RoughnessTask(read_grades('ets_roughness'))
+    with threaded_map() as parallel_map:
+        found = optimise(space, SearchSlides(scans), SearchParams(), task, parallel_map=parallel_map)
+    found.best.recipe, found.best.fitness  # a RoughnessRecipe, evaluated by its own regressor on every half
 
 A learner or regressor without a quick surrogate in `surrogates/catalogue.py` is evaluated by itself.
 """

@@ -28,7 +28,16 @@ Config.warnings['not_compiled'] = False
 
 
 class Snap(Repair):  # type: ignore[misc]
-    """Bring points to the middles of their cells, so that equal individuals are known as such."""
+    """Bring points to the middles of their cells, so that equal individuals are known as such.
+
+    Examples
+    --------
+    >>> from pymoo.core.population import Population
+    >>> from texture_estimation.search.variables import Integer
+    >>> space = SearchSpace({'bands': Integer(1, 2)})
+    >>> Snap(space).do(None, Population.new(X=np.array([[0.1], [0.4]]))).get('X').tolist()  # both mean 1 band
+    [[0.25], [0.25]]
+    """
 
     def __init__(self, space: SearchSpace) -> None:
         super().__init__()

@@ -17,7 +17,15 @@ from texture_features.feature_set import FeatureSet
 
 @dataclass(frozen=True)
 class ClassificationTask:
-    """What is counted is right decisions; see `texture_estimation.search.search_task.SearchTask`."""
+    """What is counted is right decisions; see `texture_estimation.search.search_task.SearchTask`.
+
+    Examples
+    --------
+    >>> from texture_estimation.recipe import Recipe
+    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}}, 'mine')
+    >>> ClassificationTask().feature_set_of(recipe).topics
+    ('signal',)
+    """
 
     def feature_set_of(self, recipe: Recipe) -> FeatureSet:
         """Return the feature set with the windows that `train` is trained on."""

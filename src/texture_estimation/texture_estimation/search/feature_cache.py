@@ -35,6 +35,17 @@ class FeatureCache:
         Gives the windows.
     most_peaks
         Largest number of spectral peaks that will be asked for.
+
+    Examples
+    --------
+    >>> from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
+    >>> samples = np.random.default_rng(0).standard_normal((8, 50, 1)) * np.repeat([1.0, 9.0], 4)[:, None, None]
+    >>> labels = np.repeat(['cork', 'felt'], 4)
+    >>> slides = SlideArrays({'signal': ArrayStream(samples, 100.0)}, labels, np.full(8, 0.05), np.ones(8))
+    >>> inputs = {'signal': {'features': ['log_variance']}}
+    >>> features = FeatureSet.from_mapping({'windows': {'length_s': 0.5}, 'inputs': inputs})
+    >>> FeatureCache(slides).values(features).shape
+    (8, 1)
     """
 
     def __init__(self, cut: Cut, most_peaks: int = 15) -> None:

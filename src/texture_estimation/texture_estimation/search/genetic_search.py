@@ -22,7 +22,13 @@ FIRST_LOOK = 4
 
 @dataclass(frozen=True)
 class SearchParams:
-    """How long and for what is searched; the defaults are those of Roberge et al."""
+    """How long and for what is searched; the defaults are those of Roberge et al.
+
+    Examples
+    --------
+    >>> SearchParams(population=10).population
+    10
+    """
 
     population: int = param(
         20, 'Sets the number of individuals in a generation; more search wider and take longer.', low=4, high=1000
@@ -47,7 +53,15 @@ class SearchParams:
 
 @dataclass(frozen=True)
 class ScoredIndividual:
-    """An individual with its fitness (larger is better), its cost and the number of halves behind the fitness."""
+    """An individual with its fitness (larger is better), its cost and the number of halves behind the fitness.
+
+    Examples
+    --------
+    >>> best = ScoredIndividual((3, 'svm'), fitness=0.9, cost=1e4, halves=20)
+    >>> generation = Generation(1, of=30, best=best, evaluated=20, cache_hits=0, halves=20)
+    >>> SearchOutcome((best,), (best,), (generation,)).ranked[0].individual
+    (3, 'svm')
+    """
 
     individual: Individual
     fitness: float

@@ -27,6 +27,15 @@ class LabelledWindows:
         Topic → windows with samples (n, n_samples, n_channels), speed and force.
     labels, groups : (n,) of text
         Surface and slide of each window.
+
+    Examples
+    --------
+    >>> batch = WindowBatch(np.zeros((3, 50, 1)), 100.0, np.full(3, 0.05), np.ones(3))
+    >>> labels, groups = np.array(['cork', 'felt', 'felt']), np.array(['a', 'b', 'b'])
+    >>> windows = LabelledWindows({'signal': batch}, labels, groups)
+    >>> some, chosen = windows.of(['felt'])
+    >>> some.labels.tolist(), chosen.tolist()
+    (['felt', 'felt'], [False, True, True])
     """
 
     inputs: Mapping[str, WindowBatch]

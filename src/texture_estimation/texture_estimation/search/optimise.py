@@ -36,6 +36,13 @@ class Finalist(Generic[R]):
         Score and cost in the search.
     record
         Learning and test accuracy on each half, by the learner itself.
+
+    Examples
+    --------
+    >>> from texture_estimation.search.genetic_search import ScoredIndividual
+    >>> finalist = Finalist('a recipe', ScoredIndividual((3,), 0.9, 0.0, 2), HalfScores.of([(1.0, 0.8), (1.0, 0.6)]))
+    >>> round(finalist.fitness, 3)
+    0.85
     """
 
     recipe: R
@@ -62,6 +69,14 @@ class SearchResult(Generic[R]):
         What the search says of its last generation.
     score_cache
         All scores.
+
+    Examples
+    --------
+    >>> from texture_estimation.search.genetic_search import ScoredIndividual
+    >>> one = ScoredIndividual((3,), 0.9, 0.0, 1)
+    >>> finalist = Finalist('a recipe', one, HalfScores.of([(1.0, 0.8)]))
+    >>> SearchResult(finalist, (finalist,), SearchOutcome((one,), (one,), ()), ScoreCache({})).best.recipe
+    'a recipe'
     """
 
     best: Finalist[R]

@@ -37,6 +37,12 @@ class PairSearchResult:
         The search of each pair.
     record
         Learning and test accuracy of the most pairs won, over all surfaces, on each half.
+
+    Examples
+    --------
+    >>> from texture_estimation.search.racing import HalfScores
+    >>> round(PairSearchResult({}, HalfScores.of([(1.0, 0.8), (1.0, 0.6)])).fitness, 3)
+    0.85
     """
 
     by_pair: Mapping[Pair, SearchResult[Recipe]]

@@ -30,7 +30,14 @@ class FitnessFunction(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class HalfScores:
-    """Learning and test scores on the first halves, (n_done,) each; fewer than all if the individual lost."""
+    """Learning and test scores on the first halves, (n_done,) each; fewer than all if the individual lost.
+
+    Examples
+    --------
+    >>> scores = HalfScores.of([(1.0, 0.8), (0.9, 0.7)])
+    >>> scores.halves, scores.means.round(2).tolist()
+    (2, [0.9, 0.8])
+    """
 
     learning: Array
     test: Array

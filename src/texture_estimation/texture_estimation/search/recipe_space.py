@@ -22,7 +22,15 @@ PACKAGE, FOLDER = 'texture_estimation', 'config/search'
 
 @dataclass(frozen=True)
 class Edit:
-    """One change of a recipe: `path` ('inputs/signal/features/force') is set to a value, used, or dropped."""
+    """One change of a recipe: `path` ('inputs/signal/features/force') is set to a value, used, or dropped.
+
+    Examples
+    --------
+    >>> recipe = {'windows': {'length_s': 0.5}}
+    >>> Edit('set', ('windows', 'length_s'), 1.0).apply(recipe)
+    >>> recipe
+    {'windows': {'length_s': 1.0}}
+    """
 
     action: str
     path: tuple[str, ...]
@@ -55,6 +63,13 @@ class Axis:
         What is set to the value; () if `edits` tell.
     edits
         For each option of a choice.
+
+    Examples
+    --------
+    >>> from texture_estimation.search.variables import Integer
+    >>> [edit] = Axis(Integer(1, 5), ('learner', 'folds')).edits_for(3)
+    >>> edit.path, edit.value
+    (('learner', 'folds'), 3)
     """
 
     variable: Variable
@@ -72,8 +87,11 @@ class RecipeSpace(Generic[R]):
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from texture_estimation.recipe import load_recipe
     >>> space = RecipeSpace.load('ets-svm', load_recipe('ets-linear-svm'))
-    >>> space.recipe(space.variables.decode(np.full(len(space.variables.names), 0.5)))
+    >>> space.recipe(space.variables.decode(np.full(len(space.variables.names), 0.5))).learner_name
+    'svm_pairs'
     """
 
     base: R

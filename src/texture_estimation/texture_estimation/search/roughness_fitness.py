@@ -34,6 +34,18 @@ class RoughnessFitness:
     grades, textures : (n,)
         Grade by people, and number of the texture.
     halves : (n_halves, n)
+
+    Examples
+    --------
+    >>> from texture_estimation.roughness.gaussian_process import GaussianProcess
+    >>> from texture_estimation.search.surrogates.exact_regressor import exact_grades
+    >>> textures = np.repeat(np.arange(4), 4)
+    >>> grades = 1.0 + textures
+    >>> values = grades[:, None] + 0.01 * np.random.default_rng(0).standard_normal((16, 1))
+    >>> halves = (np.arange(16) % 2 == 0)[None]
+    >>> fitness = RoughnessFitness(exact_grades, GaussianProcess(), values, grades, textures, halves)
+    >>> min(fitness.start()(0)) > 0.9
+    True
     """
 
     surrogate: RegressorSurrogate

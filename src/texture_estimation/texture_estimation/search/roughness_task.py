@@ -28,6 +28,12 @@ class RoughnessTask:
     ----------
     grades
         Of each surface, by people.
+
+    Examples
+    --------
+    >>> task = RoughnessTask(Grades({'silk': 1.0, 'jute': 5.0}))
+    >>> task.grades.of('jute')
+    5.0
     """
 
     grades: Grades

@@ -32,6 +32,13 @@ class ScoreCache:
     ----------
     identity
         What the scores belong to: data, halves, variables. Scores of another identity are refused.
+
+    Examples
+    --------
+    >>> cache = ScoreCache({'recipe': 'mine'})
+    >>> cache.store((3,), HalfScores.of([(1.0, 0.8)]))
+    >>> cache.get((3,)).halves
+    1
     """
 
     identity: Mapping[str, Any]

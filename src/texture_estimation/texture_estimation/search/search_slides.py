@@ -24,6 +24,17 @@ class SearchSlides:
         How many random halves, and what they are drawn from.
     labels
         Surfaces to tell apart; () for all. The halves of some are those of all, less the other surfaces.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
+    >>> samples = np.random.default_rng(0).standard_normal((8, 50, 1)) * np.repeat([1.0, 9.0], 4)[:, None, None]
+    >>> labels = np.repeat(['cork', 'felt'], 4)
+    >>> slides = SlideArrays({'signal': ArrayStream(samples, 100.0)}, labels, np.full(8, 0.05), np.ones(8))
+    >>> halves = SearchSlides(slides, n_halves=5).halves(WindowParams(length_s=0.5, hop_s=0.5))
+    >>> halves.sum(axis=1).tolist()  # half of the eight slides, each one window long
+    [4, 4, 4, 4, 4]
     """
 
     cut: Cut

@@ -48,6 +48,13 @@ class SlideArrays:
         Surface of each scan.
     speed_m_s, force_n : (n_scans,)
         As the exploration tells them.
+
+    Examples
+    --------
+    >>> stream = ArrayStream(np.zeros((2, 100, 1)), rate_hz=100.0)
+    >>> slides = SlideArrays({'signal': stream}, np.array(['cork', 'felt']), np.full(2, 0.05), np.ones(2))
+    >>> slides(WindowParams(length_s=0.5, hop_s=0.5)).labels.tolist()  # two windows of each
+    ['cork', 'cork', 'felt', 'felt']
     """
 
     streams: Mapping[str, ArrayStream]

@@ -32,7 +32,13 @@ class Variable(Protocol):
 
 @dataclass(frozen=True)
 class Integer:
-    """Whole numbers from `low` to `high`, both included."""
+    """Whole numbers from `low` to `high`, both included.
+
+    Examples
+    --------
+    >>> Integer(1, 3).count, Integer(1, 3).value(2)
+    (3, 3)
+    """
 
     low: int
     high: int
@@ -59,6 +65,12 @@ class LogReal:
     """Numbers from `low` to `high` in equal steps of their logarithm.
 
     Steps, because nobody tells 1.00 from 1.01 of a box constraint by its accuracy, and what repeats is remembered.
+
+    Examples
+    --------
+    >>> rate = LogReal(0.1, 10.0, per_decade=1)
+    >>> [round(rate.value(index), 3) for index in range(rate.count)]
+    [0.1, 1.0, 10.0]
     """
 
     low: float
@@ -88,7 +100,13 @@ class LogReal:
 
 @dataclass(frozen=True)
 class Categorical:
-    """One of some names."""
+    """One of some names.
+
+    Examples
+    --------
+    >>> Categorical(('svm', 'mlp')).value(1)
+    'mlp'
+    """
 
     options: tuple[str, ...]
 
@@ -114,7 +132,14 @@ class Categorical:
 
 @dataclass(frozen=True)
 class SearchSpace:
-    """The variables of a search by name, and the way between individuals and points of the unit cube."""
+    """The variables of a search by name, and the way between individuals and points of the unit cube.
+
+    Examples
+    --------
+    >>> space = SearchSpace({'bands': Integer(1, 4), 'learner': Categorical(('svm', 'mlp'))})
+    >>> space.decode(np.array([0.9, 0.1])), space.encode((4, 'svm')).tolist()
+    ((4, 'svm'), [0.875, 0.25])
+    """
 
     variables: Mapping[str, Variable]
     _counts: Array = field(init=False, repr=False, compare=False)

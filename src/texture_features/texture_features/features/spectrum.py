@@ -33,7 +33,7 @@ class Spectrum:
     Examples
     --------
     >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(1000) / 1000.0)[:, None]
-    >>> spectrum = LogSpectrum(points=500)(WindowBatch(tone, rate_hz=1000.0))  # at 1, 2, … 500 Hz
+    >>> spectrum = Spectrum(points=500)(WindowBatch(tone, rate_hz=1000.0))  # at 1, 2, … 500 Hz
     >>> int(spectrum[0].argmax()) + 1
     100
     """

@@ -44,7 +44,15 @@ NORMAL_FORCE = 2  # column of `wrench`: y of the tool, the one component that pr
 
 @dataclass(frozen=True, eq=False)
 class BiotacSlide:
-    """One slide as recorded; the fields of the arrays are named as in the files."""
+    """One slide as recorded; the fields of the arrays are named as in the files.
+
+    Examples
+    --------
+    >>> frames, velocity, wrench = np.zeros((3, 44)), np.zeros((5, 4)), np.zeros((5, 7))
+    >>> slide = BiotacSlide('material01', '1', frames, np.array([0.0, 0.01, 0.03]), velocity, wrench, epoch=0.0)
+    >>> frame_indices(slide.frame_time).tolist()  # one frame is missing
+    [0, 1, 3]
+    """
 
     surface: str
     slide: str

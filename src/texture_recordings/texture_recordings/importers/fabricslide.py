@@ -31,7 +31,13 @@ COUNTS_PER_FORCE = 100.0
 
 
 class SlideRun(NamedTuple):
-    """How one run was made; sorted as the slides are numbered: down before up, then by force, speed and repeat."""
+    """How one run was made; sorted as the slides are numbered: down before up, then by force, speed and repeat.
+
+    Examples
+    --------
+    >>> sorted([SlideRun(True, 500, 10, 1), SlideRun(False, 800, 10, 1)])[0].up  # down comes first
+    False
+    """
 
     up: bool
     counts: int

@@ -29,7 +29,13 @@ STREAM = ImportedStream('signal', 'ntp/array', tuple(f'taxel{n}' for n in range(
 
 
 class SlideCondition(NamedTuple):
-    """How one slide was made; sorted as the slides are numbered: by speed, then by force."""
+    """How one slide was made; sorted as the slides are numbered: by speed, then by force.
+
+    Examples
+    --------
+    >>> sorted([SlideCondition(20.0, 0.5), SlideCondition(10.0, 1.0)])[0].speed_mm_s  # the slowest comes first
+    10.0
+    """
 
     speed_mm_s: float
     force_n: float

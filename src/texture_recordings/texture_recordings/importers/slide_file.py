@@ -20,7 +20,23 @@ from texture_recordings.slides import parse_selection
 
 @dataclass(frozen=True)
 class SlideFile:
-    """What the file is called, and how its keys and arrays are read; slides are numbered in order of conditions."""
+    """What the file is called, and how its keys and arrays are read; slides are numbered in order of conditions.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from texture_recordings.slides import find_slides
+    >>> stream = ImportedStream('signal', 'finger', ('pac',), 'count', 100.0)
+    >>> def place(key: str) -> tuple[str, int]:
+    ...     return key.split('-')[0], int(key.split('-')[1])
+    >>> def slide(key: str, surface: str, condition: int, samples: AnyArray) -> SteadySlide:
+    ...     return SteadySlide(key, surface, samples, 0.05, 1.0, 0.0)
+    >>> with TemporaryDirectory() as folder:
+    ...     np.savez(f'{folder}/slides.npz', **{'cork-1': np.zeros((200, 1)), 'cork-2': np.zeros((200, 1))})
+    ...     bags = SlideFile('slides.npz', stream, place, slide).write_bags(folder, f'{folder}/bags', '', ())
+    ...     print([item.name for item in find_slides(bags)])
+    ['cork/1', 'cork/2']
+    """
 
     name: str
     stream: ImportedStream

@@ -31,6 +31,12 @@ class SteadySlide:
         Of the finger; NaN if unknown.
     steady
         Samples in which the finger slides; before them it is in contact, after them it lifts. All if None.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> SteadySlide('cork-1', 'cork', np.zeros((200, 1)), speed_m_s=0.05, force_n=1.0, direction_rad=0.0).surface
+    'cork'
     """
 
     exploration_id: str
@@ -44,7 +50,13 @@ class SteadySlide:
 
 @dataclass(frozen=True)
 class ImportedStream:
-    """The stream that all slides of a data set share: as in a `TactileSignal`."""
+    """The stream that all slides of a data set share: as in a `TactileSignal`.
+
+    Examples
+    --------
+    >>> ImportedStream('signal', 'finger', ('pac',), 'count', 100.0).to_ns(50)  # half a second
+    500000000
+    """
 
     topic: str
     sensor: str

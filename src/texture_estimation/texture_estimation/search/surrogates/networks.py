@@ -27,6 +27,13 @@ class SurrogateNetworks:
     out_bias : (n_networks, 1)
     transfer
         Transfer function f of the hidden layer, one of TRANSFERS.
+
+    Examples
+    --------
+    >>> values = np.linspace(-1.0, 1.0, 20)[None, :, None]
+    >>> networks = SurrogateNetworks.fitted(values, values[:, :, 0], n_hidden=3, rng=np.random.default_rng(0))
+    >>> bool(np.abs(networks.outputs(values[0])[:, 0] - values[0, :, 0]).max() < 0.2)
+    True
     """
 
     hidden: Array
