@@ -1,7 +1,9 @@
 """Check the words of the project: `python tools/check_terms.py [FOLDER]` ends with 1 and names what is to be changed.
 
 Identifiers use the field's terms: a short list of words is banned as a part of any name in Python code. What users
-read, the descriptions of parameters and the comments of messages, services and actions, are whole sentences.
+read, the descriptions of parameters and the comments of messages, services and actions, are whole sentences. The prose
+of the pages (README, CONTRIBUTING, docs/, README of each package) keeps to the same terms; code, links and names of
+files in it are left out.
 """
 
 from __future__ import annotations
@@ -42,6 +44,21 @@ BANNED = {
     'promised': 'guaranteed',
     'anew': 'again',
 }
+# What is banned in the prose of the pages, besides: words that have another meaning in names.
+BANNED_PROSE = {
+    **dict.fromkeys(('teach', 'teaches', 'teaching', 'taught', 'learnt'), 'train, add or fit'),
+    **dict.fromkeys(('told',), 'reported, given, sent or distinguished'),
+    **dict.fromkeys(('judge', 'judges', 'judged', 'judging'), 'classify, evaluate or predict'),
+    **dict.fromkeys(('lesson', 'lessons', 'pupil', 'pupils'), 'added slide or example'),
+    **dict.fromkeys(('promise', 'promises', 'promised'), 'guarantee or coverage'),
+    **dict.fromkeys(('stranger', 'strangers'), 'unknown, other or foreign'),
+    'worth': 'contribution or gain',
+    'trouble': 'fault',
+    'striker': 'fault injector',
+    'anew': 'again',
+}
+NOT_PROSE = re.compile(r'```.*?```|^    .*?$|`[^`\n]*`|\]\([^)]*\)|<[^>\n]*>', re.DOTALL | re.MULTILINE)
+PAGES = ('*.md', 'docs/*.md', 'docs/robots/*.md', 'docs/sensors/*.md', 'src/*/README.md')
 MIN_WORDS = 4
 WORDS = re.compile(r'[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+')
 # A simple test for a verb: the first word is in the third person ('Sets …'), or one of these stands anywhere.
@@ -152,6 +169,21 @@ def check_interface(path: Path) -> Iterator[str]:
             yield f"{path}:{line}: the comment of '{field.group(2)}' is no sentence, {fault}"
 
 
+def check_page(path: Path) -> Iterator[str]:
+    """Yield one sentence for each banned word in the prose of a Markdown page."""
+    text = path.read_text(encoding='utf-8')
+    prose = NOT_PROSE.sub(lambda found: re.sub(r'[^\n]', ' ', found.group()), text)
+    for line, row in enumerate(prose.splitlines(), 1):
+        for word in map(str.lower, re.findall(r'[A-Za-z]+', row)):
+            if word in BANNED_PROSE:
+                yield f"{path}:{line}: the page has the word '{word}'; write {BANNED_PROSE[word]}"
+
+
+def check_pages(root: Path) -> list[str]:
+    """Return one sentence for each banned word in the pages of the repository."""
+    return [fault for pattern in PAGES for path in sorted(root.glob(pattern)) for fault in check_page(path)]
+
+
 def check(folder: Path) -> list[str]:
     """Return one sentence for each fault in a source tree, in the order of the files."""
     found: list[str] = []
@@ -166,7 +198,8 @@ def main() -> int:
     """Check a folder and print what is to be changed."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument('folder', type=Path, nargs='?', default=ROOT / 'src', help='source tree to check')
-    found = check(parser.parse_args().folder)
+    folder = parser.parse_args().folder
+    found = check(folder) + (check_pages(ROOT) if folder == ROOT / 'src' else [])
     print('\n'.join(found) or 'all names and descriptions keep to the terms')
     return 1 if found else 0
 

@@ -4,7 +4,17 @@ import ast
 from pathlib import Path
 
 import pytest
-from check_terms import banned_words, check, check_interface, check_python, parameter_descriptions, sentence_fault
+from check_terms import (
+    ROOT,
+    banned_words,
+    check,
+    check_interface,
+    check_page,
+    check_pages,
+    check_python,
+    parameter_descriptions,
+    sentence_fault,
+)
 
 
 @pytest.mark.parametrize(
@@ -72,3 +82,17 @@ def test_faults_of_a_tree_are_named_with_file_and_line(tmp_path: Path) -> None:
 
 def test_the_suite_keeps_to_its_terms() -> None:
     assert check(Path(__file__).parents[1] / 'src') == []
+
+
+def test_the_prose_of_a_page_is_read_but_not_its_code_links_and_files(tmp_path: Path) -> None:
+    page = tmp_path / 'page.md'
+    page.write_text(
+        'The class judges windows of `lesson.py`.\n\n    judge = 1  # code\n\n'
+        '```python\ntold = 2\n```\n\n[A page](learnt.md) on felt. What it is Worth.\n'
+    )
+    assert [line.split(': ')[0].rsplit(':')[-1] for line in check_page(page)] == ['1', '9']
+    assert [line.split("'")[1] for line in check_page(page)] == ['judges', 'worth']
+
+
+def test_the_pages_of_the_repository_use_the_terms() -> None:
+    assert not check_pages(ROOT)
