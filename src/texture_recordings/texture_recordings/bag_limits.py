@@ -110,6 +110,17 @@ class MessageLimit:
     ----------
     files
         Files of the bag.
+
+    Examples
+    --------
+    >>> limit = MessageLimit([])  # of an empty bag
+    >>> for _ in range(SIGNALS_AT_LEAST):
+    ...     limit.spend(100, is_signal=True)
+    >>> try:
+    ...     limit.spend(100, is_signal=True)
+    ... except FileRefused as error:
+    ...     print(error)
+    it has more messages than a bag of 0 MB may hold; split the recording
     """
 
     def __init__(self, files: Iterable[Path]) -> None:
@@ -117,7 +128,13 @@ class MessageLimit:
         self._left = SIGNALS_AT_LEAST + max(0, self._file_bytes - SMALL_BAG_BYTES) // SIGNAL_BYTES
 
     def spend(self, n_bytes: int, is_signal: bool) -> None:
-        """Count a message; FileRefused if there are more than the size of the bag allows."""
+        """Count a message; FileRefused if there are more than the size of the bag allows.
+
+        Raises
+        ------
+        FileRefused
+            If there are more.
+        """
         self._left -= 1 if is_signal else OTHERS_COUNT + max(0, n_bytes - SHORT_BYTES) // TEXTS_BYTES
         if self._left < 0:
             raise FileRefused(
@@ -126,7 +143,13 @@ class MessageLimit:
 
 
 def check_duration(path: Path, signals: Iterable[TactileSignal]) -> None:
-    """Raise FileRefused if the signals of a bag stand for much more time than its size can tell of."""
+    """Raise FileRefused if the signals of a bag stand for much more time than its size can tell of.
+
+    Raises
+    ------
+    FileRefused
+        If they do.
+    """
     size = sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]) if file.is_file())
     seconds: defaultdict[str, float] = defaultdict(float)
     for signal in signals:

@@ -140,7 +140,13 @@ class RosControllersArm:
             topics.close()
 
     def state(self) -> ArmState:
-        """Return the newest state."""
+        """Return the newest state.
+
+        Raises
+        ------
+        DeviceError
+            If the thread that commands the arm has ended.
+        """
         self._connected()
         if self._thread is not None and not self._thread.is_alive():
             raise DeviceError('the thread that commands the arm has ended through an internal error; see the log')

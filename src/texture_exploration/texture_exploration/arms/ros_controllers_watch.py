@@ -44,6 +44,11 @@ class FollowWatch:
             That was commanded until now.
         held_s
             For how long, s.
+
+        Returns
+        -------
+        str
+            A sentence without a full stop, or ''.
         """
         place = np.array(position)
         if self._begin is None:
@@ -64,7 +69,22 @@ class FollowWatch:
 
 
 def stale(params: RosControllersParams, now_ns: int, pose_ns: int, force_ns: int) -> str:
-    """Return in a sentence that pose or force are older than the parameters allow, '' if they are not."""
+    """Return in a sentence that pose or force are older than the parameters allow, '' if they are not.
+
+    Parameters
+    ----------
+    params
+        Names of the topics and the longest allowed age.
+    now_ns
+        The time, ns.
+    pose_ns, force_ns
+        When pose and force came last, ns.
+
+    Returns
+    -------
+    str
+        A sentence without a full stop, or ''.
+    """
     for what, topic, time_ns in (('pose', params.pose_topic, pose_ns), ('force', params.wrench_topic, force_ns)):
         age_s = (now_ns - time_ns) * 1e-9
         if age_s > params.deadman_s:

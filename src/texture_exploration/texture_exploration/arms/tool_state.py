@@ -70,7 +70,17 @@ class ToolState:
         self._update_velocity(sample.stamp_ns or now_ns)
 
     def take_force(self, now_ns: int, sample: ForceSample, *, moving: bool) -> None:
-        """Take a force that came at `now_ns`, after the pose of that time; `moving` if the arm is told to move."""
+        """Take a force that came at `now_ns`, after the pose of that time; `moving` if the arm is told to move.
+
+        Parameters
+        ----------
+        now_ns
+            The time, ns.
+        sample
+            Force and its place.
+        moving
+            Whether the arm is commanded to move.
+        """
         params = self._params
         if sample.frame_id not in (params.base_frame_id, params.tool_frame_id):
             self.misplaced = (

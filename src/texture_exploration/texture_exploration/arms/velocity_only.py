@@ -48,6 +48,11 @@ class CommandedVelocity:
             The newest state of the arm.
         held_s
             For how long the velocity of the last call was asked for.
+
+        Returns
+        -------
+        (3,)
+            Along the surface and its normal, m/s.
         """
         normal_m_s = self._normal_m_s(command, state, held_s)
         self._loop.asked(state.position[2], normal_m_s, held_s)

@@ -32,6 +32,13 @@ class SlideRows:
         Values of the column that changes between slides, if one does.
     place
         File, for sentences.
+
+    Examples
+    --------
+    >>> time_s = np.array([0.0, 0.1, 0.2, 5.0, 5.1])  # a pause after the third row
+    >>> rows = SlideRows(time_s, np.zeros((5, 1)), rate_hz=10.0, keys=None, place='run.csv')
+    >>> spans(rows, SlideBorders(by='pause', pause_s=1.0))
+    [slice(0, 3, None), slice(3, 5, None)]
     """
 
     time_s: Array

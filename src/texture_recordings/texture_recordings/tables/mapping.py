@@ -155,6 +155,12 @@ class TableMapping:
     >>> mapping = mapping_from({'streams': {'signal': {'columns': ['ax']}}, 'label': {'column': 'material'}})
     >>> mapping.slides.by, mapping.streams['signal'].columns
     ('file', ['ax'])
+    >>> mapping.format == FileFormat(), mapping.label == LabelColumn('material'), mapping.slides == SlideBorders()
+    (True, True, True)
+    >>> mapping.streams['signal'] == StreamColumns(['ax'], time=TimeColumn())
+    True
+    >>> mapping.conditions == SlideConditions(speed=Quantity())  # unknown
+    True
     """
 
     files: str = param('*', "Gives the template of the paths below the source, such as '{material}/run{run}.csv'.")

@@ -46,7 +46,15 @@ class StreamCounts:
 
 @dataclass
 class ImportReport:
-    """Counts of an import."""
+    """Counts of an import.
+
+    Examples
+    --------
+    >>> report = ImportReport(files=1, rows=10, streams={'signal': StreamCounts(rate_hz=100.0, samples=10)})
+    >>> report.note('run.csv', 2, [])
+    >>> report.lines()[1]
+    'malformed rows: 2 of 10'
+    """
 
     bags: list[Path] = field(default_factory=list)
     files: int = 0

@@ -102,6 +102,18 @@ class SlideBags:
     ----------
     out
         Folder for the bags; made if missing.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from texture_recordings.slides import find_slides
+    >>> stream = StreamSamples('finger', ('x',), 'g', 100.0, np.zeros((200, 1)), np.arange(200))
+    >>> slide = ImportedSlide('cork', 'run1', 'linear_slide', {'signal': stream}, (StateSpan(0.0, speed_m_s=0.05),))
+    >>> with TemporaryDirectory() as folder:
+    ...     with SlideBags(folder) as bags:
+    ...         bags.write('monday', slide)
+    ...     print([(found.name, found.speed_m_s) for found in find_slides(bags.paths)])
+    [('cork/1', 0.05)]
     """
 
     def __init__(self, out: str | Path) -> None:

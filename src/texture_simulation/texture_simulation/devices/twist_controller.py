@@ -126,13 +126,27 @@ class EmulatedTwistArm:
         self._since_ns = self._now_ns = now_ns
 
     def command(self, now_ns: int, velocity_m_s: Array) -> None:
-        """Take a velocity in the base frame, (3,), m/s; it comes into effect later."""
+        """Take a velocity in the base frame, (3,), m/s; it comes into effect later.
+
+        Parameters
+        ----------
+        now_ns
+            The time, ns.
+        velocity_m_s : (3,)
+            In the base frame.
+        """
         if self.params.active:
             delay_s = self.params.lag_s + self.jitter_s()
             self._coming.append((now_ns + round(delay_s * 1e9), velocity_m_s))
 
     def press(self, force_n: Array) -> None:
-        """Take the force of the tool on its surroundings, (3,), N, to which the arm yields from now on; 0: none."""
+        """Take the force of the tool on its surroundings, (3,), N, to which the arm yields from now on; 0: none.
+
+        Parameters
+        ----------
+        force_n : (3,)
+            Force of the tool on its surroundings; 0 for none.
+        """
         self._pressing = force_n
 
     def jitter_s(self) -> float:
@@ -161,7 +175,13 @@ class EmulatedTwistArm:
         return force
 
     def reading_n(self) -> Array:
-        """Return what the force sensor shows in the frame of the tool, (3,): with weight, offset and noise."""
+        """Return what the force sensor shows in the frame of the tool, (3,): with weight, offset and noise.
+
+        Returns
+        -------
+        (3,)
+            N, in the frame of the tool.
+        """
         weight = np.array([0.0, 0.0, -self.params.tool_mass_kg * GRAVITY_M_S2])
         noise = self.params.force_noise_n * self._rng.standard_normal(3)
         reading: Array = TOOL_AXES.T @ (self.force_n + weight) + self.params.force_offset_n + noise
