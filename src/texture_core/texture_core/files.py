@@ -1,4 +1,4 @@
-"""Open and read files that strangers may have made: regular files only, and never more of them than a limit.
+"""Open and read files of any origin: regular files only, and never more of them than a limit.
 
 What a header or a directory says of a size is not believed: bytes are counted while they are read.
 """
@@ -192,7 +192,7 @@ def take_all(file: Readable, most_bytes: int) -> bytes:
 def read_array(file: Readable, budget: Budget, *, records: bool = False) -> AnyArray:
     """Return the array in a stream of NumPy's format (.npy); nothing in it is run.
 
-    Memory is taken as the values come, and not as the header promises. Each value counts as 8 bytes at least, since
+    Memory is taken as the values come, and not as the header claims. Each value counts as 8 bytes at least, since
     it will be computed with as such. With `records`, records of plain numbers are read, too.
 
     Parameters

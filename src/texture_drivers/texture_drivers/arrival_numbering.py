@@ -14,8 +14,8 @@ BLOCKS_LATE = 1.5  # a block may come so late by the pace at which it is read, a
 class ArrivalNumbering:
     """Give blocks of samples their running index: a jump is what was lost.
 
-    Losses that the protocol shows are told by the caller. Others are known half a second later, by all samples being
-    late from then on (see `UnseenLoss`); over an interruption the host's clock tells how much is missing.
+    Losses that the protocol shows are given by the caller. Others are known half a second later, by all samples being
+    late from then on (see `UnseenLoss`); over an interruption the host's clock shows how much is missing.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class ArrivalNumbering:
         Returns
         -------
         list of int
-            Empty while the clock is not settled: then no time can be told.
+            Empty while the clock is not settled: then no time is known.
         """
         if self._interrupted:
             self._resume()

@@ -9,7 +9,7 @@ SHORT_COUNTER = 1 << 16
 
 
 class StampStatus(enum.Enum):
-    """Status of a stamp, judged with its neighbours."""
+    """Status of a stamp, assessed with its neighbours."""
 
     GOOD = enum.auto()
     DAMAGED = enum.auto()

@@ -19,7 +19,7 @@ class SensorHealth:
 
     ERROR: the sensor cannot be reached, or no sample came for 1 s. WARN: samples were lost or the sensor was opened
     again since the last report, a rate is more than 5 % off, or more than 5 packets a second are refused. All that is
-    judged over the time since the last report, so the level falls back by itself.
+    assessed over the time since the last report, so the level falls back by itself.
     """
 
     def __init__(self, reader: SensorReader, now_s: float) -> None:

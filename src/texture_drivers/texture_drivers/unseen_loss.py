@@ -1,4 +1,4 @@
-"""Losses in a stream that neither stamps nor counts its samples, told by how late they arrive."""
+"""Losses in a stream that neither stamps nor counts its samples, known by how late they arrive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Charts that a stranger can read: what is shown stands in the title, units on the axes, colours safe for all eyes."""
+"""Charts that explain themselves: what is shown stands in the title, units on the axes, colours safe for all eyes."""
 
 from __future__ import annotations
 

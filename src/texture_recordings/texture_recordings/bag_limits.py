@@ -1,4 +1,4 @@
-"""Limits for bags of strangers, set where rosbags has none: what unpacks, how often, and which files are opened at all.
+"""Limits for bags of any origin where rosbags has none: what unpacks, how often, and which files are opened at all.
 
 rosbags unpacks first and compares afterwards, when a chunk of a kilobyte may have filled the memory; it believes the
 index of an MCAP file, in which a chunk may stand a hundred thousand times; and what an SQLite file computes is not

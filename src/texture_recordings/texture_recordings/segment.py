@@ -74,7 +74,7 @@ def _segment(path: Path, out: Path, params: SegmentationParams, surface: str, na
 def _labelled(
     found: Sequence[ExplorationState], reported: Sequence[ExplorationState], surface: str
 ) -> list[ExplorationState]:
-    """Return the states found, with what was told of the motion at the middle of each slide."""
+    """Return the states found, with what was known of the motion at the middle of each slide."""
     states: list[ExplorationState] = []
     known = ExplorationState(0, '', '', Phase.IDLE)
     for state in found:

@@ -18,14 +18,14 @@ COUNTERS: Mapping[str, tuple[str, ...]] = {
 
 
 class Totals:
-    """Add up counters of a node over its lives: a counter that falls has begun anew."""
+    """Add up counters of a node over its lives: a counter that falls has begun again."""
 
     def __init__(self) -> None:
         self._now: dict[str, int] = {}
         self._before: Counter[str] = Counter()
 
     def update(self, numbers: Mapping[str, int]) -> None:
-        """Take note of a report; counters of one node that fall in it tell that it was started anew."""
+        """Take note of a report; counters of one node that fall in it tell that it was started again."""
         if any(value < self._now.get(name, value) for name, value in numbers.items()):
             self._before.update(self._now)
             self._now = {}
@@ -47,7 +47,7 @@ class SampleAccount:
     gaps
         That the index says were lost on the way.
     restarts
-        How often the index began anew: the driver was started again.
+        How often the index began again: the driver was started again.
     away_s
         How long no driver ran: from the last sample of one to the first of the next.
     drift_s

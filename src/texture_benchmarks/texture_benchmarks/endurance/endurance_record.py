@@ -10,7 +10,7 @@ from texture_benchmarks.endurance.machine_speed import MachineSpeed
 from texture_benchmarks.endurance.usage import ProcessUsage
 
 SUCCESS, ABORTED, REFUSED, LOST = 'success', 'aborted', 'refused', 'lost'
-# A fault may still be measured for so long: connections are made anew, queues are emptied.
+# A fault may still be measured for so long: connections are made again, queues are emptied.
 RECOVERY_S = 5.0
 
 

@@ -136,7 +136,7 @@ def as_page(record: EnduranceRecord, results: Sequence[RequirementResult]) -> li
         '',
         '## Computing time',
         '',
-        'At the median speed of the machine in the run, told by a fixed piece of work.',
+        'At the median speed of the machine in the run, measured by a fixed piece of work.',
         '',
         *_table(
             ('node', 'first third after warm-up (% of a core)', 'last third'),

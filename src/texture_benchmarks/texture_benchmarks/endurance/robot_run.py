@@ -235,7 +235,7 @@ def endure_robots(
     log
         File for what the explorers say.
     say
-        Is told after each session how it went.
+        Called after each session with a line about its result.
     given
         These sessions instead of random ones; the run ends with them.
     keep

@@ -173,7 +173,7 @@ def endure(
     log
         File for what the nodes say.
     say
-        Is told now and then how it goes.
+        Called now and then with a line about the progress.
     faults
         These faults instead of random ones; the run ends when they are over.
 

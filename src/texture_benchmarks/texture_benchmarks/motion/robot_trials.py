@@ -215,7 +215,7 @@ def robot_trial(name: str, stiffness_n_m: float, request: ExplorationRequest) ->
 def _by_phase(fingers: list[FingerState], states: list[ExplorationState]) -> list[tuple[Phase, ArmState]]:
     """Return where the finger was in which phase.
 
-    What it did before the first is left out, as is what of a slide was not promised to be steady: turns of strokes.
+    What it did before the first is left out, as is what of a slide was not guaranteed to be steady: turns of strokes.
     """
     begins = [state.stamp_ns for state in states]
     log = []

@@ -32,7 +32,7 @@ class MethodResult:
     train_s
         Mean time of a training and of classifying all slides.
     note
-        What else is to be told of what was trained.
+        What else is to be reported of the training.
     """
 
     surfaces: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What tells the definition of a recipe from another one, so that stored figures can be told from outdated ones."""
+"""A digest of the definition of a recipe, by which stored figures are distinguished from outdated ones."""
 
 from __future__ import annotations
 

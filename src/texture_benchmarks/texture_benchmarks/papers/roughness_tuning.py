@@ -28,7 +28,7 @@ class TunedRegressor(TunedRecipe[RoughnessRecipe]):
 def tune(recipe: RoughnessRecipe, scans: SlideArrays, grades: Grades, seed: int, *, quick: bool) -> TunedRegressor:
     """Return the best recipe of the search space that is named like this one.
 
-    As in the paper, each half holds windows of every texture: the search is not told how a texture never touched fares.
+    As in the paper, each half holds windows of every texture: the search does not see how a new texture fares.
 
     Parameters
     ----------

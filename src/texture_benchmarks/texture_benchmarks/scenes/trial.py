@@ -260,7 +260,7 @@ def ablate(
     slides
         To train on, and as many to test, about: as many of each surface.
     repeats
-        How often all is done anew.
+        How often all is repeated.
     seed
         Of everything random.
     terms

@@ -34,7 +34,7 @@ def slide_trial(
     dataset
         The slides.
     learner
-        Is trained anew for each split.
+        Trained again for each split.
     values : (n_slides, n_features)
         Features of each slide.
     tested_values : (n_slides, n_features)

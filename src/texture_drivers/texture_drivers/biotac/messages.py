@@ -39,7 +39,7 @@ class BioTacReading:
     slow : (n_channels,) counts
         In the order of `BioTacLayout.slow_channels`.
     serial
-        Serial number of the finger, '' if not told.
+        Serial number of the finger, '' if not reported.
     """
 
     end_ns: int

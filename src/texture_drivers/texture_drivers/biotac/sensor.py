@@ -101,7 +101,7 @@ class BioTac:
 
     @property
     def details(self) -> Mapping[str, str | float]:
-        """Serial number of each BioTac that told it, and how much the device's clock is slow."""
+        """Serial number of each BioTac that reported it, and how much the device's clock is slow."""
         serials = {f'serial of finger {place}': serial for place, serial in enumerate(self._link.serials) if serial}
         return {**serials, 'device clock slow by [ppm]': PPM * self._clock.drift}
 

@@ -2,7 +2,7 @@
 
 `robotiq/ros` @18335fa, `robotiq_tsf`: for each packet one message on each of several topics, both fingers in each, none
 with a header; the device's stamp, 16 bits in ms, is a message of its own and the last of its packet. So what belongs
-together is told by the times at which the messages were sent.
+together follows from the times at which the messages were sent.
 
 The functions work on any objects with the attributes of those messages.
 """

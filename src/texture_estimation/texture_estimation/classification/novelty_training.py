@@ -83,7 +83,7 @@ def fit_novelty(
     learner
         Learner of the recipe.
     fitted
-        What it has learnt from the examples.
+        What was fitted to the examples.
     examples
         Windows of known surfaces.
     rule
@@ -138,7 +138,7 @@ def fit_novelty(
 def _folds(
     learner: Learner, fitted: Fitted, classes: Codes, groups: Codes
 ) -> Iterator[tuple[frozenset[int], Predictor | None]]:
-    """Yield the slides that are held out together, and what was learnt without them, if the learner tells."""
+    """Yield the slides that are held out together, and what was fitted without them, if the learner keeps it."""
     if fitted.folds:
         for fold in fitted.folds:
             yield frozenset(fold.held_out.tolist()), learner.predictor(fold.parameters)

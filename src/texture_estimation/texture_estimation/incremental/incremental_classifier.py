@@ -177,7 +177,7 @@ class IncrementalClassifier:
         raise unknown_name(label, added, 'added texture')
 
     def _start_again(self, added_slides: tuple[AddedSlide, ...]) -> None:
-        """Compute the incremental classifier anew: without a label in the middle, the numbers of the others change."""
+        """Compute the incremental classifier again: without a label in the middle, the numbers of the others change."""
         updated = dataclasses.replace(self.model.with_added_slides(added_slides), incremental_predictor=None)
         self._ridge_classifier = updated.ridge_classifier()
         self.model = dataclasses.replace(

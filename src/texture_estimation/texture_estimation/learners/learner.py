@@ -52,7 +52,7 @@ def hidden_layer(predictor: Predictor | HiddenPredictor) -> Callable[[Array], Ar
 
 @dataclass(frozen=True, eq=False)
 class FoldFit:
-    """What a learner has learnt without some slides.
+    """What a learner has fitted without some slides.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class FoldFit:
     Examples
     --------
     >>> import numpy as np
-    >>> fold = FoldFit(held_out=np.array([3]), parameters={'mean': 0.0})  # learnt without slide 3
+    >>> fold = FoldFit(held_out=np.array([3]), parameters={'mean': 0.0})  # fitted without slide 3
     >>> fold.held_out.tolist()
     [3]
     """
@@ -86,7 +86,7 @@ class Fitted:
     note
         How the probabilities were calibrated, in words for the model's card.
     folds
-        What the learner has learnt without each part of the slides; () if it does not say.
+        What the learner has fitted without each part of the slides; () if it does not say.
 
     Examples
     --------

@@ -469,7 +469,7 @@ def _parts(cells: AnyArray) -> AnyArray:
     """Return the part of each slide, those of one texture and motion in turn; -1 for one that is alone.
 
     The first slide is in another part for the next texture, so that where there are two of each not all are missed at
-    once, and nothing told how much they differ.
+    once, and nothing showed how much they differ.
     """
     part = np.full(len(cells), -1)
     for number, cell in enumerate(np.unique(cells)):

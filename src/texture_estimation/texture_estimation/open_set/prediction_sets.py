@@ -106,7 +106,7 @@ def fit_prediction_sets(
 
 
 def slides_needed(coverage: float) -> int:
-    """Return the smallest number of held-out slides from which sets of this coverage can be learnt."""
+    """Return the smallest number of held-out slides from which sets of this coverage can be fitted."""
     number = max(1, round(1.0 / (1.0 - coverage)) - 1)
     return number if _rank(number, coverage) else number + 1
 

@@ -50,7 +50,7 @@ class Snap(Repair):  # type: ignore[misc]
 def algorithm_for(
     space: SearchSpace, population: int, n_objectives: int, seed: int, start: Sequence[Individual] = ()
 ) -> Any:
-    """Return a genetic algorithm (one objective) or NSGA-II (two), to be asked for points and told their objectives.
+    """Return a genetic algorithm (one objective) or NSGA-II (two), to be asked for points and given their objectives.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ class ScoredIndividual:
 
 @dataclass(frozen=True)
 class Generation:
-    """What is told after each generation.
+    """What is reported after each generation.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Generation:
     cache_hits
         How often one was met again.
     halves
-        Judged so far: `evaluated` times the number of halves, had none been given up early.
+        Evaluated so far: `evaluated` times the number of halves, had none been given up early.
     """
 
     number: int

@@ -64,7 +64,7 @@ EMPTY = HalfScores(np.zeros(0), np.zeros(0))
 
 
 def race(fitness_function: FitnessFunction, known: HalfScores, incumbent: Array | None, n_halves: int) -> HalfScores:
-    """Judge an individual on the halves until it has clearly lost against its rival, or all are done.
+    """Evaluate an individual on the halves until it has clearly lost against its rival, or all are done.
 
     Individuals are compared half by half, each half being the same for all: differences scatter far less than scores.
 

@@ -24,7 +24,7 @@ MOTION = 'detected'
 class SlideSegmenter:
     """Turn signal batches into exploration states: `slide` while the finger slides, `lift` when it has ended.
 
-    A state is told once what it covers is beyond doubt: a ramp and a bridge (0.4 s by default) after it was measured.
+    A state is returned once what it covers is certain: a ramp and a bridge (0.4 s by default) after it was measured.
     The sensor's noise is estimated at rest, so let the finger rest at first, or give `noise_rms`.
 
     Parameters
@@ -62,7 +62,7 @@ class SlideSegmenter:
         self._fast, self._slow = fast, slow
         self._name = exploration_id
         self._slides = 0
-        self._reported_ns = 0  # up to here everything is told
+        self._reported_ns = 0  # up to here everything is reported
         self._sliding = False
         self._due_ns = 0
         self._rest: Array = np.empty(0)
@@ -97,7 +97,7 @@ class SlideSegmenter:
         for start_ns, end_ns in self._spans(self._streams[self._fast].buffers[-1]):
             if end_ns <= self._reported_ns or start_ns >= sure_ns:
                 continue
-            # A little more of a slide that has been told to its end is doubt about that end, not another slide.
+            # A little more of a slide that has been reported to its end is doubt about that end, not another slide.
             if (
                 not self._sliding
                 and end_ns - max(start_ns, self._reported_ns) < self._params.min_duration_s * NANOSECONDS

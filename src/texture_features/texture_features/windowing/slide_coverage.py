@@ -12,10 +12,10 @@ from texture_core.signal import NANOSECONDS
 
 # Two slide states at most so far apart cover the time between them.
 LINK_NS = NANOSECONDS // 2
-# No promise is believed for longer: a wrong one must not make millions of windows.
+# No guarantee holds for longer: a wrong one must not make millions of windows.
 MAX_STEADY_S = 3600.0
 MAX_STATES = 20_000
-LOST_SHARE = 0.5  # of the mean force; below, a state without promise is one in the air
+LOST_SHARE = 0.5  # of the mean force; below, a state without guarantee is one in the air
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class CoveredSpan:
 class SlideCoverage:
     """The covered time of consecutive `slide` states, handed out window by window.
 
-    After a state that promises nothing, though others did, the time up to the next state is not covered: the finger has
+    After a state without guarantee, though others had one, the time up to the next state is not covered: the finger has
     lost the surface or turns. If its force is far below that of the slide so far, the finger is in the air, and what is
-    left of the promise is not covered either; windows that were already handed out on it are not taken back.
+    left of the guarantee is not covered either; windows that were already handed out on it are not taken back.
 
     All it says depends on the order of the states alone, never on when they arrived: the mean speed and force of a
     window are those of the shortest beginning of the states that covers it.

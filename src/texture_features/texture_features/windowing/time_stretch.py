@@ -19,7 +19,7 @@ class Stretched:
     """A feature of windows that are first brought to one speed; itself a feature.
 
     A window of n samples at speed v becomes one of n · v / `to_m_s` samples at the same rate: the surface passes as it
-    would at that speed. What then lies above half the rate is left out, not folded back. The feature is told the
+    would at that speed. What then lies above half the rate is left out, not folded back. The feature gets the
     speed after stretching. A window whose speed is unknown or not above 0 stays as it is; no window becomes more than
     ten times as long or as short.
 

@@ -72,7 +72,7 @@ class ImportedStream:
 def write_steady_slides(path: Path, stream: ImportedStream, slides: Iterable[SteadySlide]) -> Path:
     """Write a bag of slides, one after the other in the order given; the stamps are made up.
 
-    A state is published at the start of each phase and promises its whole length: speed and force do not change.
+    A state is published at the start of each phase and guarantees its whole length: speed and force do not change.
 
     Parameters
     ----------

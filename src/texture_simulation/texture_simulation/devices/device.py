@@ -13,8 +13,8 @@ from texture_simulation.devices.pty_port import PtyPort
 class EmulatedDevice:
     """An emulated device on a pseudo-terminal.
 
-    It has no clock of its own: each kind is told what has been sampled, and a caller of another pace than nominal makes
-    it a device whose clock drifts.
+    It has no clock of its own: each kind is given the samples, and a caller of another pace than nominal makes it a
+    device whose clock drifts.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ State of the tip: `stretch_m` of the skin (base ahead of tip), `slip_m_s` (speed
 
 σ1 fades as the Stribeck curve does, which keeps friction passive at all speeds. What comes into contact when the force
 grows comes unbent, and what leaves takes its share of the bending with it: bend·N stays when N grows, bend stays when
-N falls. So a change of force adds no energy, and a new touch begins unbent without being told.
+N falls. So a change of force adds no energy, and a new touch begins unbent by itself.
 """
 
 from __future__ import annotations

@@ -77,7 +77,7 @@ class FaultInjector:
                 if self._stop.wait(planned_fault.quiet_s):
                     return
                 self._inject(planned_fault)
-        except Exception as error:  # told in the report, which is written in any case
+        except Exception as error:  # stands in the report, which is written in any case
             self.error = error
 
     def _inject(self, planned_fault: PlannedFault) -> None:

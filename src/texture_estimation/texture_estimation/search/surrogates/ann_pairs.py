@@ -22,7 +22,7 @@ def ann_pairs(learner: AnnPairs, X: Array, y: Codes, groups: Codes) -> ScoresOfH
 
     Each network sees the examples of its pair, of 200 that are drawn from all labels, and makes ten steps of the
     Levenberg-Marquardt method, without a part held out to stop early; `exact` does what the learner does. Both
-    accuracies are told of the whole half.
+    accuracies are those of the whole half.
 
     Parameters
     ----------
