@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -36,6 +37,7 @@ MADE = {
     '<!-- parameters -->': reference.parameters,
     '<!-- papers -->': reference.papers,
     '<!-- grades -->': reference.grades,
+    **{f'<!-- experiment {name} -->': partial(reference.experiment, name) for name in reference.EXPERIMENTS},
 }
 MORE_PAGES = '<!-- more pages -->'
 # Tables that a benchmark wrote, linked from its page: without a title, so in no list of pages.

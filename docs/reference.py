@@ -14,6 +14,7 @@ from texture_core.parameters import markdown_table
 
 INTERFACES = 'src/texture_msgs'
 CHARTS = 'docs/charts'
+EXPERIMENTS = ('ets-linear', 'ets-circular', 'ets-fine', 'jamali', 'kaboli', 'hu', 'roughness')
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 
 
@@ -72,18 +73,67 @@ def papers(root: Path) -> str:
 
 
 def _experiment(content: dict[str, Any]) -> str:
-    rows = ['| task | recipe | paper | here, with 95 % interval |', '|---|---|---|---|']
+    seeds = len(content['numbers'].get('seeds', [0]))
+    rows = [
+        f'| task | recipe | paper | here, with 95 % interval over slides | mean of {seeds} seeds, with 95 % interval |',
+        '|---|---|---|---|---|',
+    ]
     for task, recipes in content['numbers']['tasks'].items():
         for recipe, figures in recipes.items():
-            paper = figures.get('paper', {}).get('test')
-            rows.append(f'| {task} | {recipe} | {percent(paper)} | {percent(figures["test"])} |')
+            paper = percent(figures.get('paper', {}).get('test'))
+            here, over_seeds = percent(figures['test']), percent(figures.get('over_seeds'))
+            rows.append(f'| {task} | {recipe} | {paper} | {here} | {over_seeds} |')
     head = f'### {content["name"]}\n\nData: {content["data"]}. Split: {content["split"]}.\n'
     return head + difficulty(content['numbers'].get('difficulty') or {}) + '\n' + '\n'.join(rows) + '\n'
 
 
+def experiment(name: str, root: Path) -> str:
+    """Return the tables of one experiment: methods, anchor and findings, over the seeds that it was run with."""
+    content = json.loads((root / CHARTS / f'{name}.json').read_text(encoding='utf-8'))
+    numbers = content['numbers']
+    seeds = numbers.get('seeds', [numbers.get('seed', 0)])
+    rows = [
+        f'| task | method | paper: test | simulated, seed {seeds[0]}: training | test (95 % over slides) '
+        f'| unclassified | over {len(seeds)} seeds: test (95 %) |',
+        '|---|---|---|---|---|---|---|',
+    ]
+    for task, methods in numbers.get('tasks', {}).items():
+        for method, figures in methods.items():
+            cells = [
+                percent(figures.get('paper', {}).get('test')),
+                percent(figures.get('learning')),
+                percent(figures['test']),
+                percent(figures['unclassified']),
+                percent(figures.get('over_seeds')),
+            ]
+            rows.append(f'| {task} | {method} | {" | ".join(cells)} |')
+    table = '\n'.join(rows) if numbers.get('tasks') else ''
+    anchor = difficulty(numbers.get('difficulty') or {})
+    unit = 100.0 if numbers.get('tasks') else 1.0  # points of a share, or grades
+    return f'{table}\n\n{anchor}\n{_findings(numbers["findings"], len(seeds), unit)}\n'
+
+
+def _findings(found: list[dict[str, Any]], seeds: int, unit: float) -> str:
+    rows = [f'| finding | seed 0 | decided by the mean over {seeds} seeds (95 %) | verdict |', '|---|---|---|---|']
+    for finding in found:
+        decides = signed(finding.get('over_seeds', finding['interval']), unit)
+        rows.append(f'| {finding["claim"]} | {finding["here"]} | {decides} | **{finding["verdict"]}** |')
+    return '\n'.join(rows)
+
+
+def signed(interval: list[float], unit: float) -> str:
+    """Return a difference with its interval, times a unit."""
+    digits = 1 if unit > 1.0 else 2
+    middle, low, high = (unit * value for value in interval)
+    return f'{middle:+.{digits}f} ({low:+.{digits}f} to {high:+.{digits}f})'
+
+
 def difficulty(chosen: dict[str, Any]) -> str:
     """Return which figure the scene was made for: it is no result."""
-    return f'The difficulty of the scene ({chosen["setting"]}) was set by {chosen["set_by"]}.\n' if chosen else ''
+    if not chosen:
+        return ''
+    shortfall = f'; {chosen["shortfall"]}' if chosen.get('shortfall') else ''
+    return f'Anchor, no finding: {chosen["setting"]} was set by {chosen["set_by"]}{shortfall}.\n'
 
 
 def grades(root: Path) -> str:

@@ -126,7 +126,7 @@ def _methods(svm: float, em: float, table: Table | None) -> tuple[Method, ...]:
         *online,
         Method(OVR, windows=WHOLE),
         Method(EM, Figures(test=em), WHOLE),
-        *(Method(name, windows=WHOLE, features=ALL_SLOW, label=f'{name}, all slow channels') for name in (SVM, EM)),
+        Method(EM, windows=WHOLE, features=ALL_SLOW, label=f'{EM}, all slow channels'),
         OURS,
         Method('vibration-and-taxels'),
     )
