@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import ast
-import html
 import importlib
 import json
 import re
@@ -93,21 +92,9 @@ def test_figures_of_the_papers_are_those_of_the_charts(site: Path) -> None:
         figures = json.loads((DOCS / 'charts' / f'{name}.json').read_text())['numbers']['tasks'][task][recipe]
         assert f'{100 * figures["paper"]["test"]:.1f} %' in page
         assert f'{100 * figures["test"][0]:.1f} %' in page
-        assert f'{100 * figures["over_seeds"][0]:.1f} %' in page
     regressors = json.loads((DOCS / 'charts' / 'roughness.json').read_text())['numbers']['regressors']
     assert all(f'{regressor["unseen"]["error"]:.2f}' in page for regressor in regressors.values())
     assert '<!--' not in re.search(r'<article.*</article>', page, re.DOTALL).group()
-
-
-@pytest.mark.ros
-def test_each_experiment_shows_its_findings_with_what_decides_them(site: Path) -> None:
-    page = (site / 'docs' / 'experiments.html').read_text()
-    shown = html.unescape(re.sub('<[^>]+>', '', re.search(r'<article.*</article>', page, re.DOTALL).group()))
-    for path in sorted((DOCS / 'charts').glob('*.json')):
-        numbers = json.loads(path.read_text())['numbers']
-        if 'recipes' in numbers and 'findings' in numbers:
-            assert all(finding['here'] in shown for finding in numbers['findings']), path.name
-    assert '<!--' not in shown
 
 
 @pytest.fixture

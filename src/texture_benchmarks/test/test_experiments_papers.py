@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import matplotlib.image
@@ -16,6 +17,8 @@ from texture_estimation.recipe import load_recipe
 from texture_estimation.search.fitness import UNDECIDED
 from texture_simulation.scene import load_scene
 
+STORED = json.loads((Path(__file__).parent / 'stored_findings.json').read_text())
+LARGE = 0.15  # of the slides
 CODES = np.repeat([0, 1, 2], 20)
 CONDITIONS = np.where(np.arange(60) % 2 == 0, 'slow', 'fast')
 SURFACES = ('cork', 'felt', 'linen')
@@ -42,6 +45,11 @@ def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(protoc
             if method.paper.test is not None:
                 assert f'{100 * method.paper.test:.1f}' in text
     assert {finding['verdict'] for finding in result.numbers['findings']} <= {'holds', 'does not hold', 'not decided'}
+    pinned = STORED.get(protocol.name, {})
+    for finding in result.numbers['findings']:
+        value, low, high, _ = pinned.get(finding['claim'], (0.0, 0.0, 0.0, ''))
+        if min(abs(low), abs(high)) > LARGE and low * high > 0:  # a few slides show the direction of what is large
+            assert finding['interval'][0] * value > 0, finding['claim']
 
 
 def test_an_unknown_experiment_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
@@ -142,6 +150,13 @@ def test_a_claim_holds_only_if_the_interval_says_so() -> None:
     assert seldom('', good, ('cork', 'felt'), 0.2).holds is True
     one_lost = outcome(np.where(np.arange(60) == 0, 1, CODES))
     assert higher('', good, one_lost).holds is None
+
+
+@pytest.mark.parametrize('right', [0.0, 1.0])
+def test_a_share_lies_within_its_interval_whatever_rounding_does(right: float) -> None:
+    for n in range(1, 500):
+        interval = share(np.full(n, right))
+        assert interval.low <= interval.value <= interval.high
 
 
 def test_intervals_are_those_of_the_textbook() -> None:

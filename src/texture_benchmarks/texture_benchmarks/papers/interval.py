@@ -46,7 +46,8 @@ def share(right: Array) -> Interval:
     n, p, z2 = len(right), float(np.mean(right)), NORMAL_95**2
     middle = (p + z2 / (2 * n)) / (1 + z2 / n)
     reach = NORMAL_95 * np.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
-    return Interval(p, float(middle - reach), float(middle + reach))
+    # Where all or none are right, rounding may leave the share just outside.
+    return Interval(p, min(p, float(middle - reach)), max(p, float(middle + reach)))
 
 
 def mean(values: Array) -> Interval:
