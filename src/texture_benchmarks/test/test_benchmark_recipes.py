@@ -1,4 +1,6 @@
 import os
+import sys
+import types
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -10,7 +12,7 @@ from texture_benchmarks.catalogue import BENCHMARKS
 from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION
 from texture_benchmarks.recipes.trial import at_rate, comparable, figures_of, in_random_folds, trained_every
 from texture_benchmarks.result import BenchmarkOptions
-from texture_core.errors import ModelMismatch
+from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
@@ -19,6 +21,8 @@ from texture_evaluation.cross_validation.chronological_split import Chronologica
 from texture_evaluation.cross_validation.cross_validate import cross_validate, split_slides
 from texture_recordings.slide_dataset import SlideDataset, cut_slide
 from texture_recordings.slides import LabelledSlide, find_slides
+from texture_recordings.tables.import_tables import import_tables
+from texture_recordings.tables.mapping import mapping_from
 
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 SLIDES = [LabelledSlide(Path('bag'), f'{s}/{k}', s, k, k, None) for s in ('cork', 'felt') for k in range(1, 11)]
@@ -130,3 +134,62 @@ def test_the_shorter_run_tries_the_vibration_of_later_slides(tmp_path: Path) -> 
     assert set(result.numbers[VIBRATION]) == {'by time'}
     assert result.split == 'by time: trained on slides 1-30 of each surface, tested on the later ones'
     assert [chart.name for chart in result.charts] == ['recipes_later.png']
+
+
+class NearestMean:
+    """A classifier with the interface of aeon's: windows (n, n_channels, n_samples) by their power."""
+
+    def fit(self, X: np.ndarray, y: np.ndarray) -> 'NearestMean':
+        power = np.log(X.var(axis=(1, 2)))
+        self.labels = np.unique(y)
+        self.means = np.array([power[y == label].mean() for label in self.labels])
+        return self
+
+    def predict(self, X: np.ndarray) -> np.ndarray:
+        power = np.log(X.var(axis=(1, 2)))
+        return self.labels[np.abs(power[:, None] - self.means).argmin(axis=1)]
+
+
+def loud_and_quiet(folder: Path) -> Path:
+    rng = np.random.default_rng(0)
+    mapping = mapping_from({
+        'files': '{material}_*.npy',
+        'streams': {'signal': {'columns': ['0', '1'], 'rate_hz': 1000.0}},
+        'label': {'column': 'material'},
+    })  # fmt: skip
+    (folder / 'in').mkdir()
+    for material, amplitude in (('loud', 3.0), ('quiet', 1.0)):
+        for number in range(3):
+            np.save(folder / 'in' / f'{material}_{number}.npy', amplitude * rng.normal(size=(2500, 2)))
+    import_tables(mapping, folder / 'in', folder / 'bags')
+    return folder / 'bags'
+
+
+def test_a_recipe_and_estimators_of_ones_own_stand_beside_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = types.ModuleType('my_estimators')
+    module.NearestMean = NearestMean
+    monkeypatch.setitem(sys.modules, 'my_estimators', module)
+    recipe = tmp_path / 'default.yaml'
+    recipe.write_text(
+        'windows: {length_s: 0.5, hop_s: 0.5}\ninputs: {signal: {features: [log_variance]}}\nlearner: naive_bayes\n'
+    )
+    methods = (str(recipe), 'sklearn.naive_bayes:GaussianNB', 'my_estimators:NearestMean')
+    options = BenchmarkOptions(tmp_path / 'out', quick=True, own_methods=methods, own_bags=(loud_and_quiet(tmp_path),))
+    result = BENCHMARKS['recipes'](options)
+    [cells] = result.numbers['own recordings'].values()
+    assert {'default (own)', 'GaussianNB', 'NearestMean', 'default'} == set(cells)
+    assert cells['default (own)']['window_accuracy'] == cells['NearestMean']['window_accuracy'] == 1.0
+    assert all(cell['latency_us']['median'] > 0 for cell in cells.values())
+    assert '| NearestMean |' in (tmp_path / 'out' / 'recipes_own.md').read_text()
+    assert result.name == 'recipes_own'
+    assert result.split == '3 folds by slide'
+
+
+def test_a_recipe_that_needs_what_the_slides_lack_is_refused(tmp_path: Path) -> None:
+    recipe = tmp_path / 'slow.yaml'
+    recipe.write_text('inputs: {signal_static: {features: [mean]}}\nlearner: naive_bayes\n')
+    options = BenchmarkOptions(
+        tmp_path / 'out', quick=True, own_methods=(str(recipe),), own_bags=(loud_and_quiet(tmp_path),)
+    )
+    with pytest.raises(InvalidData, match=r"slow.yaml' needs signal_static; the slides have signal"):
+        BENCHMARKS['recipes'](options)

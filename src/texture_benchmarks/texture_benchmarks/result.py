@@ -33,6 +33,10 @@ class BenchmarkOptions:
         Folder of data sets that are imported already, each in its own folder; see `imports.imported`.
     quick
         Fewer repetitions, for tests; such numbers are not for publishing.
+    own_methods
+        Recipes of one's own, by path, and estimators by 'module:Class', that `recipes` tries beside the shipped ones.
+    own_bags
+        Labelled bags, or folders of bags, that `recipes` takes in place of the recorded data sets.
     """
 
     out: Path
@@ -41,6 +45,8 @@ class BenchmarkOptions:
     quick: bool = False
     duration_s: float = 30.0
     bags: Path | None = None
+    own_methods: tuple[str, ...] = ()
+    own_bags: tuple[Path, ...] = ()
 
     def recordings(self, name: str, *more: str) -> list[Path]:
         """Return the folders of recorded data sets, by the names of these.

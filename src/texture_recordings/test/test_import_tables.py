@@ -200,3 +200,94 @@ def test_an_import_that_fails_leaves_no_half_of_it(tmp_path: Path, mapping: Tabl
     with pytest.raises(InvalidData, match=r"no column 'acc_y'|no column 'grip'"):
         import_tables(mapping, folder, tmp_path / 'out')
     assert list((tmp_path / 'out').iterdir()) == []
+
+
+def one_channel(**content: object) -> TableMapping:
+    return mapping_from({
+        'streams': {'signal': {'columns': ['x'], 'rate_hz': 100.0}}, 'label': {'value': 'cork'}, **content,
+    })  # fmt: skip
+
+
+def lengths(folder: Path, mapping: TableMapping) -> list[int]:
+    report = import_tables(mapping, folder / 'in', folder / 'out')
+    return [len(samples) for samples in SlideDataset.from_bags(report.bags).to_numpy(next(iter(mapping.streams)))[0]]
+
+
+def save(folder: Path, **arrays: object) -> Path:
+    (folder / 'in').mkdir()
+    np.savez(folder / 'in' / 'slides.npz', **arrays)
+    return folder
+
+
+def test_slides_of_equal_length_are_cut_by_time_and_the_rest_is_left(tmp_path: Path) -> None:
+    mapping = one_channel(slides={'by': 'time', 'length_s': 2.0, 'start_s': 0.5, 'end_s': 0.25})
+    assert lengths(save(tmp_path, x=np.arange(700.0)), mapping) == [125, 125, 125]
+
+
+def test_a_pause_or_a_time_that_begins_again_ends_a_slide(tmp_path: Path) -> None:
+    time_s = np.concatenate([np.arange(100) / 100, 3.0 + np.arange(150) / 100, np.arange(120) / 100])
+    mapping = mapping_from({
+        'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}},
+        'label': {'value': 'cork'},
+        'slides': {'by': 'pause', 'pause_s': 1.0},
+    })  # fmt: skip
+    assert lengths(save(tmp_path, x=np.arange(370.0), t=time_s), mapping) == [100, 150, 120]
+
+
+def test_sliding_is_detected_where_the_signal_is_above_that_at_rest(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    sliding = np.zeros(8000, dtype=bool)
+    sliding[1500:3500] = sliding[5000:7000] = True
+    samples = rng.normal(size=8000) * np.where(sliding, 20.0, 1.0)
+    mapping = mapping_from({
+        'streams': {'signal': {'columns': ['x'], 'rate_hz': 1000.0}}, 'label': {'value': 'cork'},
+        'slides': {'by': 'detection'},
+    })  # fmt: skip
+    found = lengths(save(tmp_path, x=samples), mapping)
+    assert len(found) == 2
+    assert all(1400 <= length <= 2100 for length in found)
+
+
+def test_trials_of_arrays_for_machine_learning_are_slides(tmp_path: Path) -> None:
+    mapping = mapping_from({
+        'streams': {'signal': {'columns': ['X.*'], 'rate_hz': 500.0}},
+        'label': {'column': 'y', 'names': {0: 'cork', 1: 'felt'}},
+        'slides': {'by': 'column', 'column': 'trial'},
+    })  # fmt: skip
+    samples = np.random.default_rng(0).normal(size=(4, 250, 3))
+    report = import_tables(mapping, save(tmp_path, X=samples, y=np.array([0, 1, 1, 0])) / 'in', tmp_path / 'out')
+    dataset = SlideDataset.from_bags(report.bags)
+    assert dataset.labels.tolist() == ['cork', 'cork', 'felt', 'felt']
+    read, _ = dataset.to_numpy()
+    np.testing.assert_allclose(read[1], samples[3], atol=1e-6)
+
+
+def test_a_shipped_mapping_is_found_by_its_name(tmp_path: Path) -> None:
+    slides = {
+        f'material0{m}/val_{k % 2}_0{k}': np.full((75, 60), float(k), np.float32) for m in (1, 2) for k in range(3)
+    }
+    mapping = load_mapping('icub20')
+    assert lengths(save(tmp_path, **slides), mapping) == [75] * 6
+    assert SlideDataset.from_bags([tmp_path / 'out']).condition('number').tolist() == [1, 2, 3] * 2
+
+
+def test_slides_that_are_too_short_are_counted(tmp_path: Path) -> None:
+    mapping = one_channel(slides={'by': 'column', 'column': 'k', 'min_s': 0.5})
+    save(tmp_path, x=np.arange(150.0), k=np.repeat([1, 2, 3], [60, 20, 70]))
+    report = import_tables(mapping, tmp_path / 'in', tmp_path / 'out')
+    assert (sum(report.slides.values()), report.short_slides) == (2, 1)
+    with pytest.raises(InvalidData, match='no slide of 5 s or more'):
+        import_tables(one_channel(slides={'min_s': 5.0}), tmp_path / 'in', tmp_path / 'none')
+
+
+@pytest.mark.parametrize('resolution_s', [0.001, 0.01])
+def test_a_coarse_clock_or_samples_in_batches_are_no_gaps(tmp_path: Path, resolution_s: float) -> None:
+    """3000 samples a second, stamped in whole milliseconds, or thirty at once."""
+    time_s = np.floor(np.arange(6000) / 3000.0 / resolution_s + 1e-6) * resolution_s
+    mapping = mapping_from({
+        'streams': {'signal': {'columns': ['x'], 'time': {'column': 't'}}}, 'label': {'value': 'cork'},
+    })  # fmt: skip
+    report = import_tables(mapping, save(tmp_path, x=np.arange(6000.0), t=time_s) / 'in', tmp_path / 'out')
+    stream = report.streams['signal']
+    assert (stream.rate_hz, stream.samples) == (3000.0, 6000)
+    assert stream.gaps == stream.lost == stream.disordered == 0

@@ -144,7 +144,8 @@ def test_a_matlab_file_that_claims_huge_dimensions_is_refused(tmp_path: Path) ->
         tables(tmp_path / 'a.mat')
 
 
-def test_a_matlab_file_that_unpacks_without_end_is_refused(tmp_path: Path) -> None:
+def test_a_matlab_file_that_unpacks_without_end_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('texture_recordings.tables.table.MAX_BYTES', 1_000_000)
     scipy.io.savemat(tmp_path / 'a.mat', {'x': X})
     head = (tmp_path / 'a.mat').read_bytes()[:128]
     packed = zlib.compress(bytes(100_000_000))

@@ -34,6 +34,6 @@ def library(name: str, files: str, extra: str) -> Any:
         return importlib.import_module(name)
     except ImportError as error:
         raise InvalidData(
-            f"{files} need the library '{name}', which is not installed; run 'pip install {name}' "
-            f"or 'pip install texture_recordings[{extra}]'"
+            f"{files} need the library '{name}', which is not installed; run 'pip install "
+            f"{name.partition('.')[0]}', which the extra '{extra}' of texture_recordings names"
         ) from error

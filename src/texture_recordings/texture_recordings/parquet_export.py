@@ -10,6 +10,7 @@ import numpy as np
 
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.files import writing
 from texture_recordings.optional_library import library
 from texture_recordings.slide_samples import SlideSamples
 
@@ -42,13 +43,10 @@ def write_parquet(slides: Sequence[SlideSamples], path: str | Path) -> None:
         raise InvalidData(f'the channels are {", ".join(channels)}, but {place}; export slides of one sensor')
     if Path(path).exists():
         raise InvalidParameter(f"'{path}' exists already; name another file or remove it")
-    try:
-        first = arrow.table(_rows(arrow, slides[0]))
-        with parquet.ParquetWriter(path, first.schema) as writer:
-            for slide in slides:
-                writer.write_table(arrow.table(_rows(arrow, slide)))
-    except OSError as error:
-        raise InvalidParameter(f"'{path}' cannot be written: {error.strerror or error}; name another file") from error
+    first = arrow.table(_rows(arrow, slides[0]))
+    with writing(path), parquet.ParquetWriter(path, first.schema) as writer:
+        for slide in slides:
+            writer.write_table(arrow.table(_rows(arrow, slide)))
 
 
 def _rows(arrow: Any, samples: SlideSamples) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from texture_benchmarks.imported_data import importing_once
 from texture_benchmarks.result import BenchmarkOptions
 from texture_benchmarks.run_all import IMPORTED, LONG, run_all
 from texture_core.command_options import add_seed
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidData, InvalidParameter
 
 ALL = 'all'
 NO_DATA = 3  # exit code of a process
@@ -35,12 +35,46 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--duration', type=float, default=30.0, metavar='S', help='length of the long measurement of `load`, s'
     )
+    parser.add_argument(
+        '--recipe',
+        nargs='+',
+        default=(),
+        metavar='FILE',
+        help="with `recipes`: recipes of one's own, drawn beside ours",
+    )
+    parser.add_argument(
+        '--estimator',
+        nargs='+',
+        default=(),
+        metavar='MODULE:CLASS',
+        help='with `recipes`: classifiers of scikit-learn on the features of `default`; others, such as those of aeon, '
+        'on windows of samples',
+    )
+    parser.add_argument(
+        '--bags', nargs='+', type=Path, default=(), metavar='BAG', help="with `recipes`: labelled bags of one's own"
+    )
     add_seed(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run one benchmark, or all for which the data is there: 1 if one of these fails."""
-    benchmark_options = BenchmarkOptions(options.out, options.data, options.seed, options.quick, options.duration)
+    """Run one benchmark, or all for which the data is there: 1 if one of these fails.
+
+    Raises
+    ------
+    InvalidParameter
+        If another benchmark than `recipes` is given methods or bags of one's own.
+    """
+    benchmark_options = BenchmarkOptions(
+        options.out,
+        options.data,
+        options.seed,
+        options.quick,
+        options.duration,
+        own_methods=(*options.recipe, *options.estimator),
+        own_bags=tuple(options.bags),
+    )
+    if (benchmark_options.own_methods or benchmark_options.own_bags) and options.name != 'recipes':
+        raise InvalidParameter(f"'{options.name}' takes no --recipe, --estimator or --bags; use `recipes`")
     if options.name != ALL:
         _run_one(options.name, benchmark_options)
         return 0

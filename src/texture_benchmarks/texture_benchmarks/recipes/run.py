@@ -16,6 +16,16 @@ from texture_benchmarks.charts import front_chart
 from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.recipes import minirocket
+from texture_benchmarks.recipes.own_method import (
+    BESIDE,
+    OWN_DATA,
+    folds_of,
+    own_recipe,
+    shown_name,
+    takes_windows,
+    tells_motion,
+)
+from texture_benchmarks.recipes.raw_windows import try_estimator
 from texture_benchmarks.recipes.table import recipe_table
 from texture_benchmarks.recipes.trial import (
     LENGTH_S,
@@ -27,7 +37,7 @@ from texture_benchmarks.recipes.trial import (
     trained_every,
 )
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
-from texture_core.errors import InvalidData
+from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.resources import folder
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
@@ -42,6 +52,7 @@ VIBRATION, ALL_CHANNELS, ARRAY = 'biotac20, PAC at 1 kHz', 'biotac20, all channe
 DATA = {
     'biotac20': 'BioTac, 20 materials × 40 slides of 6 s (github dexrob/BioTac_slide_20_50, Gao et al. 2020)',
     'ntp21': 'MEMS array of 9 taxels, 21 textures × 4 speeds × 4 forces, one slide each (github LIMB-UCF/NTP)',
+    OWN_DATA: 'slides of the bags given',
 }
 RATE_HZ, FOLDS, LAST_TRAINED = 1000.0, 5, 30
 QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_TRAINED = ('material01', 'material02', 'material03'), '1-6', 2, 4
@@ -132,10 +143,13 @@ class Setting:
     of_motion: bool
 
     def recipe(self, name: str) -> Recipe:
-        """Return a shipped recipe as it is tried here: with the vibration alone where other inputs are missing."""
-        recipe = load_recipe(name.partition(', ')[0])
-        learner: Any = recipe.learner
-        recipe = replace(recipe, learner=replace(learner, **VARIANTS.get(name, SHIPPED).learner))
+        """Return a recipe as it is tried here: with the vibration alone where other inputs are missing."""
+        if name in VARIANTS:
+            recipe = load_recipe(name.partition(', ')[0])
+            learner: Any = recipe.learner
+            recipe = replace(recipe, learner=replace(learner, **VARIANTS[name].learner))
+        else:
+            recipe = own_recipe(name)
         whole = set(recipe.feature_set.topics) <= set(self.dataset[0].signals)
         recipe = comparable(with_channels(recipe, 'all' if whole else 'fast'), self.rate_hz, of_motion=self.of_motion)
         return trained_every(VARIANTS.get(name, SHIPPED).apart_s, recipe)
@@ -154,11 +168,57 @@ class _RecipeFigures(NamedTuple):
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Try all shipped recipes, and variants of some, on all recorded data sets that are there."""
+    """Try all shipped recipes, and variants of some, on all recorded data sets that are there.
+
+    With recipes, estimators or bags of the user's own, try these beside a few of the shipped recipes.
+    """
+    if options.own_methods or options.own_bags:
+        return run_own(options)
     numbers = _numbers(_settings(options), (*_shipped(options), *(() if options.quick else VARIANTS)), options)
     options.out.mkdir(parents=True, exist_ok=True)
     (options.out / 'recipes.md').write_text(recipe_table(numbers), encoding='utf-8')
     return result_of('recipes', numbers, options)
+
+
+def run_own(options: BenchmarkOptions) -> BenchmarkResult:
+    """Try the user's own methods beside some shipped recipes, on the user's own slides if there are any.
+
+    Raises
+    ------
+    InvalidData
+        If the slides are too few to be split, or a recipe needs a signal that they lack.
+    """
+    settings = own_settings(options) if options.own_bags else _settings(options)
+    first = next(iter(settings.values()))
+    shipped = [name for name in (QUICK_RECIPES[:1] if options.quick else BESIDE) if _fits(name, first)]
+    for name in options.own_methods:
+        if not takes_windows(name) and not _fits(name, first):
+            needed = ', '.join(own_recipe(name).feature_set.topics)
+            raise InvalidData(f"'{name}' needs {needed}; the slides have {', '.join(first.dataset[0].signals)}")
+    tried = _numbers(settings, (*shipped, *options.own_methods), options)
+    numbers = {
+        setting: {split: {shown_name(name): cell for name, cell in cells.items()} for split, cells in splits.items()}
+        for setting, splits in tried.items()
+    }
+    options.out.mkdir(parents=True, exist_ok=True)
+    (options.out / 'recipes_own.md').write_text(recipe_table(numbers), encoding='utf-8')
+    return result_of('recipes_own', numbers, options)
+
+
+def own_settings(options: BenchmarkOptions) -> dict[str, Setting]:
+    """Return the user's own slides in five folds, or as many as there are slides of the rarest surface."""
+    dataset = SlideDataset.from_bags(options.own_bags)
+    rate_hz = next(iter(dataset[0].signals.values()))[0].sampling_rate_hz
+    return {OWN_DATA: Setting(dataset, [folds_of(dataset, options.seed)], rate_hz, of_motion=tells_motion(dataset))}
+
+
+def _fits(name: str, setting: Setting) -> bool:
+    """Return whether a recipe can be tried: its signals and, where it needs it, the speed are there."""
+    try:
+        topics = setting.recipe(name).feature_set.topics
+    except InvalidParameter:  # of a recipe without vibration on slides that have nothing else
+        return False
+    return set(topics) <= set(setting.dataset[0].signals) and (name not in NEEDS_ARRAY or setting.of_motion)
 
 
 def run_later(options: BenchmarkOptions) -> BenchmarkResult:
@@ -223,7 +283,7 @@ def result_of(name: str, numbers: Mapping[str, Any], options: BenchmarkOptions) 
             'and stretching: there they belong to the session and not to the surface'
         ),
         data='; '.join(text for name, text in DATA.items() if name in sets),
-        split='; '.join(f'{split}: {text}' for split, text in SPLITS.items() if split in splits),
+        split='; '.join(f'{split}: {SPLITS[split]}' if split in SPLITS else split for split in sorted(splits)),
         numbers={'references': REFERENCES, 'MiniRocket': _note(options), **numbers},
         charts=(_chart(numbers, options.out / f'{name}.png'),),
     )
@@ -271,9 +331,11 @@ def _ntp21(options: BenchmarkOptions) -> dict[str, Setting]:
 
 def _jobs(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> list[_RecipeJob]:
     """Return what is tried; recipes with the same windows and features together: they are described once."""
-    groups: dict[tuple[str, FeatureSet, float], list[str]] = {}
+    groups: dict[tuple[str, FeatureSet | str, float], list[str]] = {}
     for setting, name in product(settings, names):
-        if PLACES.get(name, setting) == setting:
+        if takes_windows(name):
+            groups.setdefault((setting, name, 0.0), []).append(name)
+        elif setting in (PLACES.get(name, setting), OWN_DATA):
             recipe = settings[setting].recipe(name)
             groups.setdefault((setting, recipe.feature_set, recipe.training.hop_s), []).append(name)
     jobs = [_RecipeJob(setting, tuple(group)) for (setting, *_), group in groups.items()]
@@ -290,6 +352,10 @@ def _count(setting: Setting, split: Split) -> int:
 
 def _try(settings: Mapping[str, Setting], seed: int, job: _RecipeJob) -> dict[str, _RecipeFigures]:
     setting = settings[job.setting]
+    if takes_windows(job.recipes[0]):
+        [name] = job.recipes
+        found = {split.name: try_estimator(setting.dataset, split, name, seed) for split in setting.splits}
+        return {name: _RecipeFigures(found, None)}
     if job.recipes == (MINIROCKET,):
         figures = {split.name: minirocket.try_minirocket(setting.dataset, split, seed) for split in setting.splits}
         return {MINIROCKET: _RecipeFigures(figures, None)}

@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 from texture_core.arrays import AnyArray, Array
 from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData
+from texture_core.files import Budget, unpacked_limit
 from texture_recordings.tables.mapping import TableMapping
 
 MAX_VALUES = 50_000_000  # of one table: 400 MB
+MAX_BYTES = 8 * MAX_VALUES
 EXAMPLES = 5
 RANGE = re.compile(r'(\D*)(\d+)-\1(\d+)')
 MAX_RANGE = 10_000
@@ -144,6 +146,11 @@ def check_size(values: int, place: str) -> None:
     """
     if values > MAX_VALUES:
         raise InvalidData(f"'{place}' has more than {MAX_VALUES // 1_000_000} million values; split it into files")
+
+
+def budget_of(file_bytes: int) -> Budget:
+    """Return how many bytes may come out of a compressed file: those of one table, or ten times its size."""
+    return Budget(max(MAX_BYTES, unpacked_limit(file_bytes)))
 
 
 def _meant(name: str, names: Sequence[str]) -> list[str]:

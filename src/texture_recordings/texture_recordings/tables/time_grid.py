@@ -58,7 +58,7 @@ def estimated_rate_hz(time_s: Array) -> float:
     >>> estimated_rate_hz(np.array([0.0, 0.011, 0.019, 0.03, 0.53, 0.54]))
     100.0
     """
-    steps = np.diff(time_s[np.isfinite(time_s)])
+    steps = np.diff(_spread(time_s[np.isfinite(time_s)]))
     steps = steps[steps > 0]
     if not len(steps):
         return float('nan')
@@ -91,7 +91,7 @@ def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float,
     """
     if time_s is None or len(samples) < 2:
         return GridRows(samples, np.arange(len(samples)), np.empty(0))
-    times = _known(time_s)
+    times = _known(time_s) if interpolated else _spread(_known(time_s))
     later = np.concatenate(([True], times[1:] > np.maximum.accumulate(times)[:-1]))
     samples, times = samples[later], times[later]
     steps = np.diff(times) * rate_hz
@@ -139,6 +139,20 @@ def _known(time_s: Array) -> Array:
     rows = np.arange(len(time_s))
     filled: Array = np.interp(rows, rows[known], time_s[known])
     return filled
+
+
+def _spread(times: Array) -> Array:
+    """Return times in which rows of one time are spread to the next: of a coarse clock, or of samples in batches."""
+    starts = np.flatnonzero(np.concatenate(([True], times[1:] != times[:-1])))
+    if len(starts) == len(times) or len(starts) < 2:
+        return times
+    counts = np.diff(np.append(starts, len(times)))
+    steps = np.diff(times[starts]) / counts[:-1]
+    steps = np.append(steps, steps[-1])
+    within = np.arange(len(times)) - np.repeat(starts, counts)
+    forward = np.where(steps > 0, steps, 0.0)  # a time that goes back tells nothing
+    spread: Array = np.repeat(times[starts], counts) + within * np.repeat(forward, counts)
+    return spread
 
 
 def _interpolated(samples: Array, place: Array) -> tuple[AnyArray, Array]:

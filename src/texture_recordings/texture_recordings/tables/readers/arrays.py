@@ -51,7 +51,7 @@ def tables_of(
         raise InvalidData(
             f"'{place}' has no array of the form '{mapping.tables}'; it has {', '.join(names[:5]) or 'none'}"
         )
-    for table, (fields, members) in groups.items():
+    for table, (fields, members) in sorted(groups.items()):
         within = f'{place}, {table}' if table else place
         arrays = {column: _turned(load(name), transpose=mapping.format.transpose) for column, name in members.items()}
         columns, constants = _columns(arrays, within)

@@ -11,11 +11,11 @@ import numpy as np
 
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
-from texture_core.files import Budget, FileRefused, open_regular, unpacked_limit
+from texture_core.files import Budget, FileRefused, open_regular
 from texture_recordings.optional_library import library
 from texture_recordings.tables.mapping import TableMapping
 from texture_recordings.tables.readers.arrays import tables_of
-from texture_recordings.tables.table import Table
+from texture_recordings.tables.table import Table, budget_of
 
 MAX_DATASETS, MAX_DEPTH = 20_000, 20
 BROKEN = (OSError, ValueError, RuntimeError, KeyError, TypeError, OverflowError, MemoryError)
@@ -76,7 +76,7 @@ def _tables(path: Path, place: str, mapping: TableMapping, *, reverse: bool) -> 
     try:
         open_regular(path).close()
         with h5py.File(path, 'r') as file:
-            budget = Budget(unpacked_limit(path.stat().st_size))
+            budget = budget_of(path.stat().st_size)
             names = list(_datasets(h5py, file, '', 0))
             if len(names) > MAX_DATASETS:
                 raise FileRefused(f'it has {len(names)} data sets; {MAX_DATASETS} are allowed')

@@ -17,11 +17,11 @@ import numpy as np
 
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
-from texture_core.files import MB, Budget, FileRefused, read_bounded, unpacked_limit
+from texture_core.files import MB, Budget, FileRefused, read_bounded
 from texture_recordings.tables.mapping import TableMapping
 from texture_recordings.tables.readers.arrays import tables_of
 from texture_recordings.tables.readers.hdf5_file import read_matlab_hdf5
-from texture_recordings.tables.table import Table
+from texture_recordings.tables.table import Table, budget_of
 
 HEAD = 128
 MAX_FILE_BYTES = 500 * MB
@@ -81,7 +81,7 @@ def _arrays(content: bytes) -> dict[str, AnyArray]:
     if not content.startswith(b'MATLAB 5') or len(content) < HEAD or content[126:128] not in (b'IM', b'MI'):
         raise FileRefused('it is no MATLAB file of version 5 or 7')
     order = '<' if content[126:128] == b'IM' else '>'
-    budget = Budget(unpacked_limit(len(content)))
+    budget = budget_of(len(content))
     found: dict[str, AnyArray] = {}
     for element in _elements(memoryview(content)[HEAD:], order):
         inner = element
