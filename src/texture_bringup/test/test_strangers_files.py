@@ -29,12 +29,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import skops.io
 import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
-from scipy.io import wavfile
+from scipy.io import savemat, wavfile
 
 from texture_core import resources
 from texture_core.errors import TextureError
@@ -66,6 +67,9 @@ from texture_recordings.cdr import TYPES, decode, encode, typestore
 from texture_recordings.importers.biotac20 import import_biotac20
 from texture_recordings.importers.ntp21 import import_ntp21
 from texture_recordings.slide_dataset import SlideDataset
+from texture_recordings.tables.import_tables import import_tables
+from texture_recordings.tables.mapping import load_mapping, mapping_from
+from texture_recordings.tables.readers.catalogue import MAPPED
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))
@@ -211,6 +215,47 @@ def make_ntp(folder: Path) -> None:
     np.savez_compressed(folder / 'slides.npz', **{'texture00/speed020/force0.0': slide})
 
 
+TABLE = {'streams': {'signal': {'columns': ['x', 'y'], 'rate_hz': 100.0}}, 'label': {'value': 'cork'}}
+WRENCH = 'geometry_msgs/msg/WrenchStamped'
+FOREIGN = {'streams': {'signal': {'columns': ['/wrench/wrench.force.*'], 'rate_hz': 100.0}}, 'label': {'value': 'cork'}}
+
+
+def write_columns(path: Path, columns: dict[str, np.ndarray]) -> None:
+    if path.suffix == '.csv':
+        rows = '\n'.join(f'{x:.5f},{y:.5f}' for x, y in zip(*columns.values(), strict=True))
+        path.write_text(f'{",".join(columns)}\n{rows}\n')
+    elif path.suffix == '.h5':
+        with h5py.File(path, 'w') as file:
+            for name, values in columns.items():
+                file.create_dataset(name, data=values, compression='gzip')
+    else:
+        savemat(path, columns, do_compression=True)
+
+
+def table_file(suffix: str) -> Reader:
+    x, y = np.random.default_rng(7).normal(size=(2, 400))
+    return Reader(
+        lambda folder: write_columns(folder / f'good{suffix}', {'x': x, 'y': y}),
+        read_import(lambda folder, out: import_tables(mapping_from(TABLE), folder, out)),
+        (f'good{suffix}',),
+    )
+
+
+def make_foreign_bag(folder: Path) -> None:
+    types = typestore().types
+    vector = types['geometry_msgs/msg/Vector3']
+    with Writer(folder / 'bag', version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection('/wrench', WRENCH, typestore=typestore())
+        for number in range(200):
+            stamp = types['builtin_interfaces/msg/Time'](sec=1000 + number // 100, nanosec=number % 100 * 10_000_000)
+            header = types['std_msgs/msg/Header'](stamp=stamp, frame_id='tool')
+            inner = types['geometry_msgs/msg/Wrench'](
+                force=vector(x=1.0, y=2.0, z=float(number)), torque=vector(x=0.0, y=0.0, z=0.0)
+            )
+            message = typestore().serialize_cdr(types[WRENCH](header=header, wrench=inner), WRENCH)
+            writer.write(connection, 1_000_000_000 * (1000 + number), message)
+
+
 def read_import(load: Callable[..., object]) -> Callable[[Path], object]:
     def read_into_nothing(folder: Path) -> object:
         shutil.rmtree(folder / 'out', ignore_errors=True)
@@ -301,6 +346,13 @@ READERS = {
     ),
     'BioTac data set': Reader(make_biotac, read_import(import_biotac20), ('material01.npz',)),
     'NTP data set': Reader(make_ntp, read_import(import_ntp21), ('slides.npz',)),
+    'mapping': text_file('texture_recordings', 'config/mappings/icub20.yaml', load_mapping),
+    **{f'table {suffix}': table_file(suffix) for suffix in ('.csv', '.mat', '.h5')},
+    'foreign bag': Reader(
+        make_foreign_bag,
+        read_import(lambda folder, out: import_tables(mapping_from(FOREIGN), folder / 'bag', out, MAPPED['bag'])),
+        ('bag/bag.mcap',),
+    ),
     **{f'recording {ending}': recording(ending) for ending in ('csv', 'npy', 'npz')},
 }
 CASES = [(name, file) for name, reader in READERS.items() for file in reader.files]
