@@ -61,7 +61,7 @@ class SlideCoverage:
     >>> starts = []
     >>> while span := coverage.window():
     ...     starts.append(span.start_ns / NANOSECONDS)
-    ...     coverage.advance()
+    ...     _ = coverage.advance()
     >>> starts  # of 1 s, two windows of 0.5 s
     [0.0, 0.5]
     """

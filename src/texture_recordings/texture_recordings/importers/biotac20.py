@@ -49,9 +49,9 @@ class BiotacSlide:
     Examples
     --------
     >>> frames, velocity, wrench = np.zeros((3, 44)), np.zeros((5, 4)), np.zeros((5, 7))
-    >>> slide = BiotacSlide('material01', '1', frames, np.array([0.0, 0.01, 0.03]), velocity, wrench, epoch=0.0)
-    >>> frame_indices(slide.frame_time).tolist()  # one frame is missing
-    [0, 1, 3]
+    >>> slide = BiotacSlide('material01', '1', frames, np.array([0.0, 0.01, 0.05]), velocity, wrench, epoch=0.0)
+    >>> frame_indices(slide.frame_time).tolist()  # three frames are missing
+    [0, 1, 5]
     """
 
     surface: str
