@@ -25,6 +25,8 @@ from texture_core.parameters import markdown_table
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.arms.ur_params import UrArmParams as Params
+from texture_exploration.arms.ur_probe import TcpConnection, _ask
+from texture_exploration.arms.ur_tables import PROTOCOL_VERSION, REQUEST_VERSION, RTDE_PORT, SETUP_INPUTS
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
@@ -432,3 +434,36 @@ def test_an_arm_that_was_never_connected_says_so():
 
 def test_the_page_lists_the_parameters_as_they_are():
     assert markdown_table(Params) in PAGE.read_text()
+
+
+@contextlib.contextmanager
+def fieldbus(ip, registers):
+    """Claim registers as an adapter of EtherNet/IP or PROFINET does, which no client may write then."""
+    with contextlib.closing(TcpConnection(ip, RTDE_PORT, DEADLINE_S)) as line:
+        _ask(line, REQUEST_VERSION, struct.pack('>H', PROTOCOL_VERSION))
+        names = ','.join(f'input_int_register_{number}' for number in registers)
+        assert b'IN_USE' not in _ask(line, SETUP_INPUTS, names.encode())
+        yield
+
+
+@needs_ur_rtde
+def test_beside_a_fieldbus_the_upper_registers_are_used_and_the_lower_ones_left_alone(emulator):
+    upper = UrArm(UrArmParams(ip=emulator.ip, upper_range_registers=True))
+    with fieldbus(emulator.ip, range(24)):
+        upper.connect()
+        try:
+            before_m = upper.state().position[0]
+            keep(upper, SLIDING, lambda: upper.state().position[0] > before_m + 0.005)
+            upper.stop()
+            wait_for(emulator.rests)
+            assert upper.state().fault == ''
+        finally:
+            upper.close()
+
+
+@needs_ur_rtde
+def test_without_the_upper_registers_a_fieldbus_that_holds_the_lower_ones_is_an_error(emulator):
+    lower = UrArm(UrArmParams(ip=emulator.ip))
+    with fieldbus(emulator.ip, range(24)), pytest.raises(DeviceError):
+        lower.connect()
+    lower.close()

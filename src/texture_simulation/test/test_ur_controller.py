@@ -202,3 +202,11 @@ def test_a_program_of_somebody_else_takes_no_commands_and_can_be_paused(controll
     assert [ask('running'), ask('programState')] == ['Program running: false', 'PAUSED other.urp']
     ask('stop')
     assert ask('programState') == 'STOPPED other.urp'
+
+
+def test_the_program_uses_the_registers_that_its_script_names():
+    controller = EmulatedController(UrControllerParams(), np.random.default_rng(0))
+    controller.upload('def rtde_control():\n global reg_offset_int = # int register offset\n24\nend\n')
+    for _ in range(100):
+        controller.tick()
+    assert (controller.registers.int_out[24], controller.registers.int_out[0]) == (1, 0)  # it is ready

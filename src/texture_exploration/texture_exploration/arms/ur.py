@@ -68,6 +68,7 @@ class UrArm:
             take_over=params.take_over,
             pause_is_ours=self._paused,
             patience_s=max(params.acknowledge_s, 1.0 / params.watchdog_hz) + WATCHDOG_S,
+            upper_range=params.upper_range_registers,
         )
         link = WorkerLink(params)
         try:

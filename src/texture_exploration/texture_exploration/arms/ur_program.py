@@ -8,7 +8,7 @@ from contextlib import closing
 from texture_core.errors import DeviceError
 from texture_exploration.arms.ur_probe import DashboardClient, claims_register, runtime_state
 from texture_exploration.arms.ur_tables import (
-    COMMAND_REGISTER,
+    COMMAND_REGISTERS,
     CONTROL_SCRIPT,
     FIRST_WITHOUT_DASHBOARD,
     PROGRAM_STOPPED,
@@ -19,13 +19,20 @@ STOPPING_S = 2.0
 
 
 def check_program(
-    ip: str, version: tuple[int, int], timeout_s: float, *, take_over: bool, pause_is_ours: bool, patience_s: float
+    ip: str,
+    version: tuple[int, int],
+    timeout_s: float,
+    *,
+    take_over: bool,
+    pause_is_ours: bool,
+    patience_s: float,
+    upper_range: bool = False,
 ) -> None:
     """Return if no program runs or pauses on the controller, or none that anybody needs.
 
     A stop by the safety system may pause the program of the connection before: `pause_is_ours`. A control script of
     ours whose process was killed is ended by its watchdog within `patience_s`; one that has none yet is known by its
-    name and by nobody writing the register that it obeys.
+    name and by nobody writing the register that it obeys: one of the upper range if `upper_range`.
 
     Parameters
     ----------
@@ -52,7 +59,7 @@ def check_program(
         if take_over or (pause_is_ours and program.upper().startswith('PAUSED')):
             break
         if time.monotonic() > end_s:
-            if _is_orphan(ip, program, timeout_s):
+            if _is_orphan(ip, program, timeout_s, COMMAND_REGISTERS[upper_range]):
                 break
             raise DeviceError(
                 f"another program is on the controller at {ip} ('{program}'), and connecting would stop it; stop it on "
@@ -74,8 +81,8 @@ def _program(ip: str, version: tuple[int, int], timeout_s: float) -> str:
     return state if 'true' in running.lower() or not state.upper().startswith('STOPPED') else ''
 
 
-def _is_orphan(ip: str, program: str, timeout_s: float) -> bool:
-    return CONTROL_SCRIPT in program and claims_register(ip, COMMAND_REGISTER, timeout_s)
+def _is_orphan(ip: str, program: str, timeout_s: float, register: str) -> bool:
+    return CONTROL_SCRIPT in program and claims_register(ip, register, timeout_s)
 
 
 def _stop(ip: str, version: tuple[int, int], timeout_s: float) -> None:

@@ -16,7 +16,8 @@ FIRST_WITH_REMOTE_CONTROL = (5, 6)
 # control; a PolyScope X that takes programs on the port where ur-rtde sends its own.
 OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6), 10: (10, 10)}
 CONTROL_SCRIPT = 'rtde_control'  # the program of ur-rtde
-COMMAND_REGISTER = 'input_int_register_0'  # which it obeys; one client only may write it
+# Which it obeys; one client only may write it. By whether the upper range is used (FLAG_UPPER_RANGE_REGISTERS).
+COMMAND_REGISTERS: Mapping[bool, str] = {False: 'input_int_register_0', True: 'input_int_register_24'}
 
 REQUEST_VERSION = 86  # 'V', types of RTDE messages
 CONTROLLER_VERSION = 118  # 'v'

@@ -134,6 +134,8 @@ class Worker:
         control_class = importlib.import_module('rtde_control').RTDEControlInterface
         # Whether the arm is under remote control has been asked already.
         flags = control_class.FLAG_UPLOAD_SCRIPT | control_class.FLAG_DISABLE_REMOTE_CONTROL_CHECK
+        if params.upper_range_registers:
+            flags |= control_class.FLAG_UPPER_RANGE_REGISTERS
         receive = receive_class(params.ip, params.rate_hz, VARIABLES)
         self._control = control_class(params.ip, params.rate_hz, flags)
         self._observer = Observer(receive, channel, params)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,6 +19,8 @@ STARTING_S = 0.05  # between the upload of a program and its start
 STOP_DECELERATION = 5.0  # of a program that ends, m/s²
 ENDED = object()
 MAX_EXCUSED_S = 0.1  # for which the watchdog waits longer because this process was held up
+# So the control script of ur-rtde says it; the client puts the number behind a comment.
+FIRST_REGISTER = re.compile(r'reg_offset_int\s*=\D{0,60}?(\d+)')
 
 
 class EmulatedController:
@@ -28,6 +31,7 @@ class EmulatedController:
         self.step_s = 1.0 / self.version.rate_hz
         self.ticks = 0
         self.registers = Registers()
+        self.first_register = 0  # that the program uses
         self.robot = EmulatedRobot(params, rng)
         self.safety = SafetyMode.NORMAL
         self.acknowledge_s = 0.0  # see `Host`; set from outside
@@ -79,6 +83,8 @@ class EmulatedController:
         if 'rtde_control' in script and self.safety is SafetyMode.NORMAL:
             self.stop_program()
             self._starts_s = self.time_s + STARTING_S
+            first = FIRST_REGISTER.search(script)
+            self.first_register = int(first.group(1)) if first else 0
 
     def play(self, name: str) -> None:
         """Run a program that somebody else brought; it takes no commands and does nothing."""
@@ -92,7 +98,9 @@ class EmulatedController:
     def _start_program(self) -> None:
         self._starts_s = None
         self.program_name = CONTROL_SCRIPT
-        self._program = ControlProgram(self.robot, self.registers, self, self.step_s).cycles()
+        self._program = ControlProgram(
+            self.robot, self.registers.from_first(self.first_register), self, self.step_s
+        ).cycles()
 
     def stop_program(self) -> None:
         """End the program, and with it every motion and the watchdog."""

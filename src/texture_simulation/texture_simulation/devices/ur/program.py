@@ -1,8 +1,8 @@
 """What the control script of ur-rtde does on the controller, without being URScript.
 
-The script looks at input_int_register_0 once per cycle. Realtime commands are obeyed in every cycle in which they
-stand there; others once, until the client has written 0 in between. A command that is overwritten within a cycle is
-lost, as on the real controller.
+The script looks at its command register, input_int_register_0 or 24, once per cycle. Realtime commands are obeyed in
+every cycle in which they stand there; others once, until the client has written 0 in between. A command that is
+overwritten within a cycle is lost, as on the real controller.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class Host(Protocol):
     """What the program asks of the controller that runs it."""
 
     def set_watchdog(self, min_frequency_hz: float) -> None:
-        """Stop the program when input_int_register_0 comes less often."""
+        """Stop the program when its command register comes less often."""
 
     def protective_stop(self) -> None:
         """Stop hard."""
@@ -67,7 +67,7 @@ class ControlProgram:
         executed = False
         self._report_progress(False)
         registers.int_out[0] = READY
-        while (number := registers.int_in[0]) != ScriptCommand.STOP_SCRIPT:
+        while (number := int(registers.int_in[0])) != ScriptCommand.STOP_SCRIPT:
             if number in REALTIME:
                 yield from self._execute(number)
                 registers.int_out[0] = READY

@@ -70,6 +70,7 @@ SAFETY_BITS: Mapping[SafetyMode, int] = {SafetyMode.NORMAL: 1 << 0, SafetyMode.P
 SAFETY_NAMES: Mapping[SafetyMode, str] = {SafetyMode.NORMAL: 'NORMAL', SafetyMode.PROTECTIVE_STOP: 'PROTECTIVE_STOP'}
 ROBOT_RUNNING = 7  # robot_mode
 PROGRAM_STOPPED, PROGRAM_PLAYING, PROGRAM_PAUSED = 1, 2, 4  # runtime_state
+COMMAND_REGISTERS = (0, 24)  # input_int registers of the control script: of the lower range, of the upper one
 CONTROL_SCRIPT = 'rtde_control'  # how the control script of ur-rtde calls itself
 POWER_ON_BIT, PROGRAM_RUNNING_BIT = 1 << 0, 1 << 1  # robot_status_bits
 

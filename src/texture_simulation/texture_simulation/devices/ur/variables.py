@@ -11,6 +11,7 @@ from typing import Any
 from texture_simulation.devices.ur.controller import EmulatedController
 from texture_simulation.devices.ur.registers import COUNT
 from texture_simulation.devices.ur.tables import (
+    COMMAND_REGISTERS,
     POWER_ON_BIT,
     PROGRAM_PAUSED,
     PROGRAM_PLAYING,
@@ -107,10 +108,15 @@ def _write(name: str, index: int) -> Setter:
     return setter
 
 
-def _write_command(controller: EmulatedController, values: Sequence[Any]) -> None:
-    """Write input_int_register_0, which the watchdog watches."""
-    controller.registers.int_in[0] = values[0]
-    controller.registers.heard(controller.time_s)
+def _write_command(index: int) -> Setter:
+    """Write a command register; the watchdog watches that of the program."""
+
+    def setter(controller: EmulatedController, values: Sequence[Any]) -> None:
+        controller.registers.int_in[index] = values[0]
+        if index == controller.first_register:
+            controller.registers.heard(controller.time_s)
+
+    return setter
 
 
 def _ignore(_controller: EmulatedController, _values: Sequence[Any]) -> None:
@@ -120,6 +126,6 @@ def _ignore(_controller: EmulatedController, _values: Sequence[Any]) -> None:
 INPUTS: Mapping[str, tuple[str, Setter]] = {
     **{f'input_int_register_{index}': ('INT32', _write('int_in', index)) for index in range(COUNT)},
     **{f'input_double_register_{index}': ('DOUBLE', _write('double_in', index)) for index in range(COUNT)},
-    'input_int_register_0': ('INT32', _write_command),
+    **{f'input_int_register_{index}': ('INT32', _write_command(index)) for index in COMMAND_REGISTERS},
     'external_force_torque': ('VECTOR6D', _ignore),
 }
