@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_core.rotation import quaternion_matrix, rotation_matrix
+from texture_core.rotation import quaternion_matrix, rotation_matrix, rotation_vector
 
 
 def test_a_quarter_turn_about_z_brings_x_to_y() -> None:
@@ -35,3 +35,12 @@ def test_a_quaternion_turns_as_the_rotation_vector_does() -> None:
 
 def test_a_quaternion_of_length_zero_is_no_rotation() -> None:
     assert np.isnan(quaternion_matrix((0.0, 0.0, 0.0, 0.0))).all()
+
+
+@pytest.mark.parametrize('angle_rad', [0.0, 1e-9, 0.3, 2.0, np.pi - 1e-9, np.pi])
+@pytest.mark.parametrize('axis', [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.6, 0.0, 0.8), (-2 / 3, 1 / 3, 2 / 3)])
+def test_the_rotation_vector_of_a_matrix_gives_the_matrix_again(angle_rad: float, axis: tuple[float, ...]) -> None:
+    matrix = rotation_matrix(angle_rad * np.array(axis))
+    vector = rotation_vector(matrix)
+    assert rotation_matrix(vector) == pytest.approx(matrix, abs=1e-12)
+    assert np.linalg.norm(vector) == pytest.approx(angle_rad, abs=1e-8)

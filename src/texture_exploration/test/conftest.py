@@ -16,6 +16,7 @@ ROS_TESTS = [
     'test_explorer_node.py',
     'test_explore_preset.py',
     'test_ros_controllers_process.py',
+    'test_services_page.py',
     'test_signal_watch_node.py',
 ]
 collect_ignore = [] if importlib.util.find_spec('rclpy') else ROS_TESTS

@@ -13,7 +13,7 @@ import pytest
 from texture_core.errors import CommandRefused
 from texture_core.node_process import NodeProcess
 from texture_exploration.arms.catalogue import ARMS
-from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.protocol import ArmCommand, SurfaceBound
 from texture_simulation.devices.rails import EmulatedRails
 from texture_simulation.devices.ur.params import UrControllerParams
 from texture_simulation.devices.ur.process import ControllerProcess
@@ -111,3 +111,14 @@ def test_closing_twice_and_connecting_again_is_no_fault(arm):
     arm.connect()
     before = arm.state().time_ns
     wait_for(lambda: arm.state().time_ns > before)
+
+
+def test_an_arm_with_a_base_frame_measures_from_where_the_surface_was_moved(arm):
+    if not isinstance(arm, SurfaceBound):
+        pytest.skip('it has no base frame')
+    before_m = arm.state().position[2]
+    x, y, z, *turned = arm.surface_pose
+    arm.move_surface((x, y, z - 0.01, *turned))
+    arm.connect()
+    assert arm.state().position[2] == pytest.approx(before_m + 0.01, abs=1e-4)
+    assert arm.surface_pose == pytest.approx((x, y, z - 0.01, *turned))

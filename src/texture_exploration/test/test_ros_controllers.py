@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.errors import CommandRefused, DeviceError, InvalidParameter
+from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, MotionRefused
 from texture_core.exploration import ExplorationRequest
 from texture_core.rotation import quaternion_matrix, rotation_matrix
 from texture_exploration.arms.protocol import ArmCommand
@@ -14,6 +14,7 @@ from texture_exploration.arms.ros_controllers_params import RosControllersParams
 from texture_exploration.arms.ros_controllers_topics import ForceSample, PoseSample
 from texture_exploration.arms.tool_state import GRAVITY_M_S2, ToolState
 from texture_exploration.exploration import Exploration
+from texture_exploration.explorer import Explorer
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import TouchParams
@@ -321,3 +322,40 @@ def test_every_motion_succeeds_behind_a_late_controller(motion):
     requests = {'circular': {'speed_m_s': 0.05, 'turns': 0.5}, 'in_hand_sliding': {'duration_s': 1.0}}
     outcome, _ = robot.explore(ExplorationRequest(motion, **requests.get(motion, {'distance_m': 0.02})), TouchParams())
     assert outcome.success, outcome.message
+
+
+def put_on_surface(robot, x_m, y_m):
+    """Bring the finger to a place of the surface as an operator would, and let the arm see it."""
+    robot.arm.position = robot.arm._origin + robot.arm._axes @ [x_m, y_m, 0.0]
+    robot.pass_time(0.02)
+
+
+def test_a_tilted_surface_is_found_by_three_touches():
+    tilted = TwistControllerParams(jitter_s=0.0, force_noise_n=0.0, surface_rx_rad=0.1, surface_ry_rad=-0.2)
+    robot = Robot(tilted)
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    explorer.connect()
+    for x_m, y_m in ((0.0, 0.0), (0.05, 0.0)):
+        put_on_surface(robot, x_m, y_m)
+        assert 'touch the surface at' in explorer.touch_surface()
+    put_on_surface(robot, 0.02, 0.0)
+    with pytest.raises(MotionRefused, match='nearly in a line'):
+        explorer.touch_surface()
+    put_on_surface(robot, 0.02, 0.04)
+    assert 'residual 0.00 mm' in explorer.touch_surface()
+    explorer.connect()
+    for place in ((0.01, -0.03), (-0.04, 0.02)):
+        put_on_surface(robot, *place)
+        assert robot.driven.state().position[2] == pytest.approx(0.0, abs=1e-9)
+    normal = rotation_matrix(robot.driven.surface_pose[3:])[:, 2]
+    assert normal == pytest.approx(robot.arm._axes[:, 2])
+
+
+def test_touches_that_are_forgotten_are_made_again(robot):
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    explorer.connect()
+    for _ in range(2):
+        put_on_surface(robot, 0.0, 0.0)
+        explorer.touch_surface()
+        explorer.forget_touches()
+    assert 'touch 1 taken' in explorer.touch_surface()

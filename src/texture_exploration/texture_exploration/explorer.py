@@ -10,14 +10,25 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 
 from texture_core.catalogue import find
-from texture_core.errors import DeviceError, MotionRefused, TextureError
+from texture_core.errors import DeviceError, InvalidData, MotionRefused, TextureError
 from texture_core.exploration import ExplorationRequest, ExplorationState
-from texture_exploration.arms.protocol import Arm, Counting, Rebootable, Recoverable, Vector, Warns, Zeroing
+from texture_exploration.arms.protocol import (
+    Arm,
+    Counting,
+    Rebootable,
+    Recoverable,
+    SurfaceBound,
+    Vector,
+    Warns,
+    Zeroing,
+)
+from texture_exploration.arms.surface_frame import SurfaceFrame
 from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
+from texture_exploration.surface_fit import TOUCHES, Touches
 
 PERIOD_S = 0.01
 CLOSING_S = 10.0  # longer than any motion needs to lift
@@ -62,6 +73,7 @@ class Explorer:
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._closed = False
+        self._touches = Touches()
 
     def connect(self) -> Vector:
         """Reach the arm, or reach it again after a fault; return where explorations begin.
@@ -182,6 +194,60 @@ class Explorer:
             if not isinstance(self.arm, Rebootable):
                 raise MotionRefused('this arm has no motors that could be rebooted; use recover')
             return self.arm.reboot()
+
+    def touch_surface(self) -> str:
+        """Take the place of the finger, which touches the surface, for the surface frame; return what came of it.
+
+        From the third touch on the plane through all touches is the surface. The next exploration connects again and
+        begins where the finger is then: lift it before.
+
+        Raises
+        ------
+        MotionRefused
+            If an exploration is running, the arm has no base frame, or the touches make no plane.
+        DeviceError
+            If the arm cannot be reached.
+        """
+        with self._lock:
+            self._check_idle()
+            arm = self._surface_bound()
+            if self.fault():
+                self.connect()
+            state, frame = self.arm.state(), SurfaceFrame(arm.surface_pose)
+            self._home = None
+            try:
+                fit = self._touches.add(
+                    frame.place_to_base(state.position), frame.to_base((0.0, 0.0, 1.0)), frame.to_base((1.0, 0.0, 0.0))
+                )
+            except InvalidData as error:
+                raise MotionRefused(f'the touch was not taken: {error}') from error
+            count = f'touch {len(self._touches)} taken with {state.force_n:.2f} N'
+            if fit is None:
+                return f'{count}; touch the surface at {TOUCHES - len(self._touches)} more places'
+            arm.move_surface(fit.pose)
+            names = ('x_m', 'y_m', 'z_m', 'rx_rad', 'ry_rad', 'rz_rad')
+            values = ', '.join(f'surface_{name}: {value:.5f}' for name, value in zip(names, fit.pose, strict=True))
+            return (
+                f'{count}; the surface is {values}; residual {1e3 * fit.residual_m:.2f} mm rms, largest '
+                f'{1e3 * fit.largest_m:.2f} mm. Write these into your parameter file, and lift the finger by 10 mm'
+            )
+
+    def forget_touches(self) -> None:
+        """Begin the touches of the surface again; the surface stays as it is.
+
+        Raises
+        ------
+        MotionRefused
+            If the arm has no base frame.
+        """
+        with self._lock:
+            self._surface_bound()
+            self._touches.forget()
+
+    def _surface_bound(self) -> SurfaceBound:
+        if not isinstance(self.arm, SurfaceBound):
+            raise MotionRefused('this arm has no base frame in which a surface could be placed')
+        return self.arm
 
     def close(self) -> None:
         """Abort, wait until the finger is lifted, let the arm go."""

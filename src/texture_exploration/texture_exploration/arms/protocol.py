@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -105,6 +105,18 @@ class Zeroing(Protocol):
     @property
     def zeroed(self) -> bool:
         """Whether it did since it was connected, or recovered; before, its force is no measure of contact."""
+
+
+@runtime_checkable
+class SurfaceBound(Protocol):
+    """An arm with a base frame, in which the surface has a pose."""
+
+    @property
+    def surface_pose(self) -> tuple[float, ...]:
+        """Pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
+
+    def move_surface(self, pose: Sequence[float]) -> None:
+        """Let go, and take over another pose of the surface, (6,); it holds from the next connection on."""
 
 
 @runtime_checkable

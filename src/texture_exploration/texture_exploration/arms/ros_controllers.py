@@ -10,7 +10,7 @@ import importlib
 import math
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from texture_core.errors import DeviceError
@@ -189,6 +189,17 @@ class RosControllersArm:
         self._follow.restart()
         if fault := self._fault(self._clock()):
             raise DeviceError(f'the arm did not recover: {fault}')
+
+    @property
+    def surface_pose(self) -> tuple[float, ...]:
+        """Pose of the surface in the base frame."""
+        return self._params.surface_pose
+
+    def move_surface(self, pose: Sequence[float]) -> None:
+        """Let go, and take over another pose of the surface; it holds from the next connection on."""
+        self.close()
+        self._params = self._params.at_surface(pose)
+        self._frame = SurfaceFrame(self._params.surface_pose)
 
     @property
     def zeroed(self) -> bool:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from texture_core.arrays import Array
 from texture_core.parameters import param
 from texture_core.rotation import rotation_matrix
 from texture_exploration.arms.protocol import Vector
+
+PoseParamsT = TypeVar('PoseParamsT', bound='SurfacePoseParams')
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,11 @@ class SurfacePoseParams:
         0.0, 'Sets the z component of the rotation vector of the surface frame.', unit='rad', low=-7.0, high=7.0
     )
 
+    def at_surface(self: PoseParamsT, pose: Sequence[float]) -> PoseParamsT:
+        """Return the parameters with another pose of the surface, (6,) as `surface_pose`."""
+        names = ('surface_x_m', 'surface_y_m', 'surface_z_m', 'surface_rx_rad', 'surface_ry_rad', 'surface_rz_rad')
+        return replace(self, **dict(zip(names, map(float, pose), strict=True)))
+
     @property
     def surface_pose(self) -> tuple[float, ...]:
         """Pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
@@ -68,6 +76,10 @@ class SurfaceFrame:
     def direction(self, in_base: Sequence[float]) -> Vector:
         """Return a velocity or a force in the frame of the surface."""
         return _vector(self._axes.T @ np.array(in_base))
+
+    def place_to_base(self, place_m: Sequence[float]) -> Vector:
+        """Return a place of the frame of the surface in the base frame."""
+        return _vector(self._axes @ np.array(place_m) + self._origin)
 
     def to_base(self, direction: Sequence[float]) -> Vector:
         """Return a velocity or a force of the frame of the surface in the base frame."""

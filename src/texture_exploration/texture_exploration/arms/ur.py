@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from texture_core.errors import DeviceError
 from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading
@@ -142,6 +142,17 @@ class UrArm:
             if time.monotonic() > end_s:
                 raise DeviceError(f'the arm did not recover: {fault}; look at the pendant')
             time.sleep(POLL_S)
+
+    @property
+    def surface_pose(self) -> tuple[float, ...]:
+        """Pose of the surface in the base frame."""
+        return self._params.surface_pose
+
+    def move_surface(self, pose: Sequence[float]) -> None:
+        """Let go, and take over another pose of the surface; it holds from the next connection on."""
+        self.close()
+        self._params = self._params.at_surface(pose)
+        self._frame = SurfaceFrame(self._params.surface_pose)
 
     @property
     def worker_pid(self) -> int:

@@ -29,7 +29,7 @@ from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_core.ros.waiting_executor import WaitingExecutor
 from texture_exploration.arms.catalogue import ARMS
-from texture_exploration.arms.protocol import Rebootable
+from texture_exploration.arms.protocol import Rebootable, SurfaceBound
 from texture_exploration.estimates import EarlyStoppingParams, ExplorationEstimates
 from texture_exploration.exploration import Exploration, no_signal_watch
 from texture_exploration.exploration_ids import ExplorationIds
@@ -81,6 +81,9 @@ class ExplorerNode(Node):
         self.create_service(Trigger, 'recover', self._on_recover, callback_group=group)
         if isinstance(self._explorer.arm, Rebootable):
             self.create_service(Trigger, 'reboot', self._on_reboot, callback_group=group)
+        if isinstance(self._explorer.arm, SurfaceBound):
+            self.create_service(Trigger, 'touch_surface', self._on_touch_surface, callback_group=group)
+            self.create_service(Trigger, 'forget_touches', self._on_forget_touches, callback_group=group)
         ActionServer(
             self,
             action.Explore,
@@ -202,6 +205,19 @@ class ExplorerNode(Node):
         except (DeviceError, MotionRefused) as error:
             response.message = str(error)
         self.get_logger().info(f'reboot: {response.message}')
+        return response
+
+    def _on_touch_surface(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            response.message, response.success = self._explorer.touch_surface(), True
+        except (DeviceError, MotionRefused) as error:
+            response.message = str(error)
+        self.get_logger().info(f'touch_surface: {response.message}')
+        return response
+
+    def _on_forget_touches(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._explorer.forget_touches()
+        response.success, response.message = True, 'the touches are forgotten; the surface stays as it is'
         return response
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:

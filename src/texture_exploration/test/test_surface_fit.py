@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidData
+from texture_core.rotation import rotation_matrix
+from texture_exploration.arms.surface_frame import SurfaceFrame
+from texture_exploration.surface_fit import Touches, fit_surface
+
+UP, AHEAD = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+CORNERS = [(0.3, 0.0, 0.1), (0.4, 0.0, 0.1), (0.35, 0.08, 0.1)]
+
+
+def test_a_level_surface_is_found_with_its_height_and_without_a_turn():
+    fit = fit_surface(CORNERS, UP, AHEAD)
+    assert fit.pose == pytest.approx((0.35, 0.08 / 3, 0.1, 0.0, 0.0, 0.0))
+    assert fit.residual_m == pytest.approx(0.0, abs=1e-12)
+
+
+def test_touches_of_a_tilted_surface_have_the_height_zero_in_its_frame_and_z_points_away():
+    axes = rotation_matrix((0.2, -0.3, 0.0))
+    touches = [axes @ np.array([x, y, 0.0]) + [0.4, -0.1, 0.05] for x, y in ((0.0, 0.0), (0.1, 0.0), (0.02, 0.07))]
+    frame = SurfaceFrame(fit_surface(touches, UP, AHEAD).pose)
+    assert [frame.place(touch)[2] for touch in touches] == pytest.approx([0.0] * 3, abs=1e-12)
+    assert frame.to_base((0.0, 0.0, 1.0)) == pytest.approx(axes[:, 2])
+    ahead = np.array(AHEAD) - axes[0, 2] * axes[:, 2]
+    assert frame.to_base((1.0, 0.0, 0.0)) == pytest.approx(ahead / np.linalg.norm(ahead))
+
+
+def test_the_residual_is_that_of_touches_beside_the_plane():
+    square = [(0.0, 0.0, 1e-4), (0.1, 0.0, -1e-4), (0.1, 0.1, 1e-4), (0.0, 0.1, -1e-4)]
+    fit = fit_surface(square, UP, AHEAD)
+    assert fit.residual_m == pytest.approx(1e-4)
+    assert fit.largest_m == pytest.approx(1e-4)
+
+
+def test_touches_nearly_in_a_line_are_refused_with_what_is_needed():
+    line = [(0.0, 0.0, 0.0), (0.1, 0.002, 0.0), (0.2, 0.0, 0.0)]
+    with pytest.raises(InvalidData, match=r'nearly in a line: .* 2\.0 mm, and 10 mm are needed'):
+        fit_surface(line, UP, AHEAD)
+
+
+def test_a_bent_surface_is_refused():
+    with pytest.raises(InvalidData, match='do not lie in a plane'):
+        fit_surface([*CORNERS, (0.35, 0.02, 0.12)], UP, AHEAD)
+
+
+def test_a_wall_needs_its_pose_first():
+    wall = [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)]
+    with pytest.raises(InvalidData, match='stands across the present surface'):
+        fit_surface(wall, UP, AHEAD)
+
+
+def test_touches_count_up_and_a_refused_one_is_not_kept():
+    touches = Touches()
+    assert touches.add(CORNERS[0], UP, AHEAD) is None
+    assert touches.add(CORNERS[1], UP, AHEAD) is None
+    with pytest.raises(InvalidData):
+        touches.add((0.35, 0.001, 0.1), UP, AHEAD)
+    assert len(touches) == 2
+    assert touches.add(CORNERS[2], UP, AHEAD) is not None
+    touches.forget()
+    assert len(touches) == 0

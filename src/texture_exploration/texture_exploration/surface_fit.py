@@ -1,0 +1,114 @@
+"""The frame of a surface from places where the fingertip touched it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.errors import InvalidData
+from texture_core.rotation import rotation_vector
+
+TOUCHES = 3  # the fewest that make a plane
+NARROWEST_M = 0.01  # spread of the touches across their longest direction
+LARGEST_RESIDUAL_M = 0.002  # a surface that is bent more than this is no plane
+
+
+@dataclass(frozen=True)
+class SurfaceFit:
+    """A plane through touches: `pose` as `SurfaceFrame` takes it, (6,); distances of the touches from the plane in m.
+
+    `residual_m` is their root mean square and `largest_m` the largest; both are 0 for three touches, which always lie
+    in one plane.
+    """
+
+    pose: tuple[float, ...]
+    residual_m: float
+    largest_m: float
+
+
+def fit_surface(
+    touches: Sequence[Sequence[float] | Array], normal: Sequence[float], along: Sequence[float]
+) -> SurfaceFit:
+    """Return the plane that fits touches best, by least squares of the distances (total least squares).
+
+    The origin is the middle of the touches, z the normal, x the direction `along` the surface as far as it lies in the
+    plane.
+
+    Parameters
+    ----------
+    touches : (n, 3)
+        Places in the base frame, m; at least three.
+    normal : (3,)
+        Any direction that points away from the surface, in the base frame.
+    along : (3,)
+        Direction of the x axis in the base frame.
+
+    Raises
+    ------
+    InvalidData
+        If there are fewer than three touches, if they lie nearly in a line, if they are far from a plane, or if the
+        plane stands across `normal`.
+    """
+    points = np.array(touches, dtype=float)
+    if len(points) < TOUCHES:
+        raise InvalidData(f'there are {len(points)} touches; {TOUCHES} are needed')
+    middle = points.mean(axis=0)
+    _, _sizes, directions = np.linalg.svd(points - middle, full_matrices=False)
+    spread_m = float(np.ptp((points - middle) @ directions[1]))
+    if spread_m < NARROWEST_M:
+        raise InvalidData(
+            f'the touches lie nearly in a line: across it they spread over {1e3 * spread_m:.1f} mm, and '
+            f'{1e3 * NARROWEST_M:g} mm are needed; touch at the corners of a triangle'
+        )
+    axis = np.cross(directions[0], directions[1])
+    distances = (points - middle) @ axis
+    largest_m = float(np.abs(distances).max())
+    if largest_m > LARGEST_RESIDUAL_M:
+        raise InvalidData(
+            f'the touches do not lie in a plane: one is {1e3 * largest_m:.1f} mm off, and {1e3 * LARGEST_RESIDUAL_M:g} '
+            'mm are allowed; touch one flat part of the surface'
+        )
+    up = axis * np.sign(axis @ np.array(normal, dtype=float))
+    x_axis = np.array(along, dtype=float)
+    x_axis = x_axis - (x_axis @ up) * up
+    length = float(np.linalg.norm(x_axis))
+    if not up.any() or length < 1e-3:
+        raise InvalidData('the touched plane stands across the present surface; give its pose as parameters first')
+    axes = np.column_stack([x_axis / length, np.cross(up, x_axis / length), up])
+    pose = (*middle.tolist(), *rotation_vector(axes).tolist())
+    return SurfaceFit(pose, float(np.sqrt(np.mean(distances**2))), largest_m)
+
+
+class Touches:
+    """Collects touches until they make a plane; further ones refine it."""
+
+    def __init__(self) -> None:
+        self._places: list[Array] = []
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def forget(self) -> None:
+        """Begin again."""
+        self._places = []
+
+    def add(self, place: Sequence[float], normal: Sequence[float], along: Sequence[float]) -> SurfaceFit | None:
+        """Take a touch; return the plane, None if there are too few.
+
+        Parameters
+        ----------
+        place, normal, along : (3,)
+            See `fit_surface`.
+
+        Raises
+        ------
+        InvalidData
+            If they make no plane; the newest touch is not kept.
+        """
+        places = [*self._places, np.array(place, dtype=float)]
+        fit = fit_surface(places, normal, along) if len(places) >= TOUCHES else None
+        self._places = places
+        return fit
