@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'services.md'
 LINE = re.compile(r'`(ros2 (?:service call|action send_goal) [^`]+)`')
-OF_OTHERS = {'/reboot', '/touch_surface', '/forget_touches', '/add_texture', '/remove_last_added'}
+OF_OTHERS = {'/reboot', '/touch_surface', '/forget_touches', '/add_texture', '/remove_last_added', '/remove_texture'}
 
 
 def parsed(line):
