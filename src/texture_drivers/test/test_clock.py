@@ -81,3 +81,14 @@ def test_the_memory_is_bounded():
 def test_the_supporting_line_ignores_all_that_lies_above_it():
     points = [Arrival(x, 3 + 0.5 * x + late) for x, late in enumerate([0, 7, 2, 9, 0.5, 4, 0])]
     assert supporting_slope(points) == pytest.approx(0.5)
+
+
+def test_the_times_of_a_stream_far_too_fast_never_run_ahead_of_its_arrivals():
+    clock = StreamClock(1000.0)
+    ahead_ns = []
+    for index in range(0, 100_000, 10):  # ten times the rate: 10 s
+        arrival_ns = START + 100_000 * index
+        clock.observe(index, arrival_ns)
+        ahead_ns.append(clock.time_ns(index) - arrival_ns)
+    assert max(ahead_ns) < 0.6e9
+    assert clock.steps > 0

@@ -155,6 +155,9 @@ class StreamClock:
         """Return whether the stream or the host's clock cannot be the one of before."""
         if not self._bins:
             return False
+        # No sample arrives before it was taken: times that say so are those of a stream at another rate.
+        if self._now.delay_ns_at(arrival.elapsed_ns, self._slew_rate) - arrival.delay_ns > self._step_ns:
+            return True
         late_ns = arrival.delay_ns - self._now.trend_ns(arrival.elapsed_ns)
         if late_ns <= self._step_ns:
             self._late_since_ns = None
