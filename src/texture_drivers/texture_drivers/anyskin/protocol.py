@@ -32,7 +32,8 @@ class FrameParser:
     """Turn a byte stream into frames, whatever is lost or added on the way.
 
     A frame has no header, number or checksum: only its length, CR LF at its end and the range of its values show it,
-    and the values may hold CR LF, too. So a frame is believed only where three fit in a row, and, from there on, as
+    and the values may hold CR LF, too. So a frame is believed only where three fit in a row, the first of them only
+    behind CR LF (a byte more or less at its beginning would change a value and not its end), and, from there on, as
     long as each follows the one before without a byte between. A changed bit that leaves a value in its range cannot
     be seen.
 
@@ -54,6 +55,7 @@ class FrameParser:
     def restart(self) -> None:
         """Forget where frames begin, as after opening the port."""
         self._locked = False
+        self._before = b''  # the last two bytes before the buffer
         self._passed: int | None = None  # bytes passed over since the last frame; None before the first one
         self._buffer = b''
 
@@ -80,6 +82,7 @@ class FrameParser:
         values, valid = self._decode(self._buffer)
         count = len(valid) if valid.all() else int(valid.argmin())
         self._buffer = self._buffer[count * self._size :]
+        self._before = tables.END if count else self._before
         self.frames += count
         return values[:count]
 
@@ -93,12 +96,15 @@ class FrameParser:
             if valid.all():
                 self._pass_over(start)
                 self._locked = len(valid) == LOCK_FRAMES
+                if self._locked and self._before != tables.END:
+                    self._pass_over(self._size)
                 return self._locked
             end = self._buffer.find(tables.END, end + 1)
         self._pass_over(max(0, len(self._buffer) - self._size + 1))
         return False
 
     def _pass_over(self, count: int) -> None:
+        self._before = (self._before + self._buffer[:count])[-len(tables.END) :]
         self._buffer = self._buffer[count:]
         self.refused_bytes += count
         if self._passed is not None:
