@@ -15,6 +15,7 @@ import pytest
 from texture_core.finger_state import FingerState
 from texture_core.signal import NANOSECONDS
 from texture_drivers.biotac.sensor import BioTac
+from texture_drivers.catalogue import SENSORS
 from texture_drivers.daq.sensor import daq
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
@@ -114,6 +115,16 @@ def test_the_bench_may_hold_a_biotac_alone(tmp_path: Path) -> None:
     assert emulator.counts['bytes nobody took'] == 0
     assert found['signal'].mean() == pytest.approx(2030, abs=30)  # nothing touches: PAC idles
     assert found['signal_static'].shape[1] == 22
+
+
+@pytest.mark.parametrize(('name', 'channels'), [('anyskin', 15), ('papillarray', 54)])
+def test_the_bench_may_hold_an_array_of_slow_taxels_alone(tmp_path: Path, name: str, channels: int) -> None:
+    params = EmulatorParams(sensor=name, sensor_link=str(tmp_path / name), finger_port=0)
+    with Emulator(params) as emulator:
+        found = read(SENSORS[name](SensorParams(device=str(tmp_path / name)), time.time_ns), 1.0)
+    assert emulator.counts['bytes nobody took'] == 0
+    assert found['signal'].shape[1] == channels
+    assert np.ptp(found['signal'], axis=0).max() < 0.1 * np.abs(found['signal']).max() + 0.1  # nothing touches
 
 
 def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:

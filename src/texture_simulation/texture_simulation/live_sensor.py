@@ -18,11 +18,12 @@ from texture_simulation.devices.anyskin import EmulatedAnySkin
 from texture_simulation.devices.biotac import EmulatedBioTac
 from texture_simulation.devices.daq import EmulatedDaq
 from texture_simulation.devices.device import EmulatedDevice
+from texture_simulation.devices.papillarray import EmulatedPapillArray
 from texture_simulation.devices.pvdf import EmulatedPvdf
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 from texture_simulation.finger_track import FingerTrack
 from texture_simulation.scene import Scene
-from texture_simulation.sensors import anyskin, biotac, daq, pvdf, tsf85
+from texture_simulation.sensors import anyskin, biotac, daq, papillarray, pvdf, tsf85
 from texture_simulation.skin_contact import SkinContact
 from texture_simulation.surfaces.surface import Surface
 from texture_simulation.trajectory import Trajectory
@@ -267,6 +268,36 @@ def live_anyskin(scene: Scene, surface: Surface, link: FilePath, rng: np.random.
     )
 
 
+def live_papillarray(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return a PapillArray alone on its hub.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+
+    Returns
+    -------
+    LiveSensor
+        Not started: its first `advance` is the beginning of its time.
+    """
+    model, device = papillarray.PapillArrayModel(scene, surface, rng), EmulatedPapillArray(link, rng)
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.sample(model.advance(path)[:, None]),
+        device.skip,
+        rate_hz=papillarray.PATH_RATE_HZ,
+        points=1,
+    )
+
+
 MakeLiveSensor = Callable[[Scene, Surface, FilePath, np.random.Generator], LiveSensor]
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'tsf85': live_tsf85,
@@ -275,4 +306,5 @@ LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'daq': live_daq,
     'pvdf': live_pvdf,
     'anyskin': live_anyskin,
+    'papillarray': live_papillarray,
 }

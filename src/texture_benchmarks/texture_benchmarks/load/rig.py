@@ -136,6 +136,16 @@ def feed_anyskin(device: Any, first: int, ticks: int) -> None:
     device.sample(np.outer(numbers, np.ones(15)))
 
 
+def feed_papillarray(arrays: int) -> Feed:
+    """Return what feeds a hub with so many arrays; it samples four times as often as it sends."""
+
+    def feed(device: Any, first: int, ticks: int) -> None:
+        numbers = np.repeat(np.arange(first, first + ticks) % 30_000, 4)
+        device.sample(np.broadcast_to(numbers[:, None, None, None], (4 * ticks, arrays, 9, 6)).astype(np.float64))
+
+    return feed
+
+
 def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
     """Return how a TSF-85 is fed."""
     imu = ('m/s²',) * 3 + ('rad/s',) * 3
@@ -167,6 +177,16 @@ def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
     return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, slope=2)
 
 
+def papillarray(prefix: str = '', arrays: int = 1) -> RigCase:
+    """Return how a hub of PapillArrays is fed."""
+    units: dict[str, str | tuple[str, ...]] = {
+        f'{prefix}signal': (*('N',) * 3, *('mm',) * 3) * 9,
+        f'{prefix}wrench': (*('N',) * 3, *('N mm',) * 3),
+    }
+    feed = feed_papillarray(arrays)
+    return RigCase(f'{prefix}signal', 250.0, 1, feed, units, 30_000, config='{rate_hz: 250}')
+
+
 CASES: Mapping[str, RigCase] = {
     'tsf85': tsf85(),
     'tsf85_pair': tsf85('finger1/', (2, 28)),
@@ -183,6 +203,8 @@ CASES: Mapping[str, RigCase] = {
         'signal', 250.0, 1, feed_anyskin, {'signal': 'µT', 'temperature': '°C'}, 30_000,
         config='{rate_hz: 250.0, temperature: true}',
     ),
+    'papillarray': papillarray(),
+    'papillarray_pair': papillarray('finger1/', 2),
 }  # fmt: skip
 
 

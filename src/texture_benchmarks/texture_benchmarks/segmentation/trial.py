@@ -25,6 +25,7 @@ MEASURED_QUANTITIES = {
     'daq': 'force',
     'pvdf': 'force',
     'anyskin': 'force',
+    'papillarray': 'force',
 }
 
 

@@ -9,19 +9,23 @@ from typing import Protocol
 
 import numpy as np
 
+from texture_core.arrays import Array
 from texture_core.catalogue import find
 from texture_core.framing import Frame, FrameDecoder
 from texture_drivers.anyskin.protocol import FrameParser
+from texture_drivers.papillarray import protocol as papillarray
 from texture_drivers.tsf85.protocol import Packet, PacketParser
 from texture_simulation.devices import anyskin, daq, pvdf
 from texture_simulation.devices.biotac_encoder import encode_replies, reply_frame
 from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.papillarray_encoder import PILLARS, QUANTITIES, PapillArrayEncoder
 from texture_simulation.devices.sampler import MICROSECONDS, SampledStream, encode
 from texture_simulation.devices.tsf85_encoder import TAXELS, Tsf85Encoder
 
 MILLISECONDS_PER_IMAGE = 16
 BIOTAC_SLOTS, BIOTAC_FRAME_US = 44, 10_000
 FIELD_UT = 1000.0  # spread of the field of an AnySkin
+PAPILLARRAY_US = 1000.0
 CHUNK_BYTES = 512  # as a driver reads: the parser sees no more at once
 
 
@@ -29,7 +33,8 @@ CHUNK_BYTES = 512  # as a driver reads: the parser sees no more at once
 class LinkStatistics:
     """What came of the packets that were sent.
 
-    `false_packets` are accepted packets that were never sent. A checksum refuses them all. The TSF-85 and the AnySkin
+    `false_packets` are accepted packets that were never sent. A cyclic checksum refuses them all. Of the
+    PapillArray's sum two changed bits may leave nothing to see. The TSF-85 and the AnySkin
     have none: with bytes lost or added, strict parsers can refuse them; a changed value byte inside an intact packet
     cannot be seen by anyone, unless it leaves the range.
     """
@@ -102,6 +107,26 @@ class AnySkinReceiver:
     def refused(self) -> int:
         """Frames that did not fit while it was certain where they begin."""
         return self._parser.refused
+
+
+class PapillArrayReceiver:
+    """The PapillArray's parser, and the check of what its packets hold."""
+
+    def __init__(self) -> None:
+        self._parser = papillarray.PacketParser()
+        self._malformed = 0
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """Return the contents of packets."""
+        packets = self._parser.feed(data)
+        valid = [packet for packet in packets if papillarray.layout_of(packet)]
+        self._malformed += len(packets) - len(valid)
+        return valid
+
+    @property
+    def refused(self) -> int:
+        """Packets that failed a check."""
+        return self._parser.refused + self._malformed
 
 
 @dataclass(frozen=True)
@@ -183,6 +208,13 @@ def _anyskin(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
     yield from anyskin.encode(rng.normal(0.0, FIELD_UT, (n_packets, axes)))
 
 
+def _papillarray(rng: np.random.Generator, n_packets: int) -> Iterator[bytes]:
+    """Yield packets of a hub with one array."""
+    pillars = rng.normal(0.0, 1.0, (n_packets, 1, PILLARS, QUANTITIES))
+    times_us: Array = PAPILLARRAY_US * np.arange(n_packets, dtype=np.float64)
+    yield from PapillArrayEncoder(1).packets(0, times_us, pillars)
+
+
 def _sampled(stream: SampledStream) -> Callable[[np.random.Generator, int], Iterator[bytes]]:
     """Return what yields frames of a stream."""
 
@@ -201,5 +233,6 @@ PROTOCOLS: Mapping[str, ProtocolUnderTest] = {
     'daq': ProtocolUnderTest(_sampled(daq.STREAM), FrameReceiver),
     'pvdf': ProtocolUnderTest(_sampled(pvdf.FILM), FrameReceiver),
     'anyskin': ProtocolUnderTest(_anyskin, AnySkinReceiver),
+    'papillarray': ProtocolUnderTest(_papillarray, PapillArrayReceiver),
 }
-CHECKSUMMED = frozenset({'biotac', 'daq', 'pvdf'})  # lines with a checksum
+CHECKSUMMED = frozenset({'biotac', 'daq', 'pvdf'})  # lines with a cyclic checksum; that of a PapillArray is a sum

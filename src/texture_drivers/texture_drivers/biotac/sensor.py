@@ -12,8 +12,19 @@ from texture_drivers.biotac.bridge import SerialBridge
 from texture_drivers.biotac.cheetah import Cheetah
 from texture_drivers.biotac.link import SpiFrame, SpiLink
 from texture_drivers.biotac.protocol import Replies, decode
-from texture_drivers.biotac.tables import LAYOUTS, NANOSECONDS, PAC, PAC_SENSOR, SLOW_SENSOR, UNIT, BioTacLayout
+from texture_drivers.biotac.tables import (
+    FULL_SCALE,
+    LAYOUTS,
+    NANOSECONDS,
+    PAC,
+    PAC_SENSOR,
+    SLOW_SENSOR,
+    UNIT,
+    BioTacLayout,
+)
+from texture_drivers.channel_watch import Limits
 from texture_drivers.clock import StreamClock
+from texture_drivers.packet_numbering import PacketNumbering
 from texture_drivers.params import SensorParams
 
 SILENCE_S = 1.0  # without a whole frame, or without a good word, the board or the finger is not there
@@ -61,7 +72,7 @@ class BioTac:
         self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
         self._link = link or make_link(params, layout)
         self._clock = StreamClock(MICROSECONDS_PER_S, max_drift=self._link.max_drift)
-        self._numbers = FrameCounter(layout)
+        self._numbers = PacketNumbering(layout.frame_rate_hz)
         self._epoch: int | None = None
         self._last_received_ns: dict[int, int] = {}  # finger: when it last sent a good word; -1 for the board
         self._opened = self._samples = self._damaged = self._refused = 0
@@ -110,6 +121,11 @@ class BioTac:
         """Nominal rate of each topic."""
         rates = {'signal': self._layout.pac_rate_hz, 'signal_static': self._layout.frame_rate_hz}
         return {f'{prefix}{topic}': rate for prefix in self._prefixes.values() for topic, rate in rates.items()}
+
+    @property
+    def limits(self) -> Limits:
+        """Ends of the 12 bits by topic."""
+        return dict.fromkeys(self.expected_rates_hz, (0, FULL_SCALE))
 
     def _process(self, run: Sequence[SpiFrame], now_ns: int, topics: Topics) -> None:
         """Make batches of consecutive frames, once their times are certain."""
@@ -183,50 +199,6 @@ class BioTac:
                 f"no BioTac answers as finger {places} at '{self._params.device}'; "
                 'check its plug, and the parameter finger'
             )
-
-
-class FrameCounter:
-    """Give each frame its running index: a jump is what was lost, over an interruption by the time that passed."""
-
-    def __init__(self, layout: BioTacLayout) -> None:
-        self.lost = 0
-        self._rate_hz = layout.frame_rate_hz
-        self._next_index = 0
-        self._next_ns: int | None = None  # when the next frame should start
-        self._next_number: int | None = None  # none after an interruption
-
-    def interrupt(self) -> None:
-        """Forget the device's numbers: they begin again."""
-        self._next_number = None
-
-    def place(self, number: int, count: int, start_ns: int) -> int:
-        """Return the index of the first of `count` frames that follow each other.
-
-        Parameters
-        ----------
-        number
-            The device's number of the first frame.
-        start_ns
-            When it began.
-        count
-            Number of frames.
-
-        Returns
-        -------
-        int
-            Running index, from 0.
-        """
-        skipped = 0
-        if self._next_number is not None:
-            skipped = number - self._next_number
-        elif self._next_ns is not None:
-            skipped = max(0, round((start_ns - self._next_ns) / NANOSECONDS * self._rate_hz))
-        self.lost += skipped
-        index = self._next_index + skipped
-        self._next_index = index + count
-        self._next_number = number + count
-        self._next_ns = start_ns + round(count / self._rate_hz * NANOSECONDS)
-        return index
 
 
 def consecutive(frames: Sequence[SpiFrame]) -> Iterator[list[SpiFrame]]:

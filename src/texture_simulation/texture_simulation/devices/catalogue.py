@@ -12,6 +12,7 @@ from texture_simulation.devices.anyskin import EmulatedAnySkin
 from texture_simulation.devices.biotac import EmulatedBioTac
 from texture_simulation.devices.daq import EmulatedDaq
 from texture_simulation.devices.device import EmulatedDevice
+from texture_simulation.devices.papillarray import EmulatedPapillArray
 from texture_simulation.devices.pvdf import EmulatedPvdf
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 
@@ -25,4 +26,6 @@ DEVICES: Mapping[str, Callable[[Path, np.random.Generator], EmulatedDevice]] = {
     'daq': EmulatedDaq,
     'pvdf': EmulatedPvdf,
     'anyskin': EmulatedAnySkin,
+    'papillarray': EmulatedPapillArray,
+    'papillarray_pair': partial(EmulatedPapillArray, arrays=2),
 }

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from texture_drivers.biotac.tables import LAYOUTS as BIOTACS
 from texture_drivers.tsf85.tables import LAYOUTS as TSF85S
-from texture_simulation.sensors import anyskin, biotac, daq, pvdf, tsf85
+from texture_simulation.sensors import anyskin, biotac, daq, papillarray, pvdf, tsf85
 from texture_simulation.sensors.model import SensorKind
 
 SENSORS: Mapping[str, SensorKind] = {
@@ -16,4 +16,5 @@ SENSORS: Mapping[str, SensorKind] = {
     'biotac': biotac.biotac_kind(BIOTACS['biotac']),  # PAC at 2.2 kHz, 19 electrodes, pressure, temperature at 100 Hz
     'pvdf': pvdf.KIND,  # film at 4096 Hz with leaking charge, force at 64 Hz
     'anyskin': anyskin.KIND,  # field at 5 magnetometers, 100 Hz
+    'papillarray': papillarray.KIND,  # force and displacement of 9 pillars, 500 Hz
 }

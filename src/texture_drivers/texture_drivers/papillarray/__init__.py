@@ -1,0 +1,1 @@
+"""Contactile PapillArray: nine pillars of silicone that measure force and displacement."""
