@@ -35,7 +35,18 @@ KEYS = {
     'yaml': 'python3-yaml',
 }
 # rosdep knows no key for these; docker/requirements.in and tools/requirements.in bring them.
-KEYLESS = {'cobs', 'distributed', 'nltk', 'playwright', 'pyarrow', 'pymoo', 'pywt', 'skops', 'threadpoolctl'}
+KEYLESS = {
+    'cobs',
+    'distributed',
+    'nltk',
+    'playwright',
+    'pyarrow',
+    'pymoo',
+    'pywt',
+    'skops',
+    'sounddevice',
+    'threadpoolctl',
+}
 # What comes with Python or another package, and the libraries of robots that are chosen by name at run time.
 OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_receive'}
 # What some modules of a package use and its manifest leaves out, so that colcon builds the rest without it: to record

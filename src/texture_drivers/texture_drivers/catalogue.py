@@ -12,8 +12,10 @@ from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.biotac.tables import LAYOUTS as BIOTACS
 from texture_drivers.daq.sensor import daq
 from texture_drivers.file.player import FilePlayer
+from texture_drivers.papillarray.sensor import PapillArray
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
+from texture_drivers.sound_card.sensor import SoundCard
 from texture_drivers.tsf85.sensor import Tsf85
 from texture_drivers.tsf85.tables import LAYOUTS as TSF85S
 
@@ -36,5 +38,8 @@ SENSORS: Mapping[str, MakeSensor] = {
     'daq': daq,  # 4 PVDF films and 4 strain gauges at 2.5 kHz, Jamali & Sammut 2010
     'pvdf': Pvdf,  # PVDF film and force sensor, Hu et al. 2014
     'anyskin': anyskin,  # AnySkin and ReSkin: 5 magnetometers under a magnetic skin
+    'papillarray': PapillArray,  # Contactile PapillArray, 9 pillars
+    'papillarray_pair': partial(PapillArray, arrays=(0, 1)),  # both of a hub; topics finger0/signal and so on
+    'sound_card': SoundCard,  # contact microphone or accelerometer on a sound card, through PortAudio
     'file': FilePlayer,  # a recording: CSV, WAV, NumPy
 }

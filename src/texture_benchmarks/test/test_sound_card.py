@@ -1,0 +1,184 @@
+"""The sensor on a sound card that ALSA's file plugin emulates, through PortAudio as with a real one."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from texture_core.errors import DeviceError, InvalidParameter
+from texture_core.signal import TactileSignal, lost_samples
+from texture_drivers.params import SensorParams
+from texture_drivers.sound_card.capture import Block
+from texture_drivers.sound_card.sensor import SoundCard
+from texture_simulation.devices.sound_card import FRAMES_AT_ONCE, SYSTEM_CONFIG, EmulatedSoundCard
+
+pytestmark = pytest.mark.realtime
+
+DEADLINE_S = 20.0
+RATE_HZ = 48_000
+TURN = 30_000
+
+
+class PacedCard:
+    """A card whose sample i holds i modulo 30 000."""
+
+    def __init__(self, folder: Path) -> None:
+        self.card = EmulatedSoundCard(folder)
+        self.silent = False
+        self.skipped = 0  # blocks that are left out from now on
+        self.start_ns = time.time_ns()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        blocks = 0
+        while not self._stop.wait(0.003):
+            due = int((time.time_ns() - self.start_ns) / 1e9 * RATE_HZ / FRAMES_AT_ONCE)
+            for number in range(blocks, due):
+                first = number * FRAMES_AT_ONCE
+                if not self.silent:
+                    self.card.sample(((np.arange(FRAMES_AT_ONCE) + first) % TURN).astype(np.int16))
+            blocks = due
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+        self.card.close()
+
+
+@pytest.fixture(scope='module')
+def card(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PacedCard]:
+    if not Path(SYSTEM_CONFIG).exists():
+        pytest.skip('ALSA is not installed')
+    made = PacedCard(tmp_path_factory.mktemp('alsa'))
+    os.environ.update(made.card.environment)
+    try:
+        pytest.importorskip('sounddevice', exc_type=ImportError)
+    except OSError:
+        pytest.skip('PortAudio is not installed')
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def make(card: PacedCard) -> Iterator[Callable[..., SoundCard]]:
+    made: list[SoundCard] = []
+
+    def make(config: str = '{decimation: 1}', device: str = 'emulated') -> SoundCard:
+        card.card.drain()
+        made.append(SoundCard(SensorParams(device=device, config=config)))
+        made[-1].open()
+        return made[-1]
+
+    yield make
+    card.silent = False
+    for sensor in made:
+        sensor.close()
+
+
+def read_s(sensor: SoundCard, seconds: float) -> list[TactileSignal]:
+    batches: list[TactileSignal] = []
+    deadline_s = time.monotonic() + DEADLINE_S
+    while sum(len(batch.samples) for batch in batches) < seconds * sensor.expected_rates_hz['signal']:
+        assert time.monotonic() < deadline_s
+        batches += sensor.read().get('signal', [])
+    return batches
+
+
+def numbers(batches: list[TactileSignal]) -> np.ndarray:
+    return np.concatenate([batch.samples[:, 0] for batch in batches]) * 32768
+
+
+def test_each_sample_of_the_card_arrives_once_in_its_order(make: Callable[..., SoundCard]) -> None:
+    sensor = make()
+    batches = read_s(sensor, 1.0)
+    assert set(np.diff(numbers(batches)) % TURN) == {1.0}
+    assert lost_samples(batches) == sensor.counts['lost'] == sensor.counts['overflows'] == 0
+    assert (batches[0].sampling_rate_hz, batches[0].units, batches[0].channels) == (48000.0, ('FS',), ('channel_1',))
+
+
+def test_the_stamps_follow_the_card_s_clock(make: Callable[..., SoundCard], card: PacedCard) -> None:
+    last = read_s(make(), 1.0)[-1]
+    samples = (last.stamp_ns - card.start_ns) / 1e9 * RATE_HZ
+    late_s = ((samples - last.samples[0, 0] * 32768 + TURN / 2) % TURN - TURN / 2) / RATE_HZ
+    assert abs(late_s) < 0.06  # what is between pipe and PortAudio is 20 to 40 ms
+
+
+def test_decimated_it_says_so_in_its_rate_and_keeps_the_band(make: Callable[..., SoundCard]) -> None:
+    batches = read_s(make('{decimation: 12, unit: m/s², gain: 50.0}'), 1.0)
+    assert (batches[0].sampling_rate_hz, batches[0].units) == (4000.0, ('m/s²',))
+    steps = np.diff(np.concatenate([batch.samples[:, 0] for batch in batches])) * 32768 / 50.0
+    assert np.median(steps) == pytest.approx(12.0, abs=0.05)  # a ramp passes the filter unchanged
+    assert lost_samples(batches) == 0
+
+
+def test_closed_and_opened_again_it_goes_on_at_the_index_of_the_time(
+    make: Callable[..., SoundCard], card: PacedCard
+) -> None:
+    sensor = make()
+    last = read_s(sensor, 0.5)[-1]
+    sensor.close()
+    card.card.drain()
+    sensor.open()
+    first = read_s(sensor, 0.5)[0]
+    gap_s = (first.stamp_ns - last.end_ns) / 1e9
+    assert (first.first_sample - last.next_sample) / RATE_HZ == pytest.approx(gap_s, abs=0.03)
+    assert sensor.counts['reopened'] == 1
+
+
+def test_a_silent_card_is_reported(make: Callable[..., SoundCard], card: PacedCard) -> None:
+    sensor = make()
+    read_s(sensor, 0.2)
+    card.silent = True
+    deadline_s = time.monotonic() + DEADLINE_S
+    with pytest.raises(DeviceError, match="sound card 'emulated' is open and delivers nothing"):
+        while time.monotonic() < deadline_s:
+            sensor.read()
+    card.silent = False  # a pipe that nobody writes to would hold up whoever closes the card
+
+
+@pytest.mark.usefixtures('card')
+def test_a_card_that_is_not_there_is_named() -> None:
+    sensor = SoundCard(SensorParams(device='no such card'))
+    with pytest.raises(DeviceError, match="sound card 'no such card' cannot be opened"):
+        sensor.open()
+
+
+class Blocks:
+    """What stands for the capture: hands over blocks by hand."""
+
+    def __init__(self) -> None:
+        self.waiting: list[Block] = []
+
+    def take(self) -> list[Block]:
+        taken, self.waiting = self.waiting, []
+        return taken
+
+    def close(self) -> None: ...
+
+
+def test_an_overflow_is_counted_and_its_samples_are_left_out_of_the_index() -> None:
+    sensor = SoundCard(SensorParams(config='{decimation: 1}', batch_s=0.001))
+    blocks = Blocks()
+    sensor._capture = blocks  # type: ignore[assignment]
+    batches: list[Any] = []
+    for number in range(100):
+        lost = 2400 if number >= 50 else 0  # 50 ms, at once
+        end_ns = 10**18 + round(((number + 1) * 480 + lost) / RATE_HZ * 1e9)
+        blocks.waiting.append(Block(np.zeros((480, 1), dtype=np.float32), end_ns, number == 50))
+        batches += sensor.read().get('signal', [])
+    assert sensor.counts['overflows'] == 1
+    assert lost_samples(batches) == sensor.counts['lost'] == pytest.approx(2400, abs=5)
+
+
+def test_a_decimation_that_does_not_divide_the_rate_is_refused() -> None:
+    with pytest.raises(InvalidParameter, match='44100 Hz cannot be divided'):
+        SoundCard(SensorParams(config='{rate_hz: 44100, decimation: 16}'))

@@ -1,0 +1,1 @@
+"""A contact microphone or accelerometer on a sound card."""
