@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from texture_core.errors import InvalidData
 
 NANOSECONDS = 1_000_000_000
+TARED = ' (tared)'  # ends the name of a sensor whose level without load has been subtracted
 MAX_HZ = 1e6  # seconds of samples are kept: a rate from nowhere would take all memory
 
 

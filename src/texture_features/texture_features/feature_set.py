@@ -18,6 +18,7 @@ from texture_core.errors import InvalidParameter
 from texture_core.features import FeatureVector
 from texture_core.parameters import from_mapping, param
 from texture_core.plain_data import safe_repr
+from texture_core.signal import TARED
 from texture_core.window import Window
 from texture_features.catalogue import FEATURES
 from texture_features.feature import Feature, WindowBatch
@@ -35,6 +36,7 @@ InputLayout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of 
 
 MOTION_FEATURES = (Speed, Force)
 JOINT = '+'  # between the topics of a joint input
+RAW, SUBTRACTED = 'raw', 'tared'
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ class InputFeatures:
 
     topic: str
     features: tuple[tuple[str, Feature], ...]
+    tare: str = ''
 
     @cached_property
     def topics(self) -> tuple[str, ...]:
@@ -59,7 +62,9 @@ class InputFeatures:
     def as_mapping(self) -> dict[str, Any]:
         """Return the section of a recipe."""
         stretches = [feature.to_m_s for _, feature in self.features if isinstance(feature, Stretched)]
-        options = {'stretch_to_m_s': stretches[0]} if stretches else {}
+        options: dict[str, Any] = {'stretch_to_m_s': stretches[0]} if stretches else {}
+        if self.tare:
+            options['tare'] = self.tare
         return {**options, 'features': [{name: _parameters(feature)} for name, feature in self.features]}
 
 
@@ -75,6 +80,12 @@ class InputOptions:
 
     stretch_to_m_s: float = param(
         0.0, 'Speed to which windows are resampled before feature extraction; 0: no resampling.', unit='m/s', low=0.0
+    )
+    tare: str = param(
+        '',
+        "States what the features of levels expect: 'raw' samples, or 'tared' ones, of which the sensor node has "
+        "subtracted the baseline; '' is for features that do not see the level.",
+        choices=('', RAW, SUBTRACTED),
     )
 
 
@@ -143,6 +154,26 @@ class FeatureSet:
     def topics(self) -> tuple[str, ...]:
         """What the inputs need, in order, each once."""
         return tuple(dict.fromkeys(chain.from_iterable(item.topics for item in self.inputs)))
+
+    def tare_faults(self, sensors: Mapping[str, str]) -> list[str]:
+        """Return sentences on streams that are tared and should not be, or the other way round.
+
+        Parameters
+        ----------
+        sensors
+            Name of the sensor by topic, as its messages hold it.
+        """
+        faults = []
+        for item in self.inputs:
+            for topic in item.topics if item.tare else ():
+                tared = sensors.get(topic, '').endswith(TARED)
+                if topic in sensors and tared != (item.tare == SUBTRACTED):
+                    what = 'subtracted' if tared else 'not subtracted'
+                    faults.append(
+                        f"the recipe expects '{topic}' {item.tare}, and its baseline is {what}; tare the sensor, or "
+                        'change its parameter subtract_baseline'
+                    )
+        return faults
 
     def extract(self, event: WindowEvent) -> FeatureVector:
         """Return the features of a window; for the end of a slide, the empty vector that is `last`."""
@@ -249,7 +280,8 @@ class FeatureSet:
         return self._layouts[layout]
 
     def _fingerprint(self, layout: InputLayout) -> str:
-        meaning = {**self.as_mapping(), 'windows': self.windows.length_s}
+        inputs = {item.topic: dataclasses.replace(item, tare='').as_mapping() for item in self.inputs}
+        meaning = {'inputs': inputs, 'windows': self.windows.length_s}
         digest = hashlib.sha256(json.dumps(meaning, sort_keys=True).encode()).hexdigest()[:8]
         met = [
             f'{topic}={rate:.6g}Hz*{len(channels)}' for topic, (rate, channels) in zip(self.topics, layout, strict=True)
@@ -276,7 +308,8 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
     options = from_mapping(InputOptions, {key: value for key, value in section.items() if key != 'features'}, place)
     if options.stretch_to_m_s and len(topics) > 1:
         raise InvalidParameter(f'{place}: joined inputs cannot be stretched; leave stretch_to_m_s out')
-    return InputFeatures(topic, tuple((name, _prepared(feature, options)) for name, feature in chosen))
+    features = tuple((name, _prepared(feature, options)) for name, feature in chosen)
+    return InputFeatures(topic, features, options.tare)
 
 
 def _prepared(feature: Feature, options: InputOptions) -> Feature:

@@ -45,6 +45,7 @@ class FeatureExtractor(Node):
         self._reported = 0
         self._sent = 0
         self._frame_id = ''  # of the fingertip
+        self._sensors: dict[str, str] = {}  # by topic
         self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
         for topic in self._feature_set.topics:
@@ -54,6 +55,7 @@ class FeatureExtractor(Node):
 
     def _on_signal(self, topic: str, message: msg.TactileSignal) -> None:
         self._frame_id = message.header.frame_id
+        self._sensors[topic] = message.sensor
         self._add(partial(self._cutter.add_signal, topic), message)
 
     def _on_state(self, message: msg.ExplorationState) -> None:
@@ -91,6 +93,9 @@ class FeatureExtractor(Node):
         waiting = self._cutter.waiting_for
         if waiting:
             return 'WARN', f'nothing has come yet on {", ".join(waiting)}', numbers
+        tare_faults = self._feature_set.tare_faults(self._sensors)
+        if tare_faults:
+            return 'WARN', '; '.join(tare_faults), numbers
         faults = sum(numbers.values()) - numbers['windows']
         new, self._reported = faults - self._reported, faults
         return ('WARN', 'samples or messages were lost', numbers) if new else ('OK', 'extracting', numbers)
