@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
+from std_srvs.srv import Trigger
 from texture_msgs import msg
 
-from texture_benchmarks.load.rig import Rig, biotac
+from texture_benchmarks.load.rig import CASES, Rig, biotac
 from texture_core.ros.local_graph import LocalGraph
-from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.devices.biotac import EmulatedBioTac
 
@@ -53,6 +56,40 @@ def test_the_daq_finger_is_published_in_volts_under_its_names(graph: LocalGraph,
     assert (signal[-1].sensor, set(signal[-1].units), signal[-1].sampling_rate_hz) == ('daq', {'V'}, 2500.0)
     assert signal[-1].channels[::4] == ['pvdf_outer_1', 'strain_outer_1']
     assert np.median(np.diff(signal[-1].samples[::8])) == pytest.approx(10 / 2**15, rel=1e-3)
+
+
+def test_a_tare_is_asked_for_and_the_baseline_is_published_and_subtracted(graph: LocalGraph, tmp_path: Path) -> None:
+    def feed(device: Any, first: int, ticks: int) -> None:
+        device.sample(np.full((4 * ticks, 1, 9, 6), 0.25))
+
+    case = replace(CASES['papillarray'], feed=feed)
+    signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
+    baselines = graph.listen(msg.TactileSignal, 'signal_baseline', STATE_QOS)
+    with Rig('papillarray', tmp_path / 'papillarray', case=case) as rig:
+        node = graph.add(
+            SensorNode,
+            sensor='papillarray',
+            device=str(rig.link),
+            config=case.config,
+            subtract_baseline=True,
+            tare_s=0.2,
+        )
+        graph.until(lambda: signal)
+        response = node._on_tare(Trigger.Request(), Trigger.Response())
+        assert response.success
+        graph.until(lambda: baselines)
+        graph.until(lambda: signal[-1].sensor == 'papillarray/pillars (tared)')
+        assert rig.device.biases == 1
+    assert len(baselines[-1].samples) == 54
+    assert np.abs(baselines[-1].samples).max() == 0.0  # the hub has set its own bias first
+    assert np.abs(signal[-1].samples).max() == 0.0
+
+
+def test_a_tare_without_a_sensor_is_refused(graph: LocalGraph, tmp_path: Path) -> None:
+    node = graph.add(SensorNode, sensor='daq', device=str(tmp_path / 'missing'))
+    response = node._on_tare(Trigger.Request(), Trigger.Response())
+    assert not response.success
+    assert 'delivers no samples' in response.message
 
 
 def test_a_recording_is_played_as_a_sensor(graph: LocalGraph, tmp_path: Path) -> None:

@@ -14,7 +14,9 @@ class Sensor(Protocol):
     `read` blocks for about one batch and returns what arrived, keyed by topic ('signal', 'signal_static');
     it may return nothing. A device that is gone raises DeviceError from `open` or `read`; the caller closes and
     opens again. `counts` are running totals of this sensor object, kept over reopening. A sensor may also have
-    `details`: what it reports about itself, such as its 'serial number', by name, for the diagnostics.
+    `details`: what it reports about itself, such as its 'serial number', by name, for the diagnostics; `limits`: the
+    lowest and the highest sample by topic, of all channels or of each, to tell when one is saturated; and `set_bias()`:
+    makes the device take its present state for none, and returns the seconds that this takes.
     """
 
     def open(self) -> None:

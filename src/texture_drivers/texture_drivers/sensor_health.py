@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from texture_drivers.channel_watch import ChannelWatch
 from texture_drivers.sensor_reader import SensorReader
 
 NO_SAMPLE_TIMEOUT_S = 1.0  # ERROR: no sample for so long
@@ -18,12 +19,14 @@ class SensorHealth:
     """Report level, sentence and numbers on what happened since the last report.
 
     ERROR: the sensor cannot be reached, or no sample came for 1 s. WARN: samples were lost or the sensor was opened
-    again since the last report, a rate is more than 5 % off, or more than 5 packets a second are refused. All that is
-    assessed over the time since the last report, so the level falls back by itself.
+    again since the last report, a rate is more than 5 % off, more than 5 packets a second are refused, a channel is
+    saturated, dead or has drifted, or a tare was refused. All that is assessed over the time since the last report, so
+    the level falls back by itself.
     """
 
-    def __init__(self, reader: SensorReader, now_s: float) -> None:
+    def __init__(self, reader: SensorReader, now_s: float, watch: ChannelWatch | None = None) -> None:
         self._reader = reader
+        self._watch = watch
         self._then_s = now_s
         self._published = dict(reader.published)
         self._counts = dict(reader.sensor.counts)
@@ -45,14 +48,18 @@ class SensorHealth:
             self._last_sample_s = now_s
         age_s = now_s - self._last_sample_s
         self._then_s, self._published, self._counts = now_s, published, counts
+        faults, watched = self._watch.review(period_s) if self._watch else ([], {})
         numbers = {
             **{f'{topic} rate [Hz]': rate for topic, rate in rates.items()},
             **{f'{topic} expected [Hz]': rate for topic, rate in self._reader.sensor.expected_rates_hz.items()},
             **counts,
             'age of last sample [s]': age_s,
             **self.details,
+            **watched,
         }
         level, message = self._assess(rates, new, age_s, period_s)
+        if level == 'OK' and faults:
+            level, message = 'WARN', '; '.join(faults)
         return level, message, numbers
 
     def _assess(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 
 from texture_core.errors import DeviceError
@@ -12,6 +13,7 @@ from texture_core.signal import TactileSignal
 RETRY_S = 0.2
 Deliver = Callable[[str, TactileSignal], None]
 LogSentence = Callable[[str], None]
+Action = Callable[[], None]
 
 
 class SensorReader:
@@ -36,12 +38,17 @@ class SensorReader:
         self._deliver = deliver
         self._warn = warn
         self._inform = inform
+        self._actions: deque[Action] = deque()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='sensor reader', daemon=True)
 
     def start(self) -> None:
         """Start the thread."""
         self._thread.start()
+
+    def between_reads(self, action: Action) -> None:
+        """Do something to the sensor in this thread, between two reads, once it is open; it may raise DeviceError."""
+        self._actions.append(action)
 
     def stop(self) -> None:
         """End the thread and close the sensor; returns when both are done."""
@@ -61,6 +68,8 @@ class SensorReader:
             while not self._stop.is_set():
                 for topic, batches in self.sensor.read().items():
                     self._deliver_all(topic, batches)
+                while self._actions:
+                    self._actions.popleft()()
         except DeviceError as error:
             if self.fault != str(error):
                 self._warn(f'{error}. Trying again every {RETRY_S} s')

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from texture_core.errors import DeviceError
 from texture_core.signal import TactileSignal
+from texture_drivers.channel_watch import Limits
 from texture_drivers.params import SensorParams
 from texture_drivers.serial_port import SerialPort
 
@@ -36,6 +37,11 @@ class Decoder(Protocol):
     @property
     def rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
+        ...
+
+    @property
+    def limits(self) -> Limits:
+        """Lowest and highest sample by topic, where they are known."""
         ...
 
     def restart(self) -> None:
@@ -144,6 +150,11 @@ class SerialSensor:
     def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
         return self._decoder.rates_hz
+
+    @property
+    def limits(self) -> Limits:
+        """Lowest and highest sample by topic, where they are known."""
+        return self._decoder.limits
 
     def _opened_port(self) -> SerialPort:
         if self._port is None:

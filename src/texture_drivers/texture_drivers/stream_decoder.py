@@ -18,6 +18,7 @@ from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.framing import TIME_BITS, CounterUnwrapper, Frame, FrameDecoder
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.block_counter import BlockCounter
+from texture_drivers.channel_watch import Limits
 from texture_drivers.clock import PPM, SLOW_CLOCK, StreamClock
 
 VERSION = 1
@@ -51,6 +52,13 @@ class FramedStream:
                 f"'{self.sensor}' has {len(self.channels)} channels, {len(self.units)} units, {len(self.gains)} gains "
                 f'and {len(self.offsets)} offsets; give one of each for every channel'
             )
+
+    @property
+    def limits(self) -> tuple[Array, Array]:
+        """Lowest and highest sample of each channel, (n_channels,) each."""
+        counts = np.iinfo(SAMPLE)
+        ends = np.array([self.gains * end + self.offsets for end in (counts.min, counts.max)], dtype=np.float32)
+        return ends.min(axis=0), ends.max(axis=0)
 
     def check(self, frame: Frame) -> None:
         """Raise DeviceError if a frame is of another version or another number of channels.
@@ -134,6 +142,11 @@ class StreamDecoder:
     def rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
         return {tracker.stream.topic: tracker.stream.rate_hz for tracker in self.trackers.values()}
+
+    @property
+    def limits(self) -> Limits:
+        """Lowest and highest sample by topic: those of an int16."""
+        return {tracker.stream.topic: tracker.stream.limits for tracker in self.trackers.values()}
 
     def restart(self) -> None:
         """Go on after an interruption, with the index that the host's clock will tell."""

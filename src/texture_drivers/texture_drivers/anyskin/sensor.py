@@ -13,6 +13,7 @@ from texture_core.signal import TactileSignal
 from texture_drivers.anyskin import tables
 from texture_drivers.anyskin.protocol import FrameParser, FrameRun, Values
 from texture_drivers.arrival_numbering import ArrivalNumbering
+from texture_drivers.channel_watch import Limits
 from texture_drivers.clock import PPM, SLOW_CLOCK
 from texture_drivers.params import SensorParams
 from texture_drivers.rate_meter import RateMeter
@@ -94,6 +95,11 @@ class AnySkinDecoder:
         rate_hz = self._rate_hz or tables.USUAL_RATE_HZ
         topics = (tables.SIGNAL, *((tables.TEMPERATURE,) if self._settings.temperature else ()))
         return dict.fromkeys(topics, rate_hz)
+
+    @property
+    def limits(self) -> Limits:
+        """What a magnetometer can measure."""
+        return {tables.SIGNAL: (-tables.RANGE_UT, tables.RANGE_UT)}
 
     def restart(self) -> None:
         """Go on after an interruption, with the index that the host's clock will tell."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from std_srvs.srv import Trigger
 from texture_msgs import msg
 
 from texture_core.catalogue import find
@@ -16,17 +17,22 @@ from texture_core.protocols import Sensor
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.diagnostics import Diagnostics
 from texture_core.ros.parameters import declare, read
-from texture_core.ros.qos import SENSOR_QOS
+from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
 from texture_core.signal import TactileSignal
+from texture_drivers.baseline import Baseline
 from texture_drivers.catalogue import SENSORS
+from texture_drivers.channel_watch import ChannelWatch, TareParams
 from texture_drivers.params import SensorParams
 from texture_drivers.sensor_health import SensorHealth
 from texture_drivers.sensor_reader import SensorReader
 
+# Phases of an exploration in which nothing touches the finger; after an abort it may still.
+UNLOADED = frozenset({msg.ExplorationState.IDLE, msg.ExplorationState.APPROACH, msg.ExplorationState.DONE})
+
 
 @dataclass(frozen=True)
-class SensorNodeParams(SensorParams):
+class SensorNodeParams(TareParams, SensorParams):
     """Parameters of the sensor node."""
 
     sensor: str = param(
@@ -46,6 +52,9 @@ class SensorNode(LifecycleNode):
         self._make(params)  # what is wrong in the parameters ends the node here, with a sentence
         self._reader: SensorReader | None = None
         self._topics: dict[str, Any] = {}
+        self._baselines: dict[str, Any] = {}
+        self.create_service(Trigger, 'tare', self._on_tare)
+        self.create_subscription(msg.ExplorationState, 'exploration', self._on_exploration, STATE_QOS)
         self._diagnostics = Diagnostics(self, self._report, hardware_id=params.device)
         if params.autostart:
             self.trigger_configure()
@@ -65,6 +74,10 @@ class SensorNode(LifecycleNode):
             topic: self.create_lifecycle_publisher(msg.TactileSignal, topic, SENSOR_QOS)
             for topic in sensor.expected_rates_hz
         }
+        self._baselines = {
+            topic: self.create_publisher(msg.TactileSignal, f'{topic}_baseline', STATE_QOS) for topic in self._topics
+        }
+        self._watch = ChannelWatch(params, list(self._topics), getattr(sensor, 'limits', {}))
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -72,7 +85,7 @@ class SensorNode(LifecycleNode):
         result = super().on_activate(state)
         log = self.get_logger()
         self._reader = SensorReader(self._sensor, self._publish, log.warning, log.info)
-        self._health = SensorHealth(self._reader, time.monotonic())
+        self._health = SensorHealth(self._reader, time.monotonic(), self._watch)
         self._reader.start()
         return result
 
@@ -102,16 +115,48 @@ class SensorNode(LifecycleNode):
         return find(SENSORS, params.sensor, 'sensor')(params, lambda: self.get_clock().now().nanoseconds)
 
     def _destroy_publishers(self) -> None:
-        for publisher in self._topics.values():
+        for publisher in (*self._topics.values(), *self._baselines.values()):
             self.destroy_publisher(publisher)
-        self._topics = {}
+        self._topics, self._baselines = {}, {}
 
     def _publish(self, topic: str, batch: TactileSignal) -> None:
-        self._topics[topic].publish(to_msg(batch))
+        published, baseline = self._watch.add(topic, batch)
+        self._topics[topic].publish(to_msg(published))
+        if baseline is not None:
+            self._publish_baseline(topic, baseline)
+
+    def _publish_baseline(self, topic: str, baseline: Baseline) -> None:
+        self._baselines[topic].publish(to_msg(baseline.as_signal()))
+        self.get_logger().info(f"'{topic}' is tared")
+
+    def _on_tare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Start a tare: its result comes on the topics of the baselines, a refusal on /diagnostics."""
+        if self._reader is None or self._reader.fault:
+            response.message = 'the sensor delivers no samples; activate it, and see /diagnostics'
+            return response
+        self._start_tare()
+        response.success = True
+        response.message = (
+            'taring: the baseline comes on the topics that end with _baseline, or a fault on /diagnostics'
+        )
+        return response
+
+    def _on_exploration(self, state: msg.ExplorationState) -> None:
+        if self._reader is None:
+            return
+        self._watch.set_unloaded(state.phase in UNLOADED)
+
+    def _start_tare(self) -> None:
+        """Let the device set its own bias, if it has one, and then measure what is left."""
+        sensor, watch = self._sensor, self._watch
+        set_bias = getattr(sensor, 'set_bias', lambda: 0.0)
+        self._reader.between_reads(lambda: watch.start_tare(set_bias()))
 
     def _report(self) -> tuple[str, str, dict[str, Any]]:
         if self._reader is None:
             return 'WARN', 'the sensor is not active', {}
+        if self._watch.needs_tare:
+            self._start_tare()
         self._diagnostics.hardware_id = self._health.details.get('serial number', self._device)
         return self._health.report(time.monotonic())
 

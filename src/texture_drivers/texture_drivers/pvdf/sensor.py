@@ -10,6 +10,7 @@ import numpy as np
 
 from texture_core.parameters import param
 from texture_core.signal import TactileSignal
+from texture_drivers.channel_watch import Limits
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf import tables
 from texture_drivers.pvdf.charge_leak import ChargeLeak, ForceReconstructor
@@ -161,6 +162,12 @@ class Pvdf:
     def expected_rates_hz(self) -> Mapping[str, float]:
         """Nominal rate of each topic."""
         return self._line.expected_rates_hz
+
+    @property
+    def limits(self) -> Limits:
+        """Lowest and highest sample by topic; the force that is restored from the film has none."""
+        kept = self._line.limits
+        return {tables.FORCE_TOPIC: kept[tables.FORCE_TOPIC]} if self._reconstructor else kept
 
     def _restored(self, film: TactileSignal, reconstructor: ForceReconstructor) -> TactileSignal:
         """Return the force on the film, N, of its charge, pC."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.signal import TactileSignal
 from texture_drivers import usb_ports
+from texture_drivers.channel_watch import Limits
 from texture_drivers.params import SensorParams
 from texture_drivers.serial_port import SerialPort
 from texture_drivers.settings import load_settings
@@ -152,6 +153,11 @@ class Tsf85:
             for number, prefix in self._prefixes.items()
             for topic, rate in self._fingers[number].rates_hz.items()
         }
+
+    @property
+    def limits(self) -> Limits:
+        """Ends of the int16 and of the uint16 by topic."""
+        return {f'{prefix}{topic}': ends for prefix in self._prefixes.values() for topic, ends in tables.LIMITS.items()}
 
     def _without_duplicates(self, packets: Sequence[Packet]) -> list[Packet]:
         """Leave out what came twice: the same to the last bit, stamp and all."""

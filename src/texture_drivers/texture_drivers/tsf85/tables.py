@@ -39,6 +39,7 @@ RATE_HZ = 1000.0  # of the dynamic channel; the device's stamps are milliseconds
 DYNAMIC_SENSOR, STATIC_SENSOR, MOTION_SENSOR = 'tsf85/dynamic', 'tsf85/static', 'tsf85/imu'
 DYNAMIC_CHANNELS = ('dynamic',)
 UNIT = 'count'
+LIMITS = {'signal': (-(2**15), 2**15 - 1), 'signal_static': (0, 2**16 - 1)}  # what the counts can be, by topic
 
 
 @dataclass(frozen=True)
