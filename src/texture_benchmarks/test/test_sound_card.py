@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -32,7 +31,6 @@ class PacedCard:
     def __init__(self, folder: Path) -> None:
         self.card = EmulatedSoundCard(folder)
         self.silent = False
-        self.skipped = 0  # blocks that are left out from now on
         self.start_ns = time.time_ns()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -48,10 +46,9 @@ class PacedCard:
                     self.card.sample(((np.arange(FRAMES_AT_ONCE) + first) % TURN).astype(np.int16))
             blocks = due
 
-    def close(self) -> None:
+    def stop(self) -> None:
         self._stop.set()
         self._thread.join()
-        self.card.close()
 
 
 @pytest.fixture(scope='module')
@@ -59,13 +56,16 @@ def card(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PacedCard]:
     if not Path(SYSTEM_CONFIG).exists():
         pytest.skip('ALSA is not installed')
     made = PacedCard(tmp_path_factory.mktemp('alsa'))
-    os.environ.update(made.card.environment)
-    try:
-        pytest.importorskip('sounddevice', exc_type=ImportError)
-    except OSError:
-        pytest.skip('PortAudio is not installed')
-    yield made
-    made.close()
+    # Whoever lists the cards opens the pipe and waits for a writer: other tests of this process must not find it.
+    with pytest.MonkeyPatch.context() as environment:
+        for name, value in made.card.environment.items():
+            environment.setenv(name, value)
+        try:
+            pytest.importorskip('sounddevice', exc_type=ImportError)
+        except OSError:
+            pytest.skip('PortAudio is not installed')
+        yield made
+        made.stop()
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from texture_core.errors import DeviceError
 from texture_core.signal import NANOSECONDS
 from texture_drivers.sound_card import tables
 
-FULL_SCALE = np.float32(2**15)
+FULL_SCALE = 2.0**15
 LONGEST_LATENCY_S = 1.0  # a time of conversion that lies further off is none: some drivers tell 0
 
 
@@ -91,7 +91,7 @@ class Capture:
         latency_s = times.currentTime - times.inputBufferAdcTime - frames / self._rate_hz
         believed_s = latency_s if 0 <= latency_s < LONGEST_LATENCY_S else 0.0
         end_ns = self._now_ns() - round(believed_s * NANOSECONDS)
-        self._blocks.append(Block(samples / FULL_SCALE, end_ns, self._overflowed))
+        self._blocks.append(Block((samples / FULL_SCALE).astype(np.float32), end_ns, self._overflowed))
         self._overflowed = False
 
 
