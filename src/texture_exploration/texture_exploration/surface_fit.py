@@ -46,6 +46,11 @@ def fit_surface(
     along : (3,)
         Direction of the x axis in the base frame.
 
+    Returns
+    -------
+    SurfaceFit
+        Pose of the surface in the base frame, and the distances that are left, m.
+
     Raises
     ------
     InvalidData
@@ -102,6 +107,10 @@ class Touches:
         ----------
         place, normal, along : (3,)
             See `fit_surface`.
+
+        Returns
+        -------
+        SurfaceFit or None
 
         Raises
         ------

@@ -48,6 +48,8 @@ def check_program(
         Whether a paused program is one that this connection started before.
     patience_s
         How long a running program may take to end by itself.
+    upper_range
+        Whether the registers of the upper range are used.
 
     Raises
     ------
