@@ -8,21 +8,17 @@ import pytest
 
 from texture_benchmarks.result import BenchmarkOptions
 from texture_benchmarks.scenes import run as scenes
-from texture_benchmarks.scenes.trial import (
+from texture_benchmarks.scenes.touch_protocols import (
     ADDED,
     FRICTION,
     PATCH,
     TOUCH_PROTOCOLS,
-    MeanDifference,
-    TermEffect,
     TouchProtocol,
-    ablate,
     completed,
-    extract_features,
-    simulate_features,
     variants,
     with_one_more,
 )
+from texture_benchmarks.scenes.trial import MeanDifference, TermEffect, ablate, extract_features, simulate_features
 from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.effects.noise import Noise
 from texture_simulation.scene import Scene, load_scene, scene_from
@@ -58,7 +54,7 @@ def test_what_grows_with_the_force_stays_at_its_mean_when_removed_and_comes_back
     scene = two_ridges(patch_growth={})
     removed = variants(scene, TOUCHING)['patch_growth']
     assert removed.contact.blur_m == pytest.approx(scene.contact.blur_m * 4.5 ** (1 / 3))
-    monkeypatch.setattr('texture_benchmarks.scenes.trial.REMOVED_EFFECTS', {'ridges': dict(scene.effects)})
+    monkeypatch.setattr('texture_benchmarks.scenes.touch_protocols.REMOVED_EFFECTS', {'ridges': dict(scene.effects)})
     again = completed(removed, TOUCHING)
     assert again.effects == scene.effects
     assert again.contact.blur_m == pytest.approx(scene.contact.blur_m)

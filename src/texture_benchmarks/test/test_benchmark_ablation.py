@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from texture_benchmarks.ablation.run import SHIPPED, SLOW_VARIANTS, VARIANTS, changed
+from texture_benchmarks.ablation.variants import SHIPPED, SLOW_VARIANTS, VARIANTS, changed
 from texture_benchmarks.catalogue import BENCHMARKS
 from texture_benchmarks.result import BenchmarkOptions
 from texture_estimation.recipe import load_recipe

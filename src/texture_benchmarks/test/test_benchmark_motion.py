@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import run_benchmark
-from texture_benchmarks.motion.chart import robot_table
+from texture_benchmarks.motion.tables import robot_table
 from texture_benchmarks.motion.trial import radius_error_m
 from texture_benchmarks.result import BenchmarkOptions
 

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
-from texture_benchmarks.optimise.run import CASES, DATA, LINEAR
+from texture_benchmarks.optimise.cases import CASES, DATA, LINEAR
 from texture_benchmarks.result import BenchmarkOptions
 
 

@@ -15,8 +15,9 @@ from texture_benchmarks.endurance.endurance_record import EnduranceRecord, Explo
 from texture_benchmarks.endurance.faults import FAULTS, planned_faults
 from texture_benchmarks.endurance.machine_speed import MachineSpeed, measure_machine_speed
 from texture_benchmarks.endurance.planned_explorations import planned_explorations
+from texture_benchmarks.endurance.process_load import lives
 from texture_benchmarks.endurance.processes import Processes
-from texture_benchmarks.endurance.requirements import check_requirements, lives, unexplained_vectors
+from texture_benchmarks.endurance.requirements import check_requirements, unexplained_vectors
 from texture_benchmarks.endurance.usage import ProcessUsage, read_usage
 
 HOUR_S = 3600

@@ -7,7 +7,8 @@ import pytest
 from texture_core.errors import TextureError
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search.genetic_search import SearchParams
-from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags
+from texture_evaluation.found_recipes import Wanted, checkpoint_of
+from texture_evaluation.optimise import optimise_from_bags
 from texture_evaluation.train import train_from_bags
 
 SMALL = SearchParams(population=5, generations=2, halves=3)

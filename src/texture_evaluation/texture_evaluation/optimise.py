@@ -4,28 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.files import writing
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.genetic_search import Generation, SearchParams
 from texture_estimation.search.labelled_windows import Cut, LabelledWindows
-from texture_estimation.search.optimise import Finalist, SearchResult, optimise
-from texture_estimation.search.pairs import PairSearchResult, beside, optimise_pairs
+from texture_estimation.search.optimise import optimise
+from texture_estimation.search.pairs import optimise_pairs
 from texture_estimation.search.parallel import ParallelMap, dask_map, threaded_map
 from texture_estimation.search.recipe_space import RecipeSpace
 from texture_estimation.search.roughness_task import RoughnessTask
 from texture_estimation.search.search_slides import SearchSlides
-from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
+from texture_evaluation.found_recipes import Wanted, Written, checkpoint_of, write_found, write_pairs
 from texture_evaluation.train import with_channels
 from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import CutWindow, WindowParams
@@ -52,49 +49,6 @@ OF_LEARNERS: Mapping[str, str] = {
     'mlp': 'mlp',
 }
 Tell = Callable[[str, Generation], None]
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is tuned, and on which slides.
-
-    Parameters
-    ----------
-    recipe
-        Name of a shipped recipe, or path of any; of a roughness recipe if there are `grades`.
-    bags
-        Bags, or folders of bags.
-    search
-        Name or path of the search space; '' for that of the recipe or its learner.
-    slides
-        Which slides of each surface, such as '1-30'; '' for all.
-    channels
-        'fast' leaves all inputs of the recipe but `signal` out.
-    grades
-        CSV file with the grade of every surface, or the name of a shipped table; '' to distinguish surfaces.
-    per_pair
-        Tune a recipe for each pair of surfaces by itself.
-    """
-
-    recipe: str
-    bags: tuple[str, ...]
-    search: str = ''
-    slides: str = ''
-    channels: str = 'all'
-    grades: str = ''
-    per_pair: bool = False
-
-    def __post_init__(self) -> None:
-        if self.grades and self.per_pair:
-            raise InvalidParameter('grades are not told pair by pair; leave --per-pair or --grades out')
-
-
-@dataclass(frozen=True)
-class Written:
-    """The files that a search has written, and what it found in lines for people."""
-
-    files: tuple[Path, ...]
-    lines: tuple[str, ...]
 
 
 def cut_of(dataset: SlideDataset, feature_set: FeatureSet) -> Cut:
@@ -176,18 +130,12 @@ def optimise_from_bags(
                 tell=lambda pair, said: tell(' – '.join(pair), said),
                 **options,
             )
-            return _write_pairs(pairs, wanted, params, target)
+            return write_pairs(pairs, wanted, params, target)
         task: Any = RoughnessTask(read_grades(wanted.grades)) if wanted.grades else ClassificationTask()
         found = optimise(
             space, search_slides, params, task, parallel_map=parallel_map, tell=lambda said: tell('', said), **options
         )
-    return _write(found, wanted, params, target)
-
-
-def checkpoint_of(out: str | Path) -> Path:
-    """Return where the scores of a search are kept: 'best.yaml' → 'best.search.json'."""
-    path = Path(out)
-    return path.with_name(f'{path.stem}.search.json')
+    return write_found(found, wanted, params, target)
 
 
 def parallel_map_for(jobs: int, dask: str) -> Callable[[], AbstractContextManager[ParallelMap]]:
@@ -215,72 +163,3 @@ def _space(wanted: Wanted) -> RecipeSpace[Any]:
 def _checkpoints(path: Path) -> list[Path]:
     """Return the checkpoint, or those of the pairs."""
     return [path] if path.is_file() else sorted(path.parent.glob(f'{path.stem}-*-vs-*{path.suffix}'))
-
-
-def _write(found: SearchResult[Any], wanted: Wanted, params: SearchParams, target: Path) -> Written:
-    recipes = {target: found.best}
-    if params.objective == 'front':
-        others = (one for one in found.finalists if one is not found.best)
-        recipes |= {target.with_name(f'{target.stem}-{n}{target.suffix}'): one for n, one in enumerate(others, 2)}
-    for path, finalist in recipes.items():
-        write_recipe(finalist, path, _origin(wanted, params))
-    chart = target.with_suffix('.png')
-    if params.objective == 'front':
-        costs = {f'{one.fitness:.4f}/{n}': (one.searched.cost, one.fitness) for n, one in enumerate(found.finalists)}
-        search_front_chart({wanted.recipe: list(costs.values())}, f'{wanted.recipe}: accuracy and computing', chart)
-    else:
-        convergence_chart({wanted.recipe: found.found.history}, f'{wanted.recipe}: the search', chart)
-    lines = [f'{path}: {_scores(finalist)}' for path, finalist in recipes.items()]
-    return Written((*recipes, checkpoint_of(target), chart), tuple(lines))
-
-
-def _write_pairs(pairs: PairSearchResult, wanted: Wanted, params: SearchParams, target: Path) -> Written:
-    recipes = {beside(target, pair): found.best for pair, found in pairs.by_pair.items()}
-    for path, finalist in recipes.items():
-        write_recipe(finalist, path, _origin(wanted, params))
-    chart = target.with_suffix('.png')
-    histories = {' – '.join(pair): found.found.history for pair, found in pairs.by_pair.items()}
-    convergence_chart(histories, f'{wanted.recipe}: a search for each pair', chart)
-    together = (
-        f'all pairs together, most pairs won: training {100 * pairs.record.learning.mean():.1f} %, '
-        f'tested {100 * pairs.record.test.mean():.1f} %'
-    )
-    lines = [f'{path}: {_scores(finalist)}' for path, finalist in recipes.items()]
-    return Written((*recipes, chart), (*lines, together))
-
-
-def write_recipe(finalist: Finalist[Any], path: Path, origin: str) -> None:
-    """Write a recipe as a file that `texture train` reads; where it comes from stands at the top.
-
-    Parameters
-    ----------
-    finalist
-        Recipe and its scores.
-    path
-        File that is written.
-    origin
-        Where it comes from, in words.
-
-    Raises
-    ------
-    InvalidParameter
-        If the file cannot be written.
-    """
-    content = yaml.safe_dump(finalist.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
-    with writing(path):
-        path.write_text(f'# {origin}\n# {_scores(finalist)}.\n{content}', encoding='utf-8')
-
-
-def _origin(wanted: Wanted, params: SearchParams) -> str:
-    return (
-        f'Found by `texture optimise {wanted.recipe}`: {params.population} individuals, {params.generations} '
-        f'generations, {params.halves} halves, seed {params.seed}.'
-    )
-
-
-def _scores(finalist: Finalist[Any]) -> str:
-    record = finalist.record
-    return (
-        f'fitness {100 * finalist.fitness:.1f} %: training {100 * record.learning.mean():.1f} %, '
-        f'tested {100 * record.test.mean():.1f} % over {record.halves} halves'
-    )

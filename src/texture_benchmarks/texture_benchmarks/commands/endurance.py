@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+from texture_benchmarks.endurance.endurance_plan import EndurancePlan
 from texture_benchmarks.endurance.report import write
 from texture_benchmarks.endurance.requirements import RequirementResult, check_requirements
 from texture_benchmarks.endurance.robot_report import write_figures, write_robots
 from texture_benchmarks.endurance.robot_requirements import check_robots
 from texture_benchmarks.endurance.robot_run import RobotPlan, endure_robots
-from texture_benchmarks.endurance.run import EndurancePlan, endure
+from texture_benchmarks.endurance.run import endure
 from texture_core.command_options import add_seed
 from texture_core.errors import InvalidData
 

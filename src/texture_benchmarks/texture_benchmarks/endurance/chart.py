@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.endurance.endurance_record import ABORTED, LOST, REFUSED, SUCCESS, EnduranceRecord
-from texture_benchmarks.endurance.requirements import by_process, cpu_shares
+from texture_benchmarks.endurance.process_load import by_process, cpu_shares
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 

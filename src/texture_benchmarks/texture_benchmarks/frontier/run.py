@@ -4,29 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from texture_benchmarks.charts import evidence_chart, line_chart
-from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.frontier.chart import early_chart, size_chart
 from texture_benchmarks.frontier.training_costs import Cost, TrainingSize, costs
+from texture_benchmarks.frontier.trial import CONFIDENCES, OVERLAPPING_S, FrontierJob, Points, try_all
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.recipes import minirocket
 from texture_benchmarks.recipes.run import DATA, FIRST, LATER, QUICK_FIRST, QUICK_MATERIALS, QUICK_SLIDES, RATE_HZ
-from texture_benchmarks.recipes.trial import LENGTH_S, all_at_rate, comparable, every, figures_of, latency_us
+from texture_benchmarks.recipes.trial import LENGTH_S, all_at_rate
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
-from texture_estimation.model import TextureModel
-from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.search.parallel import single_blas_thread
-from texture_evaluation import metrics
 from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
-from texture_evaluation.cross_validation.cross_validate import cross_validate
 from texture_evaluation.cross_validation.splits import Split
-from texture_evaluation.train import with_channels
 from texture_recordings.slide_dataset import SlideDataset
 
 # Ours with windows of all lengths, and of each paper the recipe that recognises most, of those that train in seconds.
@@ -41,8 +35,6 @@ RECIPES: Mapping[str, Sequence[float]] = {
 }
 QUICK_RECIPES: Mapping[str, Sequence[float]] = {'fast': (0.1, 0.5)}
 SHOWN = 'default'
-OVERLAPPING_S = 0.1  # windows of LENGTH_S begin so far apart on the robot
-CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.999)
 # MiniRocket takes minutes for training all windows, and time that grows with their square.
 ROCKET, ROCKET_EVERY = 'MiniRocket', 2
 LEARNERS = ('mlp', 'svm_rbf', 'naive_bayes', 'passive_aggressive')
@@ -54,42 +46,15 @@ FIXED = {'windows': f'of {FEW_LABELS} surfaces', 'labels': f'{WINDOWS_PER_LABEL}
 LIMIT_S, QUICK_SIZES = 18.0, 2
 
 
-class _FrontierJob(NamedTuple):
-    """A recipe with windows of a length, which begin so far apart as they are long or LENGTH_S, or overlap."""
-
-    name: str
-    length_s: float
-    overlap: bool = False
-
-    def recipe(self) -> Recipe:
-        recipe = comparable(
-            with_channels(load_recipe(self.name), 'fast'), RATE_HZ, of_motion=False, length_s=self.length_s
-        )
-        return every(OVERLAPPING_S, recipe) if self.overlap else recipe
-
-
-class _Point(NamedTuple):
-    """What came of a job."""
-
-    model: TextureModel
-    figures: dict[str, Any]
-    curve: tuple[Array, Array]  # seconds of sliding, share of slides recognised
-    early: tuple[Array, Array]  # mean seconds of sliding, share right, when slides end at CONFIDENCES
-    rule: Mapping[str, float]  # the same at the fitted rule
-
-
-_Points = Mapping[str, Mapping[float, _Point]]  # by recipe and length (s) of its windows
-
-
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Try recipes with windows of many lengths on recorded slides, and learners with trainings of many sizes."""
     dataset = _recorded(options)
     split = Split(LATER, ChronologicalSplit(QUICK_FIRST if options.quick else FIRST))
     recipes = QUICK_RECIPES if options.quick else RECIPES
     name = SHOWN if SHOWN in recipes else next(iter(recipes))
-    overlap = _FrontierJob(name, LENGTH_S, overlap=True)
-    tried = _try_all([overlap, *(_FrontierJob(each, s) for each in recipes for s in recipes[each])], dataset, split)
-    points = {each: {s: tried[_FrontierJob(each, s)] for s in recipes[each]} for each in recipes}
+    overlap = FrontierJob(name, LENGTH_S, overlap=True)
+    tried = try_all([overlap, *(FrontierJob(each, s) for each in recipes for s in recipes[each])], dataset, split)
+    points = {each: {s: tried[FrontierJob(each, s)] for s in recipes[each]} for each in recipes}
     shown, overlapping = points[name], tried[overlap]
     with single_blas_thread():
         rocket = _rocket(dataset, split, options)
@@ -162,23 +127,6 @@ def _recorded(options: BenchmarkOptions) -> SlideDataset:
         return all_at_rate(SlideDataset.from_bags(bags, topics=('signal',)), 'signal', RATE_HZ)
 
 
-def _try(dataset: SlideDataset, split: Split, job: _FrontierJob) -> _Point:
-    result = cross_validate(job.recipe(), dataset, split.splitter)
-    results = result.pooled
-    early = metrics.decided_at(results, CONFIDENCES)
-    rule = metrics.early_decision(results)
-    return _Point(result.folds[-1].model, figures_of(result), metrics.curve(results), early, rule)
-
-
-def _try_all(jobs: Sequence[_FrontierJob], dataset: SlideDataset, split: Split) -> dict[_FrontierJob, _Point]:
-    """Return what comes of each job, one on each core; the computing time of windows is taken alone, at the end."""
-    tried = dict(zip(jobs, map_forked(partial(_try, dataset, split), jobs), strict=True))
-    with single_blas_thread():
-        for job, point in tried.items():
-            point.figures['latency_us'] = latency_us(job.recipe(), point.model, dataset)
-    return tried
-
-
 def _rocket(dataset: SlideDataset, split: Split, options: BenchmarkOptions) -> dict[float, dict[str, Any]]:
     """Return the figures of MiniRocket by the length of the window; none where it is not installed."""
     if options.quick or not minirocket.installed():
@@ -189,7 +137,7 @@ def _rocket(dataset: SlideDataset, split: Split, options: BenchmarkOptions) -> d
     }
 
 
-def _figures(points: _Points) -> dict[str, dict[float, dict[str, Any]]]:
+def _figures(points: Points) -> dict[str, dict[float, dict[str, Any]]]:
     return {name: {length_s: point.figures for length_s, point in own.items()} for name, own in points.items()}
 
 

@@ -10,32 +10,23 @@ from typing import Any
 
 import numpy as np
 
-from texture_benchmarks.motion.chart import (
-    border_chart,
-    hazard_chart,
-    hazard_table,
-    lag_table,
-    robot_chart,
-    robot_table,
-    surface_chart,
-    surface_table,
-)
+from texture_benchmarks.motion.chart import border_chart, hazard_chart, robot_chart, surface_chart
+from texture_benchmarks.motion.defaults import TARGETS, bump_speed_m_s, defaults, margins
 from texture_benchmarks.motion.hazards import LAGS_S, hazard_trials, lag_trials
 from texture_benchmarks.motion.robot_trials import ROBOTS, typical_trial
+from texture_benchmarks.motion.tables import hazard_table, lag_table, robot_table, surface_table
 from texture_benchmarks.motion.trial import (
     ARM,
     CIRCLE,
     SLIDE,
-    SURFACES,
     ForceControlMetrics,
     simulate_force_controlled_slide,
     simulate_slides_on_surfaces,
 )
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
-from texture_core.arrays import Array
-from texture_exploration.arms.simulated import RATE_HZ, SimulatedArmParams
-from texture_exploration.force_control import ForceController, ForceLoopParams
-from texture_exploration.stability import LoopModel, stability_chart, stability_limit_gain
+from texture_exploration.arms.simulated import SimulatedArmParams
+from texture_exploration.force_control import ForceController
+from texture_exploration.stability import LoopModel, stability_chart
 
 STIFFNESSES_N_M = (200.0, 2000.0, 20000.0)
 FINE_STIFFNESSES_N_M = tuple(float(k) for k in np.geomspace(200.0, 20000.0, 9))
@@ -43,19 +34,10 @@ BORDER_STIFFNESSES_N_M = (100.0, 1e3, 1e4, 1e5)
 DELAYS_S = tuple(float(delay) for delay in np.linspace(0.0, 0.02, 21))
 QUICK_DELAYS_S = (0.0, 0.008, 0.02)
 QUICK_ROBOTS = ('emulated rails',)
-SPEEDS_M_S = (0.1, 0.07, 0.05, 0.035, 0.025, 0.018, 0.0125, 0.01, 0.007, 0.005)
 REPEATS = 3  # of the emulated robots
 SIMULATED: Mapping[str, SimulatedArmParams] = {
     'simulated, force mode': replace(ARM, force_mode=True),
     'simulated, velocities only': ARM,
-}
-TARGETS = {
-    'force_rms': 0.05,
-    'overshoot': 0.2,
-    'speed_error': 0.02,
-    'radius_error_m': 0.001,
-    'border_error': 0.1,
-    'margin': 2.0,
 }
 
 
@@ -94,15 +76,15 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
                 name: {_milliseconds(lag): _rows(trials) for lag, trials in by_lag.items()}
                 for name, by_lag in hazards.items()
             },
-            'bump_speed_m_s': {_newtons(k): _bump_speed_m_s(k) for k in stiffnesses},
+            'bump_speed_m_s': {_newtons(k): bump_speed_m_s(k) for k in stiffnesses},
             'border_error': float(np.abs(border['simulated'] / border['predicted'] - 1).max()),
-            'margin': _margins(),
+            'margin': margins(),
         },
         charts=(
             robot_chart(robots, TARGETS, options.out / 'motion_robots.png'),
             surface_chart(surfaces, TARGETS, options.out / 'motion_surfaces.png'),
             hazard_chart(lags, hazards, TARGETS, options.out / 'motion_hazards.png'),
-            border_chart(border, _defaults(border), options.out / 'motion_stability.png'),
+            border_chart(border, defaults(border), options.out / 'motion_stability.png'),
         ),
     )
 
@@ -143,42 +125,3 @@ def _newtons(stiffness_n_m: float) -> str:
 
 def _milliseconds(time_s: float) -> str:
     return f'{1e3 * time_s:.0f} ms'
-
-
-def _bump_speed_m_s(stiffness_n_m: float) -> float:
-    """Return the highest of `SPEEDS_M_S` at which a bump of 2 mm is followed as well as asked, without a force mode."""
-    arm = replace(ARM, stiffness_n_m=stiffness_n_m, **SURFACES['bump of 2 mm'])
-    fits = (
-        v
-        for v in SPEEDS_M_S
-        if simulate_force_controlled_slide(arm, replace(SLIDE, speed_m_s=v)).force_rms <= TARGETS['force_rms']
-    )
-    return next(fits, 0.0)
-
-
-def _defaults(border: Mapping[str, Array]) -> Array:
-    """Return the gains that are chosen for the stiffnesses and delays of a chart, (s, d)."""
-    return np.array(
-        [
-            [ForceLoopParams(loop_delay_s=delay).default_gain(stiffness, 1 / RATE_HZ) for delay in border['delay_s']]
-            for stiffness in border['stiffness_n_m']
-        ]
-    )
-
-
-def _margins() -> dict[str, float]:
-    """Return how many times stiffer, and later, the contact may be than expected before the chosen gain is unstable."""
-    params, period_s = ForceLoopParams(), 1 / RATE_HZ
-    gain = params.default_gain(params.max_stiffness_n_m, period_s)
-    delays = np.linspace(1.0, 20.0, 191)
-    late = [
-        stability_limit_gain(
-            replace(params.loop(params.max_stiffness_n_m, period_s), delay_s=float(f) * params.loop_delay_s)
-        )
-        > gain
-        for f in delays
-    ]
-    return {
-        'stiffness': stability_limit_gain(params.loop(params.max_stiffness_n_m, period_s)) / gain,
-        'delay': float(delays[np.argmin(late)]),
-    }

@@ -5,29 +5,34 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.stats import spearmanr
 
+from texture_benchmarks.optimise.cases import (
+    CASES,
+    COMPARISONS,
+    DATA,
+    GRADES,
+    LINEAR,
+    USUAL,
+    Data,
+    SearchCase,
+    space_and_task,
+)
+from texture_benchmarks.optimise.charts import linear_charts, search_charts
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.catalogue import find
-from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import TRAIN, read_grades
-from texture_estimation.roughness.recipe import load_roughness_recipe
-from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.genetic_search import SearchParams
 from texture_estimation.search.optimise import SearchResult, optimise
 from texture_estimation.search.parallel import threaded_map
-from texture_estimation.search.recipe_space import RecipeSpace
-from texture_estimation.search.roughness_task import RoughnessTask
 from texture_estimation.search.search_slides import SearchSlides
-from texture_estimation.search.search_task import SearchTask
 from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
-from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
 from texture_simulation.offline import simulate_slides
 from texture_simulation.scene import load_scene
 from texture_simulation.sensors.catalogue import SENSORS
@@ -35,70 +40,20 @@ from texture_simulation.simulated_slide import SimulatedSlide
 
 Draw = Callable[[Mapping[str, SearchResult[Any]], Path], tuple[Path, ...]]
 
-GRADES = 'ets_roughness'
-USUAL = SearchParams()
 QUICK = SearchParams(population=5, generations=2, halves=3, finalists=1)
 QUICK_SCANS = 4  # of each surface, speed and force
 # Random individuals, and halves of each, on which a quick surrogate is compared with the learner itself.
 COMPARED, QUICK_COMPARED, COMPARED_HALVES = 12, 4, 3
 
 
-@dataclass(frozen=True)
-class Data:
-    """Slides over the surfaces of a scene: so many of each, with each speed and force."""
-
-    scene: str
-    speeds_m_s: tuple[float, ...]
-    forces_n: tuple[float, ...]
-    scan_s: float
-    count: int
-
-
-@dataclass(frozen=True)
-class SearchCase:
-    """One search: a recipe, its space, the data, and how long it may take on two cores."""
-
-    recipe: str
-    space: str
-    data: str
-    limit_s: float | None
-    params: SearchParams = USUAL
-
-
-DATA: Mapping[str, Data] = {
-    'linear': Data('ets_linear', (0.10, 0.15, 0.20), (1.0, 2.5, 5.0), 0.5, 50),
-    'fine': Data('ets_fine', (0.125,), (2.0,), 0.8, 200),
-    'roughness': Data('roughness', (0.15,), (2.5,), 0.5, 200),
-}
-FRONT = SearchParams(objective='front')
-CASES: Mapping[str, SearchCase] = {
-    'linear, SVM': SearchCase('ets-linear-svm', 'ets-svm', 'linear', 60.0),
-    'linear, ANN': SearchCase('ets-linear-ann', 'ets-ann', 'linear', 60.0),
-    'linear, SVM, no individual given up': SearchCase(
-        'ets-linear-svm', 'ets-svm', 'linear', None, SearchParams(race=False)
-    ),
-    'linear, SVM, front': SearchCase('ets-linear-svm', 'ets-svm-points', 'linear', None, FRONT),
-    'linear, ANN, front': SearchCase('ets-linear-ann', 'ets-ann-points', 'linear', None, FRONT),
-    'ten textures, SVM': SearchCase('ets-fine-svm', 'ets-fine-svm', 'fine', 300.0),
-    'ten textures, ANN': SearchCase('ets-fine-ann', 'ets-fine-ann', 'fine', 300.0),
-    'roughness, SVM5': SearchCase('ets-roughness-svm5', 'ets-roughness-svm5', 'roughness', 900.0),
-    'roughness, ANN5': SearchCase(
-        'ets-roughness-ann5', 'ets-roughness-ann5', 'roughness', 900.0, SearchParams(finalists=1)
-    ),
-    'roughness, ANN1': SearchCase('ets-roughness-ann1', 'ets-roughness-ann1', 'roughness', 900.0),
-}
-LINEAR = ('linear, SVM', 'linear, ANN')  # the papers' own
-COMPARISONS = (*LINEAR, 'ten textures, ANN')
-
-
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Run the searches of the linear experiment once, as large as in the paper."""
-    return _searched('optimise', LINEAR, (), options, _charts_linear)
+    return _searched('optimise', LINEAR, (), options, linear_charts)
 
 
 def run_large(options: BenchmarkOptions) -> BenchmarkResult:
     """Run all searches once, as large as in the papers: half an hour on two cores."""
-    return _searched('optimise-large', tuple(CASES), COMPARISONS, options, _charts)
+    return _searched('optimise-large', tuple(CASES), COMPARISONS, options, search_charts)
 
 
 def _searched(
@@ -143,7 +98,7 @@ def run_case(
     """
     params = replace(QUICK, objective=case.params.objective, race=case.params.race) if options.quick else case.params
     params = replace(params, seed=options.seed)
-    space, task = _space_and_task(case)
+    space, task = space_and_task(case)
     load = os.getloadavg()[0]
     began_s, began_cpu_s = time.perf_counter(), time.process_time()
     with threaded_map() as parallel_map:
@@ -168,12 +123,6 @@ def run_case(
         'test': round(float(best.record.test.mean()), 4),
         'best': space.variables.named(best.searched.individual),
     }, found
-
-
-def _space_and_task(case: SearchCase) -> tuple[RecipeSpace[Any], SearchTask[Any]]:
-    if case.data == 'roughness':
-        return RecipeSpace.load(case.space, load_roughness_recipe(case.recipe)), RoughnessTask(read_grades(GRADES))
-    return RecipeSpace.load(case.space, load_recipe(case.recipe)), ClassificationTask()
 
 
 def _simulate_slides(data: Data, options: BenchmarkOptions) -> SlideArrays:
@@ -204,7 +153,7 @@ def _simulate_slides(data: Data, options: BenchmarkOptions) -> SlideArrays:
 
 def _compare(case: SearchCase, measured: SlideArrays, options: BenchmarkOptions) -> dict[str, float]:
     """Return how a quick surrogate ranks random individuals, against the learner itself."""
-    space, task = _space_and_task(case)
+    space, task = space_and_task(case)
     search_slides = SearchSlides(measured, COMPARED_HALVES, options.seed)
     features = FeatureCache(measured)
     rng = np.random.default_rng(options.seed)
@@ -225,29 +174,3 @@ def _compare(case: SearchCase, measured: SlideArrays, options: BenchmarkOptions)
         'rank_correlation': round(float(spearmanr(*fitness).statistic), 3),
         'mean_difference': round(float((fitness[0] - fitness[1]).mean()), 4),
     }
-
-
-def _charts_linear(found: Mapping[str, SearchResult[Any]], out: Path) -> tuple[Path, ...]:
-    reported = {name: one.found.history for name, one in found.items()}
-    title = 'Searches of the linear experiment (simulated slides)'
-    return (convergence_chart(reported, title, out / 'optimise_linear.png'),)
-
-
-def _charts(found: Mapping[str, SearchResult[Any]], out: Path) -> tuple[Path, ...]:
-    single = {name: one.found.history for name, one in found.items() if CASES[name].params.objective == 'accuracy'}
-    fronts: dict[str, Sequence[tuple[float, float]]] = {
-        name.removesuffix(', front'): [(point.searched.cost, point.fitness) for point in one.finalists]
-        for name, one in found.items()
-        if CASES[name].params.objective == 'front'
-    }
-    reported = {name: history for name, history in single.items() if CASES[name].data != 'roughness'}
-    graded = {name: history for name, history in single.items() if CASES[name].data == 'roughness'}
-    return (
-        convergence_chart(
-            reported, 'Searches that distinguish surfaces (simulated slides)', out / 'optimise_textures.png'
-        ),
-        convergence_chart(graded, 'Searches that grade roughness (simulated slides)', out / 'optimise_roughness.png'),
-        search_front_chart(
-            fronts, 'The linear experiment: fitness and computing (simulated slides)', out / 'optimise_front.png'
-        ),
-    )

@@ -10,7 +10,8 @@ import numpy as np
 from texture_benchmarks.papers import ets_linear, jamali
 from texture_benchmarks.papers.protocol import Protocol, folds, halves
 from texture_benchmarks.papers.trial import of_task
-from texture_benchmarks.scenes.trial import TOUCH_PROTOCOLS, Ablation, completed, difference, variants
+from texture_benchmarks.scenes.touch_protocols import TOUCH_PROTOCOLS, completed, variants
+from texture_benchmarks.scenes.trial import Ablation, difference
 from texture_simulation.scene import Scene, load_scene
 
 

@@ -14,17 +14,8 @@ from texture_benchmarks.scenes.chart import ablation_chart, cost_chart
 from texture_benchmarks.scenes.costs import MANY, SCAN_S, DeviceLoad, ScanCost, live_load, scan_cost, stuck_surfaces
 from texture_benchmarks.scenes.paper_ablation import with_paper
 from texture_benchmarks.scenes.tables import added_table, cost_table, term_table
-from texture_benchmarks.scenes.trial import (
-    CONFIDENCE,
-    HOST,
-    TOUCH_PROTOCOLS,
-    Ablation,
-    MeanDifference,
-    ablate,
-    completed,
-    timed,
-    with_one_more,
-)
+from texture_benchmarks.scenes.touch_protocols import HOST, TOUCH_PROTOCOLS, completed, with_one_more
+from texture_benchmarks.scenes.trial import CONFIDENCE, Ablation, MeanDifference, ablate, timed
 from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.scene import Scene, load_scene
 

@@ -11,23 +11,20 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
-from texture_benchmarks.stick_slip.chart import Borders, Costs, Vibration, border_chart, cost_chart, vibration_chart
+from texture_benchmarks.stick_slip.chart import Borders, Costs, border_chart, cost_chart, vibration_chart
+from texture_benchmarks.stick_slip.dragged_tip import FORCE_N, FRICTION, SPEED_M_S
 from texture_benchmarks.stick_slip.integrators import INTEGRATORS
 from texture_benchmarks.stick_slip.simulated_limit import ContactRegime, simulated_max_stable_step_s
+from texture_benchmarks.stick_slip.vibration import drag_vibration
 from texture_core.arrays import Array
-from texture_simulation.stick_slip.friction import StickSlip
 from texture_simulation.stick_slip.integrator import Integrator
-from texture_simulation.stick_slip.limit_cycle import nudged, slow_drag
 from texture_simulation.stick_slip.reference import SOLVERS, solve
 from texture_simulation.stick_slip.semi_implicit import SEMI_IMPLICIT
-from texture_simulation.stick_slip.simulate import drag, drag_unchecked, pull_n
+from texture_simulation.stick_slip.simulate import drag_unchecked, pull_n
 from texture_simulation.stick_slip.stability_limit import MARGIN, max_stable_step_s
-from texture_simulation.stick_slip.stribeck import critical_speed_m_s
 from texture_simulation.stick_slip.tip_drag import TipDrag
 from texture_simulation.trajectory import Trajectory
 
-FRICTION = StickSlip()
-SPEED_M_S, FORCE_N = 0.05, 1.5  # of the drag whose cost and error are measured
 SLIDE_M_S = 0.4  # speed at which the border of sliding is sought
 SCAN_S, COMPARED_S, QUICK_COMPARED_S = 0.5, 0.2, 0.04
 MS = 1e-3
@@ -37,11 +34,9 @@ STEPS_S = (5e-4, 2.5e-4, 1.25e-4, 6e-5, 3e-5, 1.5e-5)  # of the default
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 STIFFNESSES_1_M = (1e4, 3e4, 1e5, 3e5, 1e6, 3e6)
 SPEED_SHARES = (0.1, 0.2, 0.4, 0.6, 0.8, 0.95, 1.05, 1.3, 1.6, 2.0, 2.2, 2.4, 2.6, 3.0)  # of the critical speed
-SHOWN_SHARES = (0.2, 0.6, 1.3)
 RATES_HZ = {'TSF-85': 2000.0, 'DAQ finger': 5000.0, 'PVDF finger': 8192.0, 'BioTac': 8800.0}
 MANY = 100
 REPEATS, LONG_S = 5, 0.2  # what takes longer is measured once
-FINE_S = 2e-5
 TARGET_MS = 10.0
 
 
@@ -50,7 +45,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     compared_s = QUICK_COMPARED_S if options.quick else COMPARED_S
     costs = _costs(compared_s, thin=2 if options.quick else 1)
     borders = _borders(STIFFNESSES_1_M[:: 3 if options.quick else 1])
-    vibration = _vibration(SPEED_SHARES[:: 4 if options.quick else 1])
+    vibration = drag_vibration(SPEED_SHARES[:: 4 if options.quick else 1])
     charts = (
         cost_chart(costs, options.out / 'stick_slip_cost.png'),
         border_chart(borders, options.out / 'stick_slip_border.png'),
@@ -209,42 +204,3 @@ def _border_numbers(borders: Borders) -> dict[str, Any]:
             'found': microseconds(borders.found_s[phase, method]),
         }
     return numbers
-
-
-def _vibration(shares: tuple[float, ...]) -> Vibration:
-    """Return how the tip vibrates over the speed."""
-    critical = critical_speed_m_s(FRICTION, FORCE_N)
-    speeds = critical * np.array(shares)
-    pulls = [_pulled_n(speed) for speed in speeds]
-    late = [pull[len(pull) // 2 :] for pull in pulls]
-    slid = [_pulled_n(speed, from_sliding=True) for speed in speeds]
-    return Vibration(
-        speed_m_s=speeds,
-        critical_m_s=critical,
-        period_s=np.array([_period_s(pull) for pull in late]),
-        formula_s=np.array([slow_drag(FRICTION, speed, FORCE_N).period_s for speed in speeds]),
-        from_rest_n=np.array([float(np.ptp(pull)) for pull in late]),
-        from_sliding_n=np.array([float(np.ptp(pull[len(pull) // 2 :])) for pull in slid]),
-        step_s=FINE_S,
-        shown={share * critical: _pulled_n(share * critical) for share in SHOWN_SHARES},
-    )
-
-
-def _pulled_n(speed_m_s: float, *, from_sliding: bool = False) -> Array:
-    """Return the force on the skin from rest, or from sliding with a nudge, for some periods."""
-    duration_s = max(0.6, 8 * slow_drag(FRICTION, speed_m_s, FORCE_N).period_s)
-    speed = np.full(round(duration_s / FINE_S), speed_m_s)
-    force = np.full_like(speed, FORCE_N)
-    if not from_sliding:
-        return pull_n(FRICTION, drag(FRICTION, speed, force, FINE_S), speed)
-    start = nudged(FRICTION, speed_m_s, FORCE_N)
-    return pull_n(FRICTION, drag(FRICTION, speed, force, FINE_S, start=start, force_before_n=FORCE_N), speed)
-
-
-def _period_s(pull: Array) -> float:
-    """Return the mean time between rises through the middle; NaN if it does not vibrate."""
-    middle = (pull.max() + pull.min()) / 2
-    rises = np.flatnonzero((pull[:-1] < middle) & (pull[1:] >= middle))
-    if np.ptp(pull) < 1e-3 or len(rises) < 2:
-        return math.nan
-    return float((rises[-1] - rises[0]) / (len(rises) - 1) * FINE_S)

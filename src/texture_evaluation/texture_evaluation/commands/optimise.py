@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from texture_core.command_options import add_channels, add_seed, add_slides
 from texture_core.parameters import from_mapping
 from texture_estimation.search.genetic_search import OBJECTIVES, Generation, SearchParams
-from texture_evaluation.optimise import Wanted, checkpoint_of, optimise_from_bags, parallel_map_for
+from texture_evaluation.found_recipes import Wanted, checkpoint_of
+from texture_evaluation.optimise import optimise_from_bags, parallel_map_for
 
 BAR = 20  # letters
 
