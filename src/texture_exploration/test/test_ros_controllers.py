@@ -262,6 +262,27 @@ def test_a_controller_that_listens_without_moving_the_arm_is_named_and_recovers(
     assert robot.is_commanded_to_rest
 
 
+def test_a_finger_that_stalls_in_mid_slide_aborts_within_half_a_second(monkeypatch):
+    robot = Robot(TwistControllerParams(start_height_m=0.003, jitter_s=0.0))
+    robot.driven.connect()
+    follow, stalled_ns = robot.arm.command, []
+
+    def follow_along_the_normal_only(now_ns, velocity_m_s):
+        if robot.arm.finger().x_m > 0.01:
+            stalled_ns.append(now_ns)
+            normal = robot.arm._axes[:, 2]
+            velocity_m_s = normal * (normal @ velocity_m_s)
+        follow(now_ns, velocity_m_s)
+
+    monkeypatch.setattr(robot.arm, 'command', follow_along_the_normal_only)
+    request = ExplorationRequest('linear_slide', speed_m_s=0.05, distance_m=0.04)
+    outcome, _ = robot.explore(request, TouchParams())
+    assert (outcome.success, outcome.slid) == (False, True)
+    assert 'the finger stalled' in outcome.message or 'mm commanded' in outcome.message
+    still_sliding = [at_ns for at_ns, velocity in robot.sent if abs(velocity[0]) + abs(velocity[1]) > 0.04]
+    assert 0.1 < (still_sliding[-1] - stalled_ns[0]) * 1e-9 < 0.5
+
+
 def test_a_late_arm_that_limits_its_speed_still_follows():
     robot = Robot(TwistControllerParams(lag_s=0.08, max_speed_m_s=0.1, max_acceleration_m_s2=1.0))
     robot.driven.connect()
