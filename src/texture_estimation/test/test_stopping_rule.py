@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from texture_estimation.open_set.stopping_rule import StoppingRule, fit_stopping_rule
+from texture_estimation.open_set.stopping_rule import SlideCourse, StoppingRule, fit_open_set_rule, fit_stopping_rule
 
 EFFECTIVE_WINDOWS = 1.0 + 0.5 * np.arange(9)
 
@@ -52,3 +52,43 @@ def test_where_no_rule_errs_rarely_enough_the_one_that_errs_least_is_taken():
 def test_without_anything_held_out_confidence_alone_decides():
     assert StoppingRule().certain(0.96, 1.0)
     assert not StoppingRule().certain(0.9, 100.0)
+
+
+def test_at_the_start_of_a_slide_a_smaller_novelty_score_is_needed():
+    rule = StoppingRule(confidence=0.9, novelty_score=4.0, early_novelty_score=1.0)
+    assert rule.certain(0.95, 3.0, 0.9)
+    assert not rule.certain(0.95, 3.0, 1.1)
+    assert rule.certain(0.95, 3.2, 1.1)
+    assert not rule.certain(0.95, 3.2, 4.1)
+    assert not StoppingRule(novelty_score=0.5, early_novelty_score=1.0).certain(0.99, 1.0, 0.8)
+
+
+def course(right, novelty_score, disturbance=''):
+    """Return a slide of which the same is said at all times, with full confidence."""
+    count = len(EFFECTIVE_WINDOWS)
+    return SlideCourse(
+        confidences=np.full(count, 0.99),
+        right=np.full(count, right),
+        effective_windows=EFFECTIVE_WINDOWS,
+        known=np.ones(count, bool),
+        novelty_scores=np.full(count, novelty_score),
+        disturbance=disturbance,
+    )
+
+
+def test_the_rule_stops_few_disturbed_slides_wrongly():
+    undisturbed = [course(right=True, novelty_score=0.1)] * 50
+    strange = [course(right=False, novelty_score=8.0, disturbance='gain')] * 5
+    harmless = [course(right=True, novelty_score=0.1, disturbance='gain')] * 95
+    strict, lax = (fit_open_set_rule([*undisturbed, *strange, *harmless], 0.02, wrong) for wrong in (0.02, 0.05))
+    assert strict.certain(0.99, 1.0, 0.1)
+    assert not strict.certain(0.99, 1.0, 8.0)
+    assert lax.certain(0.99, 1.0, 8.0)
+
+
+def test_an_early_limit_is_kept_while_the_rest_of_the_rule_is_fitted():
+    slides = [course(right=True, novelty_score=0.7)] * 50
+    free, limited = (fit_open_set_rule(slides, 0.02, 0.007, limit) for limit in (1e6, 0.4))
+    assert free.certain(0.99, 1.0, 0.7)
+    assert not limited.certain(0.99, 3.0, 0.7)
+    assert limited.certain(0.99, 3.5, 0.7)

@@ -14,6 +14,7 @@ from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, Evi
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
 from texture_estimation.open_set.domain import DomainMargins
+from texture_estimation.open_set.stopping_rule import NEVER
 from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_features.recipe_entry import choose, entry_of
@@ -63,6 +64,20 @@ class DecisionParams(TrainingParams):
     )
     max_error_rate: float = param(
         0.02, 'Largest fraction of wrong decisions when slides are stopped early.', low=0.0, high=1.0
+    )
+    max_disturbed_error_rate: float = param(
+        0.007,
+        'Largest fraction of wrong decisions when disturbed copies of held-out slides are stopped early; most of them '
+        'are too strange to be stopped at all.',
+        low=0.0,
+        high=1.0,
+    )
+    early_novelty_score: float = param(
+        NEVER,
+        'Largest novelty score at which a slide may end within its first three windows; a smaller one costs sliding '
+        'time and makes wrong decisions under disturbances rarer.',
+        low=0.0,
+        high=NEVER,
     )
     coverage: float = param(
         0.95, 'Coverage of the prediction set: fraction of slides whose texture it contains.', low=0.5, high=0.999

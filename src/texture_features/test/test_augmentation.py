@@ -11,12 +11,14 @@ from texture_features.augmentation.augmentation import Augmentation
 from texture_features.augmentation.augmented_features import Augmenter
 from texture_features.augmentation.disturbances import (
     DISTURBANCES,
+    KINDS,
     SlideWindows,
     add_drift,
     amplify,
     at_speed,
     clip,
     hold_lost,
+    low_pass,
     smooth_response,
 )
 from texture_features.feature_set import FeatureSet
@@ -85,7 +87,7 @@ def test_copies_are_of_the_slides_they_are_named_after_and_repeatable() -> None:
     assert set(first.copies.groups) == {'cork/1', 'cork/2'}
     assert set(first.copies.copies) == {0, 1}
     assert set(first.copies.kinds) == {''}
-    assert set(first.disturbed.kinds) <= {'speed', *DISTURBANCES}
+    assert set(first.disturbed.kinds) <= set(KINDS)
     np.testing.assert_array_equal(first.copies.values, again.copies.values)
 
 
@@ -132,3 +134,23 @@ def test_noise_raises_the_power_of_the_quiet_bands_as_much_as_it_has_power() -> 
     loud = augmented(speed_range=0.0, noise_range=10.0, copies=8, disturbed_copies=0).copies
     quiet = augmented(speed_range=0.0, noise_range=0.0, copies=1, disturbed_copies=0).copies
     assert loud.values[:, 7].max() > quiet.values[:, 7].max() + 2 * math.log(3.0)
+
+
+def test_a_low_pass_halves_the_power_at_its_cut_off_and_keeps_what_is_far_below() -> None:
+    time_s = np.arange(4000) / RATE_HZ
+    tones = {hz: one_input(np.sin(2 * np.pi * hz * time_s)[None, :, None]) for hz in (5.0, 100.0)}
+    passed = {
+        hz: (low_pass(tone, 0.05, np.random.default_rng(0)).std() / tone.rms[0]) ** 2 for hz, tone in tones.items()
+    }
+    assert passed[5.0] == pytest.approx(1.0, abs=0.01)
+    assert passed[100.0] == pytest.approx(0.5, abs=0.03)
+    slow = dataclasses.replace(tones[100.0], vibration=False)
+    np.testing.assert_array_equal(low_pass(slow, 0.05, np.random.default_rng(0)), slow.samples)
+
+
+def test_strengths_are_uniform_in_their_logarithm() -> None:
+    rng = np.random.default_rng(0)
+    drift = DISTURBANCES['drift']
+    drawn = np.log([drift.draw(rng) for _ in range(2000)])
+    assert math.log(drift.weakest) <= drawn.min() < drawn.max() <= math.log(drift.strongest)
+    assert drawn.mean() == pytest.approx(math.log(math.sqrt(drift.weakest * drift.strongest)), abs=0.1)

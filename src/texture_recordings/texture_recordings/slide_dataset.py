@@ -325,6 +325,7 @@ class SlideDataset:
         return replace(features, motions=motions, augmented=self._augmented(feature_set, augmentation))
 
     def _augmented(self, feature_set: FeatureSet, augmentation: Augmentation | None) -> AugmentedFeatures | None:
+        """Return changed copies of the slides as features, for training; None without augmentation or copies."""
         if augmentation is None or not augmentation.copies:
             return None
         from texture_features.augmentation.augmented_features import Augmenter  # noqa: PLC0415  # needs scipy

@@ -17,6 +17,7 @@ from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_evaluation.train import training_examples
 from texture_recordings.slide_dataset import SlideDataset
 
 RECIPE = 'default'
@@ -33,9 +34,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     stages, last_training = (QUICK_STAGES, QUICK_TRAINED) if options.quick else (STAGES, TRAINED)
     slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ('', ())
     with imported(options, 'biotac20', slides, materials) as bags, tempfile.TemporaryDirectory() as folder:
-        examples = SlideDataset.from_bags(bags, topics=recipe.feature_set.topics).features(
-            replace(recipe.feature_set, windows=recipe.training_windows)
-        )
+        examples = training_examples(recipe, SlideDataset.from_bags(bags, topics=recipe.feature_set.topics))
         labels, rng = np.unique(examples.labels), np.random.default_rng(options.seed)
         draws = [rng.permutation(labels)[: 1 if options.quick else NEW] for _ in range(1 if options.quick else DRAWS)]
         incremental_runs = [

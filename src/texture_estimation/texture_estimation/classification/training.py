@@ -260,7 +260,10 @@ def _fit_open_set(
         return _fit_stopping(slides, recipe.evidence, tempering_exponent, decisions.max_error_rate), None
     detector, traces = found
     courses = [_course(trace, detector, recipe.evidence, tempering_exponent) for trace in traces]
-    return stopping_rule.fit_open_set_rule(courses, decisions.max_error_rate), detector
+    rule = stopping_rule.fit_open_set_rule(
+        courses, decisions.max_error_rate, decisions.max_disturbed_error_rate, decisions.early_novelty_score
+    )
+    return rule, detector
 
 
 def _course(

@@ -56,7 +56,7 @@ class Augmentation:
         0.43, 'Fraction of the drawn examples that are of the undisturbed slides.', low=0.0, high=1.0
     )
     disturbed_copies: int = param(
-        4,
+        6,
         'Number of strongly disturbed copies of each slide on which early stopping is fitted; no classifier is '
         'trained on them.',
         low=0,

@@ -16,8 +16,6 @@ from texture_features.augmentation.augmentation import Augmentation
 from texture_features.augmentation.disturbances import (
     DISTURBANCES,
     KINDS,
-    SPEED,
-    SPEED_RANGE,
     SlideWindows,
     add_noise,
     at_speed,
@@ -174,15 +172,15 @@ class Augmenter:
         return self._extract(batches, longer, like, speed)
 
     def _disturb(self, kind: str, cut: Cut, windows: Sequence[CutWindow], rng: np.random.Generator) -> Array | None:
-        if kind == SPEED:
-            speed = _log_uniform(*SPEED_RANGE, rng)
-            longer = self._longer(cut, max(speed, 1.0))
+        strengths = DISTURBANCES[kind]
+        strength = strengths.draw(rng)
+        disturbance = strengths.disturbance
+        if disturbance is None:
+            longer = self._longer(cut, max(strength, 1.0))
             if not longer:
                 return None
-            batches = _at_speed(_batches(longer, self._features.topics), windows[0], speed)
-            return self._extract(batches, longer, windows[0], speed)
-        disturbance, weakest, strongest = DISTURBANCES[kind]
-        strength = _log_uniform(weakest, strongest, rng)
+            batches = _at_speed(_batches(longer, self._features.topics), windows[0], strength)
+            return self._extract(batches, longer, windows[0], strength)
         batches = _changed(_batches(windows, self._features.topics), lambda batch: disturbance(batch, strength, rng))
         return self._extract(batches, windows, windows[0], 1.0)
 
@@ -244,7 +242,3 @@ def _gathered(parts: Sequence[tuple[Array, str, int, str]]) -> FeatureCopies:
     groups, copies, kinds = (np.repeat([part[column] for part in parts], lengths) for column in (1, 2, 3))
     values = np.concatenate([values.astype(np.float32) for values, *_ in parts])
     return FeatureCopies(values, groups, copies.astype(np.intp), kinds)
-
-
-def _log_uniform(low: float, high: float, rng: np.random.Generator) -> float:
-    return math.exp(rng.uniform(math.log(low), math.log(high)))

@@ -199,6 +199,17 @@ def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> A
     return np.clip(windows.samples, windows.mean - limit, windows.mean + limit)
 
 
+def low_pass(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
+    """Filter the vibration by a low-pass of first order whose cut-off is a multiple of the sampling rate."""
+    if not windows.vibration:
+        return windows.samples
+    n_samples = windows.samples.shape[1]
+    pole = math.exp(-2.0 * math.pi * strength)
+    response = (1.0 - pole) / (1.0 - pole * np.exp(-2j * math.pi * np.fft.rfftfreq(n_samples)))
+    deviation = windows.samples - windows.mean
+    return windows.mean + np.fft.irfft(np.fft.rfft(deviation, axis=1) * response[:, None], n_samples, axis=1)
+
+
 def other_finger(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
     """Filter the vibration by a smooth random response with this standard deviation in dB; shift slow channels.
 
@@ -250,15 +261,35 @@ def smooth_response(count: int, strength_db: float, rng: np.random.Generator) ->
     return response
 
 
-# Smallest and largest strength on which early stopping is fitted; from harmless to useless.
-DISTURBANCES: Mapping[str, tuple[Disturbance, float, float]] = {
-    'gain': (amplify, 0.4, 2.5),
-    'noise': (add_noise, 0.003, 0.3),
-    'finger': (other_finger, 0.3, 5.0),
-    'drift': (add_drift, 0.1, 10.0),
-    'held': (hold_lost, 0.003, 0.3),
-    'clipped': (clip, 0.7, 4.0),
+@dataclass(frozen=True)
+class StrengthRange:
+    """A disturbance, and its smallest and largest strength on which early stopping is fitted.
+
+    Parameters
+    ----------
+    disturbance
+        None for a change of speed, which needs longer windows.
+    weakest, strongest
+        From harmless to useless.
+    """
+
+    disturbance: Disturbance | None
+    weakest: float
+    strongest: float
+
+    def draw(self, rng: np.random.Generator) -> float:
+        """Return a strength, uniform in its logarithm."""
+        return math.exp(rng.uniform(math.log(self.weakest), math.log(self.strongest)))
+
+
+DISTURBANCES: Mapping[str, StrengthRange] = {
+    'speed': StrengthRange(None, 0.35, 2.2),
+    'gain': StrengthRange(amplify, 0.4, 2.5),
+    'noise': StrengthRange(add_noise, 0.003, 0.3),
+    'finger': StrengthRange(other_finger, 0.3, 5.0),
+    'drift': StrengthRange(add_drift, 0.1, 10.0),
+    'held': StrengthRange(hold_lost, 0.003, 0.3),
+    'clipped': StrengthRange(clip, 0.7, 4.0),
+    'low-pass': StrengthRange(low_pass, 0.1, 1.0),
 }
-SPEED = 'speed'
-SPEED_RANGE = (0.35, 2.2)
-KINDS = (SPEED, *DISTURBANCES)
+KINDS = tuple(DISTURBANCES)
