@@ -94,6 +94,12 @@ def test_a_recipe_is_tested_on_slides_outside_its_training(simulated: Path) -> N
     assert len(find_slides([simulated])) == len(dataset)
 
 
+def test_copies_of_the_slides_are_trained_on_only_where_asked_for() -> None:
+    recipe = load_recipe('default')
+    assert comparable(recipe, 1000.0, of_motion=False, augmented=True).augmentation == recipe.augmentation
+    assert comparable(recipe, 1000.0, of_motion=False).augmentation.copies == 0
+
+
 def test_training_windows_may_overlap_where_test_windows_do_not(simulated: Path) -> None:
     dataset = SlideDataset.from_bags([simulated])
     recipe = comparable(load_recipe('jamali-naive-bayes-5'), 1000.0, of_motion=False)

@@ -66,7 +66,7 @@ class DecisionParams(TrainingParams):
         0.02, 'Largest fraction of wrong decisions when slides are stopped early.', low=0.0, high=1.0
     )
     max_disturbed_error_rate: float = param(
-        0.007,
+        0.0085,
         'Largest fraction of wrong decisions when disturbed copies of held-out slides are stopped early; most of them '
         'are too strange to be stopped at all.',
         low=0.0,

@@ -8,7 +8,7 @@ import pytest
 
 from texture_core.window import Window
 from texture_features.augmentation.augmentation import Augmentation
-from texture_features.augmentation.augmented_features import Augmenter
+from texture_features.augmentation.augmented_features import NOISE, Augmenter
 from texture_features.augmentation.disturbances import (
     DISTURBANCES,
     KINDS,
@@ -86,7 +86,7 @@ def test_copies_are_of_the_slides_they_are_named_after_and_repeatable() -> None:
     first, again = augmented(), augmented()
     assert set(first.copies.groups) == {'cork/1', 'cork/2'}
     assert set(first.copies.copies) == {0, 1}
-    assert set(first.copies.kinds) == {''}
+    assert set(first.copies.kinds) <= {'', NOISE}
     assert set(first.disturbed.kinds) <= set(KINDS)
     np.testing.assert_array_equal(first.copies.values, again.copies.values)
 
@@ -134,6 +134,9 @@ def test_noise_raises_the_power_of_the_quiet_bands_as_much_as_it_has_power() -> 
     loud = augmented(speed_range=0.0, noise_range=10.0, copies=8, disturbed_copies=0).copies
     quiet = augmented(speed_range=0.0, noise_range=0.0, copies=1, disturbed_copies=0).copies
     assert loud.values[:, 7].max() > quiet.values[:, 7].max() + 2 * math.log(3.0)
+    told = loud.values[loud.kinds == '', 7]
+    assert len(told)
+    assert told.max() == pytest.approx(quiet.values[:, 7].max(), abs=0.1)
 
 
 def test_a_low_pass_halves_the_power_at_its_cut_off_and_keeps_what_is_far_below() -> None:

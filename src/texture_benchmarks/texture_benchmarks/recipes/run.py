@@ -45,6 +45,7 @@ from texture_evaluation.cross_validation.chronological_split import Chronologica
 from texture_evaluation.cross_validation.cross_validate import FoldFeatures, cross_validate, split_slides
 from texture_evaluation.cross_validation.splits import Split
 from texture_evaluation.train import with_channels
+from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_recordings.slide_dataset import SlideDataset
 
@@ -151,7 +152,9 @@ class Setting:
         else:
             recipe = own_recipe(name)
         whole = set(recipe.feature_set.topics) <= set(self.dataset[0].signals)
-        recipe = comparable(with_channels(recipe, 'all' if whole else 'fast'), self.rate_hz, of_motion=self.of_motion)
+        recipe = comparable(
+            with_channels(recipe, 'all' if whole else 'fast'), self.rate_hz, of_motion=self.of_motion, augmented=True
+        )
         return trained_every(VARIANTS.get(name, SHIPPED).apart_s, recipe)
 
 
@@ -331,13 +334,14 @@ def _ntp21(options: BenchmarkOptions) -> dict[str, Setting]:
 
 def _jobs(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> list[_RecipeJob]:
     """Return what is tried; recipes with the same windows and features together: they are described once."""
-    groups: dict[tuple[str, FeatureSet | str, float], list[str]] = {}
+    groups: dict[tuple[str, FeatureSet | str, float, Augmentation], list[str]] = {}
     for setting, name in product(settings, names):
         if takes_windows(name):
-            groups.setdefault((setting, name, 0.0), []).append(name)
+            groups.setdefault((setting, name, 0.0, Augmentation()), []).append(name)
         elif setting in (PLACES.get(name, setting), OWN_DATA):
             recipe = settings[setting].recipe(name)
-            groups.setdefault((setting, recipe.feature_set, recipe.training.hop_s), []).append(name)
+            key = (setting, recipe.feature_set, recipe.training.hop_s, recipe.augmentation)
+            groups.setdefault(key, []).append(name)
     jobs = [_RecipeJob(setting, tuple(group)) for (setting, *_), group in groups.items()]
     if not options.quick and minirocket.installed() and VIBRATION in settings:
         jobs.append(_RecipeJob(VIBRATION, (MINIROCKET,)))

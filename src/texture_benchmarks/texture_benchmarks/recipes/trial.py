@@ -113,8 +113,10 @@ def all_at_rate(dataset: SlideDataset, topic: str, rate_hz: float) -> SlideDatas
     return SlideDataset(tuple(at_rate(slide, topic, rate_hz) for slide in dataset))
 
 
-def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: float | None = None) -> Recipe:
-    """Return a recipe with windows as all others have them, trained LENGTH_S apart and without changed copies.
+def comparable(
+    recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: float | None = None, augmented: bool = False
+) -> Recipe:
+    """Return a recipe with windows as all others have them, trained LENGTH_S apart.
 
     Parameters
     ----------
@@ -126,6 +128,8 @@ def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: flo
         Whether speed and force may be used. Where they belong to the recording session, they betray the surface.
     length_s
         Of all windows, if given; they begin so far apart, or LENGTH_S if they are longer.
+    augmented
+        Whether a recipe that trains with changed copies of the slides does so: that takes minutes.
 
     Returns
     -------
@@ -139,7 +143,8 @@ def comparable(recipe: Recipe, rate_hz: float, *, of_motion: bool, length_s: flo
     inputs = (_adapted(item, round(windows.length_s * rate_hz), of_motion) for item in recipe.feature_set.inputs)
     inputs = (item for item in inputs if item.features)
     feature_set = dataclasses.replace(recipe.feature_set, windows=windows, inputs=tuple(inputs), _layouts={})
-    comparable_recipe = dataclasses.replace(recipe, feature_set=feature_set, augmentation=Augmentation())
+    augmentation = recipe.augmentation if augmented else Augmentation()
+    comparable_recipe = dataclasses.replace(recipe, feature_set=feature_set, augmentation=augmentation)
     return trained_every(LENGTH_S, comparable_recipe)
 
 

@@ -143,7 +143,7 @@ def _some(effects: Mapping[str, Effect], size: _Size) -> list[tuple[str, Effect]
 
 def _recipe(name: str) -> Recipe:
     """Return a shipped recipe for the vibration alone, as it is compared with all others."""
-    return comparable(with_channels(load_recipe(name), 'fast'), RATE_HZ, of_motion=False)
+    return comparable(with_channels(load_recipe(name), 'fast'), RATE_HZ, of_motion=False, augmented=True)
 
 
 def _degraded(

@@ -18,6 +18,7 @@ from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_evaluation.train import training_examples
+from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
@@ -104,10 +105,10 @@ def _changed(run: TactileSignal, degradation: Degradation, strength: float, rng:
 
 
 def _sharing(recipes: Mapping[str, Recipe]) -> list[list[Recipe]]:
-    """Return the recipes that have the same windows and features together."""
-    groups: dict[FeatureSet, list[Recipe]] = {}
+    """Return the recipes that have the same windows, features and augmentation together."""
+    groups: dict[tuple[FeatureSet, Augmentation], list[Recipe]] = {}
     for recipe in recipes.values():
-        groups.setdefault(recipe.feature_set, []).append(recipe)
+        groups.setdefault((recipe.feature_set, recipe.augmentation), []).append(recipe)
     return list(groups.values())
 
 

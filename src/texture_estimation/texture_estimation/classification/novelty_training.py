@@ -15,25 +15,16 @@ from texture_estimation.classification.evidence_rules import EvidenceRule
 from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted, Learner, Predictor, hidden_layer
 from texture_estimation.open_set.class_distance import ClassDistance
-from texture_estimation.open_set.novelty import (
-    EFFECTIVE_WINDOWS,
-    HIDDEN,
-    ONSET,
-    SPACES,
-    NoveltyDetector,
-    SlideNovelty,
-    space_means,
-)
-from texture_features.augmentation.augmented_features import FeatureCopies
+from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, NoveltyDetector, SlideNovelty, space_means
+from texture_features.augmentation.augmented_features import NOISE, FeatureCopies
 from texture_features.labelled_features import LabelledFeatures
 
 MIN_SLIDES = 3  # of a class: with one held out, two tell how much slides differ
 MIN_ALL_SLIDES = 20
 FOLDS = 5
-REFERENCE_COPIES = 3  # of each slide, at random gains, among the slides to which the distance is measured
-# Of the logarithm of the gain range, for the copies of the onset, which differ in nothing but the gain: the onset shows
-# soonest that something differs, if not too much is allowed to differ. Chosen on slides 21-30, trained on 1-20.
-ONSET_GAIN_SHARE = 0.64
+# Of the copies of each slide, so many are among the slides to which the distance is measured, at random gains, if they
+# have no noise: what is tolerated as noise would let strong noise pass. Chosen on slides 21-30, trained on 1-20.
+REFERENCE_COPIES = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,10 +110,15 @@ def fit_novelty(
         _Slide(number, int(classes[first[number]]), examples.values[groups == number]) for number in range(len(names))
     ]
     disturbed = _disturbed_slides(examples, names, classes[first])
-    references = _references(examples, slides, names, classes[first], gain_range)
+    copies = _reference_copies(examples, names, classes[first], gain_range)
     traces: list[SlideTrace] = []
     for held_out, predictor in _folds(learner, fitted, classes, groups):
-        distances = _fit_distances(references.without(held_out), predictor, overlap)
+        distances = _fit_distances(
+            [slide for slide in slides if slide.group not in held_out],
+            [copy for copy in copies if copy.group not in held_out],
+            predictor,
+            overlap,
+        )
         for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
             if predictor is not None:
                 log_probabilities = predictor(slide.values)
@@ -132,7 +128,7 @@ def fit_novelty(
                 continue
             traces.append(_trace(slide, rule.window_evidence(log_probabilities), predictor, distances, overlap))
     final = learner.predictor(fitted.parameters)
-    distances = _fit_distances(references, final if hidden_layer(final) else None, overlap)
+    distances = _fit_distances(slides, copies, final if hidden_layer(final) else None, overlap)
     held_out_scores = [_scores_at(traces, level) for level in EFFECTIVE_WINDOWS]
     if min(map(len, held_out_scores)) < MIN_SLIDES:
         return None
@@ -157,53 +153,17 @@ def _disturbed_slides(examples: LabelledFeatures, names: Any, classes: Codes) ->
     return list(_copied_slides(examples.augmented.disturbed, names, classes)) if examples.augmented else []
 
 
-@dataclass(frozen=True, eq=False)
-class _References:
-    """Slides to which the distance is measured.
-
-    Parameters
-    ----------
-    slides
-        Undisturbed ones: they make the metric.
-    copies
-        Augmented copies at random gains, to which slides may be as near.
-    onset_copies
-        For the onset: undisturbed slides at random gains.
-    """
-
-    slides: Sequence[_Slide]
-    copies: Sequence[_Slide]
-    onset_copies: Sequence[_Slide]
-
-    def without(self, held_out: frozenset[int]) -> _References:
-        """Return the references without those of some slides."""
-        kept = ([own for own in those if own.group not in held_out] for those in self._parts)
-        return _References(*kept)
-
-    @property
-    def _parts(self) -> tuple[Sequence[_Slide], ...]:
-        return self.slides, self.copies, self.onset_copies
-
-
-def _references(
-    examples: LabelledFeatures, slides: Sequence[_Slide], names: Any, classes: Codes, gain_range: float
-) -> _References:
-    if examples.augmented is None or not REFERENCE_COPIES:
-        return _References(slides, [], [])
+def _reference_copies(examples: LabelledFeatures, names: Any, classes: Codes, gain_range: float) -> list[_Slide]:
+    """Return copies of the slides at other speeds and random gains, to which slides may be as near as to the slides."""
+    if examples.augmented is None:
+        return []
     rng = np.random.default_rng(0)
-    response, widest = examples.augmented.gain_response, math.log(gain_range)
-    rows = examples.augmented.copies.copies < REFERENCE_COPIES
-    copies = _copied_slides(examples.augmented.copies.select(rows), names, classes)
-    repeated = [slide for slide in slides for _ in range(REFERENCE_COPIES)]
-    return _References(
-        slides,
-        [_amplified(copy, widest * rng.uniform(-1.0, 1.0), response) for copy in copies],
-        [_amplified(slide, ONSET_GAIN_SHARE * widest * rng.uniform(-1.0, 1.0), response) for slide in repeated],
-    )
-
-
-def _amplified(slide: _Slide, log_gain: float, gain_response: Array) -> _Slide:
-    return replace(slide, values=slide.values + log_gain * gain_response)
+    widest, copies = math.log(gain_range), examples.augmented.copies
+    quiet = (copies.copies < REFERENCE_COPIES) & (copies.kinds != NOISE)
+    return [
+        replace(copy, values=copy.values + rng.uniform(-widest, widest) * examples.augmented.gain_response)
+        for copy in _copied_slides(copies.select(quiet), names, classes)
+    ]
 
 
 def _copied_slides(copies: FeatureCopies, names: Any, classes: Codes) -> Iterator[_Slide]:
@@ -217,20 +177,23 @@ def _copied_slides(copies: FeatureCopies, names: Any, classes: Codes) -> Iterato
             yield _Slide(group, int(classes[group]), values, str(copies.kinds[start]))
 
 
-def _fit_distances(references: _References, predictor: Predictor | None, overlap: float) -> Mapping[str, ClassDistance]:
+def _fit_distances(
+    slides: Sequence[_Slide], copies: Sequence[_Slide], predictor: Predictor | None, overlap: float
+) -> Mapping[str, ClassDistance]:
     """Return the distances, with the metric of undisturbed slides and references among the copies, too."""
     hidden = hidden_layer(predictor) if predictor is not None else None
-
-    def means(slides: Sequence[_Slide], space: str) -> tuple[Array, Codes]:
-        by_space = [space_means(own.values, hidden(own.values) if hidden else None, overlap)[space] for own in slides]
-        return np.stack(by_space), np.array([own.truth for own in slides])
-
-    found = {}
-    for space in (space for space in SPACES if hidden or space != HIDDEN):
-        distance = ClassDistance.fit(*means(references.slides, space))
-        copies = references.onset_copies if space == ONSET else references.copies
-        found[space] = distance.with_slides(*means(copies, space)) if copies else distance
-    return found
+    means, more = (
+        [space_means(slide.values, hidden(slide.values) if hidden else None, overlap) for slide in those]
+        for those in (slides, copies)
+    )
+    classes, more_classes = (np.array([slide.truth for slide in those]) for those in (slides, copies))
+    found = {space: ClassDistance.fit(np.stack([own[space] for own in means]), classes) for space in means[0]}
+    if not more:
+        return found
+    return {
+        space: distance.with_slides(np.stack([own[space] for own in more]), more_classes)
+        for space, distance in found.items()
+    }
 
 
 def _trace(

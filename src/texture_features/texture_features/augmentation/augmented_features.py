@@ -24,6 +24,7 @@ from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import CutWindow, WindowEvent, WindowParams
 
 GAIN_STEP = 1.25  # ratio of the two gains at which the response of the features is measured
+NOISE = 'noise'
 PROBABILITY = 0.5  # of a change of speed, and of noise, in a copy
 Cut = Callable[[WindowParams], Sequence[WindowEvent]]
 Batches = Mapping[str, SlideWindows]
@@ -41,7 +42,7 @@ class FeatureCopies:
     copies : (n,)
         Number of the copy of the slide.
     kinds : (n,) of text
-        Kind of disturbance; '' in augmented copies.
+        Kind of disturbance; in augmented copies NOISE if noise was added, else ''.
 
     Examples
     --------
@@ -141,7 +142,8 @@ class Augmenter:
         longest = 1.0 + self._augmentation.speed_range
         longer = self._longer(cut, longest)
         for copy in range(self._augmentation.copies if longer else 0):
-            self._copies.append((self._augmented(longer, windows[0], rng), name, copy, ''))
+            augmented, noise = self._augmented(longer, windows[0], rng)
+            self._copies.append((augmented, name, copy, noise))
         for copy in range(self._augmentation.disturbed_copies):
             kind = KINDS[rng.integers(len(KINDS))]
             values = self._disturb(kind, cut, windows, rng)
@@ -162,14 +164,15 @@ class Augmenter:
         params = dataclasses.replace(own, length_s=own.length_s * times + 0.02)
         return [event for event in cut(params) if isinstance(event, CutWindow)]
 
-    def _augmented(self, longer: Sequence[CutWindow], like: CutWindow, rng: np.random.Generator) -> Array:
+    def _augmented(self, longer: Sequence[CutWindow], like: CutWindow, rng: np.random.Generator) -> tuple[Array, str]:
         widest = math.log1p(self._augmentation.speed_range)
         speed = math.exp(rng.uniform(-widest, widest)) if rng.random() < PROBABILITY else 1.0
         batches = _at_speed(_batches(longer, self._features.topics), like, speed)
-        if rng.random() < PROBABILITY:
+        noisy = rng.random() < PROBABILITY
+        if noisy:
             strength = self._augmentation.noise_range * rng.random() ** 2
             batches = _changed(batches, lambda windows: add_noise(windows, strength, rng))
-        return self._extract(batches, longer, like, speed)
+        return self._extract(batches, longer, like, speed), NOISE if noisy else ''
 
     def _disturb(self, kind: str, cut: Cut, windows: Sequence[CutWindow], rng: np.random.Generator) -> Array | None:
         strengths = DISTURBANCES[kind]
