@@ -117,7 +117,8 @@ def _findings(found: list[dict[str, Any]], seeds: int, unit: float) -> str:
     rows = [f'| finding | seed 0 | decided by the mean over {seeds} seeds (95 %) | verdict |', '|---|---|---|---|']
     for finding in found:
         decides = signed(finding.get('over_seeds', finding['interval']), unit)
-        rows.append(f'| {finding["claim"]} | {finding["here"]} | {decides} | **{finding["verdict"]}** |')
+        claim = finding['claim'].replace('|', '\\|')  # of |s|
+        rows.append(f'| {claim} | {finding["here"]} | {decides} | **{finding["verdict"]}** |')
     return '\n'.join(rows)
 
 
