@@ -60,7 +60,22 @@ def _try(dataset: SlideDataset, split: Split, job: FrontierJob) -> _Point:
 
 
 def try_all(jobs: Sequence[FrontierJob], dataset: SlideDataset, split: Split) -> dict[FrontierJob, _Point]:
-    """Return what comes of each job, one on each core; the computing time of windows is taken alone, at the end."""
+    """Return what comes of each job, one on each core; the computing time of windows is taken alone, at the end.
+
+    Parameters
+    ----------
+    jobs
+        What is tried.
+    dataset
+        The slides.
+    split
+        Which slides are trained on and tested.
+
+    Returns
+    -------
+    dict
+        What came of each job.
+    """
     tried = dict(zip(jobs, map_forked(partial(_try, dataset, split), jobs), strict=True))
     with single_blas_thread():
         for job, point in tried.items():

@@ -41,7 +41,18 @@ def bump_speed_m_s(stiffness_n_m: float) -> float:
 
 
 def defaults(border: Mapping[str, Array]) -> Array:
-    """Return the gains that are chosen for the stiffnesses and delays of a chart, (s, d)."""
+    """Return the gains that are chosen for the stiffnesses and delays of a chart, (s, d).
+
+    Parameters
+    ----------
+    border
+        Data of the chart: 'stiffness_n_m' (s,) and 'delay_s' (d,).
+
+    Returns
+    -------
+    (s, d)
+        m/s/N.
+    """
     return np.array(
         [
             [ForceLoopParams(loop_delay_s=delay).default_gain(stiffness, 1 / RATE_HZ) for delay in border['delay_s']]

@@ -72,7 +72,22 @@ def lag_table(lags: Mapping[float, Mapping[float, ForceControlMetrics]]) -> str:
 
 
 def plain_number(row: Mapping[str, Mapping[str, float]], motions: Sequence[str], number: str) -> float:
-    """Return a number of the first of the motions that a robot does, NaN if it does none."""
+    """Return a number of the first of the motions that a robot does, NaN if it does none.
+
+    Parameters
+    ----------
+    row
+        Motion → numbers by their names.
+    motions
+        Names of the motions, the preferred one first.
+    number
+        Name of the number.
+
+    Returns
+    -------
+    float
+        In the unit of the number.
+    """
     return next((row[motion].get(number, np.nan) for motion in motions if motion in row), np.nan)
 
 

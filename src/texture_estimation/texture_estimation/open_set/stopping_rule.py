@@ -155,6 +155,10 @@ def fit_open_set_rule(
         The same of the disturbed copies.
     early_novelty_score
         Of the rule, as it is.
+
+    Returns
+    -------
+    StoppingRule
     """
     table = _CourseTable(courses, early_novelty_score)
     best, rule = (np.inf, np.inf), StoppingRule()

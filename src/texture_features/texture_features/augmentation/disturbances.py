@@ -200,7 +200,22 @@ def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> A
 
 
 def low_pass(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Filter the vibration by a low-pass of first order whose cut-off is a multiple of the sampling rate."""
+    """Filter the vibration by a low-pass of first order whose cut-off is a multiple of the sampling rate.
+
+    Parameters
+    ----------
+    windows
+        Windows of one input; slow channels are returned as they are.
+    strength
+        Cut-off frequency over the sampling rate.
+    _rng
+        Not used; every disturbance takes one.
+
+    Returns
+    -------
+    (n_windows, n_samples, n_channels)
+        In the unit of the signal.
+    """
     if not windows.vibration:
         return windows.samples
     n_samples = windows.samples.shape[1]
@@ -271,6 +286,12 @@ class StrengthRange:
         None for a change of speed, which needs longer windows.
     weakest, strongest
         From harmless to useless.
+
+    Examples
+    --------
+    >>> gain = StrengthRange(amplify, 0.4, 2.5)
+    >>> 0.4 <= gain.draw(np.random.default_rng(0)) <= 2.5
+    True
     """
 
     disturbance: Disturbance | None
