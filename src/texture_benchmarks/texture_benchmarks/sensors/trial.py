@@ -137,12 +137,15 @@ class ProtocolUnderTest:
     ----------
     packets
         Yields so many packets of random content, as bytes.
-    listener
+    receiver
         Makes a parser.
+    passed_over
+        Packets at the start of a line, even a good one, that the parser only uses to find where packets begin.
     """
 
     packets: Callable[[np.random.Generator, int], Iterator[bytes]]
     receiver: Callable[[], PacketReceiver]
+    passed_over: int = 0
 
 
 def link_statistics(
@@ -232,7 +235,7 @@ PROTOCOLS: Mapping[str, ProtocolUnderTest] = {
     'biotac': ProtocolUnderTest(_biotac, FrameReceiver),
     'daq': ProtocolUnderTest(_sampled(daq.STREAM), FrameReceiver),
     'pvdf': ProtocolUnderTest(_sampled(pvdf.FILM), FrameReceiver),
-    'anyskin': ProtocolUnderTest(_anyskin, AnySkinReceiver),
-    'papillarray': ProtocolUnderTest(_papillarray, PapillArrayReceiver),
+    'anyskin': ProtocolUnderTest(_anyskin, AnySkinReceiver, passed_over=1),
+    'papillarray': ProtocolUnderTest(_papillarray, PapillArrayReceiver, passed_over=1),
 }
 CHECKSUMMED = frozenset({'biotac', 'daq', 'pvdf'})  # lines with a cyclic checksum; that of a PapillArray is a sum

@@ -99,7 +99,7 @@ class SlideCourse:
     --------
     >>> right = np.array([False, True])
     >>> course = SlideCourse(np.array([0.6, 0.99]), right, np.array([1.0, 1.2]), np.array([True, True]), np.zeros(2))
-    >>> fit_open_set_rule([course] * 30, wrong=0.02).certain(0.99, 1.2)
+    >>> fit_open_set_rule([course] * 30, wrong=0.02, wrong_disturbed=0.02).certain(0.99, 1.2)
     True
     """
 
