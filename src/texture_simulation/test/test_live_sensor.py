@@ -117,14 +117,17 @@ def test_the_bench_may_hold_a_biotac_alone(tmp_path: Path) -> None:
     assert found['signal_static'].shape[1] == 22
 
 
-@pytest.mark.parametrize(('name', 'channels'), [('anyskin', 15), ('papillarray', 54)])
-def test_the_bench_may_hold_an_array_of_slow_taxels_alone(tmp_path: Path, name: str, channels: int) -> None:
+@pytest.mark.parametrize(('name', 'channels', 'noise'), [('anyskin', 15, 4.0), ('papillarray', 54, 0.027)])
+def test_the_bench_may_hold_an_array_of_slow_taxels_alone(
+    tmp_path: Path, name: str, channels: int, noise: float
+) -> None:
+    """`noise` is the standard deviation of the noisiest channel, in µT and in N."""
     params = EmulatorParams(sensor=name, sensor_link=str(tmp_path / name), finger_port=0)
     with Emulator(params) as emulator:
         found = read(SENSORS[name](SensorParams(device=str(tmp_path / name)), time.time_ns), 1.0)
     assert emulator.counts['bytes nobody took'] == 0
     assert found['signal'].shape[1] == channels
-    assert np.ptp(found['signal'], axis=0).max() < 0.1 * np.abs(found['signal']).max() + 0.1  # nothing touches
+    assert np.ptp(found['signal'], axis=0).max() < 10 * noise  # nothing touches
 
 
 def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:
