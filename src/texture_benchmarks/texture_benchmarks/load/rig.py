@@ -88,20 +88,14 @@ def feed_biotac(slots: int, fingers: int) -> Feed:
     return feed
 
 
-def feed_daq(device: Any, first: int, ticks: int) -> None:
-    """Feed all channels alike.
+def feed_alike(channels: int, kind: type[np.generic]) -> Feed:
+    """Return what feeds so many channels alike, with numbers of this type."""
 
-    Parameters
-    ----------
-    device
-        Emulated device.
-    first
-        Number of the first tick.
-    ticks
-        How many.
-    """
-    numbers = np.arange(first, first + ticks) % 30_000
-    device.sample(np.outer(numbers, np.ones(8)).astype(np.int16))
+    def feed(device: Any, first: int, ticks: int) -> None:
+        numbers = np.arange(first, first + ticks) % 30_000
+        device.sample(np.outer(numbers, np.ones(channels)).astype(kind))
+
+    return feed
 
 
 def feed_pvdf(device: Any, first: int, ticks: int) -> None:
@@ -118,22 +112,6 @@ def feed_pvdf(device: Any, first: int, ticks: int) -> None:
     """
     numbers = np.arange(first, first + ticks)
     device.sample((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16))
-
-
-def feed_anyskin(device: Any, first: int, ticks: int) -> None:
-    """Feed all axes alike.
-
-    Parameters
-    ----------
-    device
-        Emulated device.
-    first
-        Number of the first tick.
-    ticks
-        How many.
-    """
-    numbers = np.arange(first, first + ticks) % 30_000
-    device.sample(np.outer(numbers, np.ones(15)))
 
 
 def feed_papillarray(arrays: int) -> Feed:
@@ -194,13 +172,13 @@ CASES: Mapping[str, RigCase] = {
     'biotac': biotac(),
     'biotac_sp': biotac(slots=54),
     'biotac_hand': biotac('finger2/', fingers=3),
-    'daq': RigCase('signal', 2500.0, 1, feed_daq, {'signal': 'count'}, 30_000, config=DAQ),
+    'daq': RigCase('signal', 2500.0, 1, feed_alike(8, np.int16), {'signal': 'count'}, 30_000, config=DAQ),
     'pvdf': RigCase(
         'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
         config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
     ),
     'anyskin': RigCase(
-        'signal', 250.0, 1, feed_anyskin, {'signal': 'µT', 'temperature': '°C'}, 30_000,
+        'signal', 250.0, 1, feed_alike(15, np.float64), {'signal': 'µT', 'temperature': '°C'}, 30_000,
         config='{rate_hz: 250.0, temperature: true}',
     ),
     'papillarray': papillarray(),
