@@ -76,9 +76,9 @@ class SensorReader:
             self.fault = str(error)
 
     def _deliver_all(self, topic: str, batches: Sequence[TactileSignal]) -> None:
+        if batches and self.fault:  # before the first batch is out: who has it may ask for a tare at once
+            self.fault = ''
+            self._inform('the sensor delivers samples')
         for batch in batches:
             self._deliver(topic, batch)
             self.published[topic] += len(batch.samples)
-        if batches and self.fault:
-            self._inform('the sensor delivers samples')
-            self.fault = ''
