@@ -1,10 +1,11 @@
 import itertools
 
+import numpy as np
 import pytest
 
 from texture_core.errors import MotionRefused
 from texture_core.exploration import ExplorationRequest, Phase
-from texture_exploration.motions.in_hand_sliding import in_hand_sliding
+from texture_exploration.motions.in_hand_sliding import in_hand_random, in_hand_sliding, random_strokes
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -49,3 +50,42 @@ def test_a_stroke_too_short_to_turn_is_refused():
     request = ExplorationRequest('in_hand_sliding', speed_m_s=0.1, distance_m=0.01)
     with pytest.raises(MotionRefused, match=r'the length of a stroke, is 0\.01; allowed is 0\.0'):
         in_hand_sliding(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())
+
+
+def turning_places(table):
+    """Return where the finger turned, as seen from the start, m."""
+    along = [place[0] for _, place in sliding(table)]
+    return [b for a, b, c in zip(along, along[1:], along[2:], strict=False) if (b - a) * (c - b) < 0]
+
+
+def test_random_strokes_stay_within_the_stroke_and_are_at_least_half_as_long():
+    for seed in range(20):
+        end_of = random_strokes(0.02, np.random.default_rng(seed))
+        places = [0.0]
+        for number in range(20):
+            places.append(end_of(number % 2 == 0, places[-1]))
+        assert min(places) >= 0.0 and max(places) <= 0.02
+        lengths = [abs(b - a) for a, b in itertools.pairwise(places)]
+        assert min(lengths) >= 0.01 - 1e-12
+        assert np.ptp(lengths) > 0.001
+
+
+def test_a_finger_rubs_at_random_places_and_turns_elsewhere_each_time(table):
+    assert table.explore(ExplorationRequest('in_hand_random', duration_s=5.0)).success
+    along = [place[0] for place in table.places]
+    assert min(along) > -0.0005 and max(along) < 0.0205
+    places = turning_places(table)
+    assert len(places) >= 3
+    assert len({round(place, 4) for place in places}) == len(places)
+
+
+def test_a_random_stroke_may_be_half_as_long_so_the_shortest_that_turns_is_twice_that():
+    request = ExplorationRequest('in_hand_random', speed_m_s=0.05, distance_m=0.02)
+    in_hand_sliding(
+        ExplorationRequest('in_hand_sliding', speed_m_s=0.05, distance_m=0.02),
+        (0.0, 0.0, 0.01),
+        TouchParams(),
+        SafetyLimits(),
+    )
+    with pytest.raises(MotionRefused, match=r'in_hand_random: distance_m, the length of a stroke, is 0\.02; allowed'):
+        in_hand_random(request, (0.0, 0.0, 0.01), TouchParams(), SafetyLimits())

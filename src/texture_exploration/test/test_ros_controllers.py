@@ -340,7 +340,11 @@ def test_a_compliance_controller_presses_by_itself_and_is_let_go_at_the_end():
 def test_every_motion_succeeds_behind_a_late_controller(motion):
     robot = Robot(TwistControllerParams(start_height_m=0.003))
     robot.driven.connect()
-    requests = {'circular': {'speed_m_s': 0.05, 'turns': 0.5}, 'in_hand_sliding': {'duration_s': 1.0}}
+    requests = {
+        'circular': {'speed_m_s': 0.05, 'turns': 0.5},
+        'in_hand_sliding': {'duration_s': 1.0},
+        'in_hand_random': {'duration_s': 1.0},
+    }
     outcome, _ = robot.explore(ExplorationRequest(motion, **requests.get(motion, {'distance_m': 0.02})), TouchParams())
     assert outcome.success, outcome.message
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from texture_exploration.motions import circular, in_hand_sliding, linear_slide
+from texture_exploration.motions import circular, cross_slide, in_hand_sliding, linear_slide
 from texture_exploration.safety import RANGES, SafetyLimits
 
 DEFAULTS: Mapping[str, Mapping[str, float]] = {
     'linear_slide': linear_slide.DEFAULTS,
     'circular': circular.DEFAULTS,
+    'cross_slide': cross_slide.DEFAULTS,
     'in_hand_sliding': in_hand_sliding.DEFAULTS,
+    'in_hand_random': in_hand_sliding.DEFAULTS,
 }
 
 

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
 
 from texture_core.errors import MotionRefused
 from texture_core.exploration import ExplorationRequest
@@ -16,6 +20,33 @@ from texture_exploration.safety import SafetyLimits
 # A stroke is about what a fingertip reaches; duration: Kaboli et al. 2015.
 DEFAULTS = {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0}
 TURN_MARGIN_S = 0.01  # steady speed is guaranteed until one step before the turn
+LEAST_SHARE = 0.5  # of the longest stroke: a random stroke is at least so long
+# (whether the next stroke goes forth, where it begins, m) -> where it ends, m
+StrokeEnds = Callable[[bool, float], float]
+
+
+def whole_strokes(stroke_m: float) -> StrokeEnds:
+    """Return the ends of strokes that are all `stroke_m` long."""
+    return lambda forth, _begin_m: stroke_m if forth else 0.0
+
+
+def random_strokes(longest_m: float, rng: np.random.Generator) -> StrokeEnds:
+    """Return ends that are drawn at each turn: strokes of at least half of the longest, within 0 to `longest_m`.
+
+    Parameters
+    ----------
+    longest_m
+        Way that all strokes stay within.
+    rng
+        Draws the ends, equally distributed over what is allowed.
+    """
+    least_m = LEAST_SHARE * longest_m
+
+    def end_of(forth: bool, begin_m: float) -> float:
+        low, high = (begin_m + least_m, longest_m) if forth else (0.0, begin_m - least_m)
+        return float(rng.uniform(low, max(low, high)))
+
+    return end_of
 
 
 class Strokes:
@@ -26,8 +57,10 @@ class Strokes:
 
     Parameters
     ----------
-    heading_rad, stroke_m
-        Direction of the first stroke, and the way from turn to turn.
+    heading_rad
+        Direction of the first stroke.
+    ends
+        Where each stroke ends, as seen from where the first begins.
     speed_m_s
         Between the turns.
     turn_s
@@ -36,15 +69,16 @@ class Strokes:
         The way of all strokes together as if it had no turns: a turn counts as long as it takes.
     """
 
-    def __init__(self, heading_rad: float, stroke_m: float, speed_m_s: float, turn_s: float, length_m: float) -> None:
+    def __init__(self, heading_rad: float, ends: StrokeEnds, speed_m_s: float, turn_s: float, length_m: float) -> None:
         self.length_m = length_m
         self.travelled_m = 0.0
         self._heading_rad = heading_rad
         self._speed_m_s = speed_m_s
         self._turn_s = turn_s
-        runs_on_m = speed_m_s * turn_s / math.pi  # until it stands: the integral of the cosine over half a turn
-        self._low_m, self._high_m = runs_on_m, stroke_m - runs_on_m
+        self._ends = ends
+        self._runs_on_m = speed_m_s * turn_s / math.pi  # until it stands: the integral of the cosine over half a turn
         self._forth = True
+        self._end_m = ends(True, 0.0)
         self._along_m = 0.0
         self._age_m = 0.0
         self._turning_s = math.nan  # since the turn began; NaN between turns
@@ -62,8 +96,10 @@ class Strokes:
         """The way left until the finger turns; none while it does."""
         if not math.isnan(self._turning_s):
             return 0.0
-        left = self._high_m - self._along_m if self._forth else self._along_m - self._low_m
-        return max(0.0, left - self._age_m - TURN_MARGIN_S * self._speed_m_s)
+        return max(0.0, self._left_m - self._age_m - TURN_MARGIN_S * self._speed_m_s)
+
+    def begin_slide(self) -> None:
+        """Strokes go on as they are: there is nothing to change."""
 
     def update(self, time_ns: int, arm: ArmState) -> None:
         """Take note of where the finger is, and turn at the end of the stroke."""
@@ -90,9 +126,15 @@ class Strokes:
         self._turning_s += passed_s
         if self._turning_s >= self._turn_s:
             self._turning_s = math.nan
-        beyond = self._along_m > self._high_m if self._forth else self._along_m < self._low_m
-        if math.isnan(self._turning_s) and beyond:
+        if math.isnan(self._turning_s) and self._left_m < 0.0:
             self._forth, self._turning_s = not self._forth, 0.0
+            self._end_m = self._ends(self._forth, self._end_m)
+
+    @property
+    def _left_m(self) -> float:
+        """The way until the turn begins; below 0 beyond it."""
+        left_m = self._end_m - self._along_m if self._forth else self._along_m - self._end_m
+        return left_m - self._runs_on_m
 
 
 def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
@@ -121,11 +163,62 @@ def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParam
     MotionRefused
         If a number is out of its range, does not belong to this motion, or a stroke leaves the workspace.
     """
-    request = limits.complete(request, DEFAULTS)
+    return _plan(limits.complete(request, DEFAULTS), home, touch, limits, ends=whole_strokes)
+
+
+def in_hand_random(
+    request: ExplorationRequest,
+    home: Vector,
+    touch: TouchParams,
+    limits: SafetyLimits,
+    rng: np.random.Generator | None = None,
+) -> Motion:
+    """Plan the same with strokes of random length, each of at least half of `distance_m`.
+
+    Parameters
+    ----------
+    request
+        What the operator asks for; 0 takes the default of a number.
+    home
+        Place where the strokes begin, m, in the frame of the surface.
+    touch
+        How the finger approaches, presses and lifts.
+    limits
+        Allowed speeds, forces and workspace.
+    rng
+        Draws the strokes; None: other ones each time.
+
+    Returns
+    -------
+    Motion
+        Ready for its first step.
+
+    Raises
+    ------
+    MotionRefused
+        If a number is out of its range, does not belong to this motion, or a stroke leaves the workspace.
+
+    Source: the "random exploratory movements" that Kaboli et al. 2015, section VI, leave to future work.
+    """
+    drawn = partial(random_strokes, rng=rng or np.random.default_rng())
+    return _plan(limits.complete(request, DEFAULTS), home, touch, limits, ends=drawn, least_share=LEAST_SHARE)
+
+
+def _plan(
+    request: ExplorationRequest,
+    home: Vector,
+    touch: TouchParams,
+    limits: SafetyLimits,
+    *,
+    ends: Callable[[float], StrokeEnds],
+    least_share: float = 1.0,
+) -> Motion:
+    """Plan strokes of a complete request; the shortest is `least_share` of the longest."""
     speed = request.speed_m_s
     turn_s = touch.ramp_s(2 * speed)
-    _check_stroke(request, home, limits, least_m=ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s)
-    strokes = Strokes(request.direction_rad, request.distance_m, speed, turn_s, speed * request.duration_s)
+    least_m = (ramps_m(speed, touch.ramp_s(speed)) + speed * turn_s) / least_share
+    _check_stroke(request, home, limits, least_m)
+    strokes = Strokes(request.direction_rad, ends(request.distance_m), speed, turn_s, speed * request.duration_s)
     return plan_surface_slide(strokes, request, home, touch, limits)
 
 

@@ -42,6 +42,9 @@ class Follower(Protocol):
     def steady_m(self) -> float:
         """How far from here speed and force can be kept."""
 
+    def begin_slide(self) -> None:
+        """The slide begins here; what came before was for gaining speed."""
+
     def update(self, time_ns: int, arm: ArmState) -> None:
         """Take note of where the finger is."""
 
@@ -77,6 +80,9 @@ class PathFollower:
     def direction_rad(self) -> float:
         """Present direction of travel."""
         return self.path.direction_rad(self.travelled_m)
+
+    def begin_slide(self) -> None:
+        """One path serves the ramp and the slide: there is nothing to change."""
 
     def update(self, time_ns: int, arm: ArmState) -> None:
         """Project the finger on the path: so noise of the position does not add up."""

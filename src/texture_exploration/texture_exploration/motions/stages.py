@@ -246,6 +246,7 @@ class SlideStage(Stage):
         self._stall.restart()
         if self._start_m is None:
             self._start_m = self._follower.travelled_m
+            self._follower.begin_slide()
 
     def finish(self) -> None:
         """End as soon as the guaranteed time is over."""
