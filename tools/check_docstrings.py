@@ -7,8 +7,12 @@ A public function explains itself in numpydoc where its name and annotations can
 - an exception that it raises itself: a section Raises that names it.
 
 What carries out a protocol or overrides a base class of the suite (same name, same parameters) is described there,
-once; what it raises is not. Private names, tests, `__init__` and other special methods are left out: the parameters of
-a constructor stand in the docstring of its class.
+once; it names only the exceptions that are not named there. So is a function that fills a table: it is named in an
+assignment of a module, and its parameters are those of the `__call__` of a protocol, which describes them; a leading
+underscore marks a parameter that it does not use.
+
+Private names, tests, `__init__` and other special methods are left out: the parameters of a constructor stand in the
+docstring of its class.
 
 A public class of the packages in `WITH_EXAMPLES` has a doctest, or another class of its module uses it in one. A
 protocol has none, for nothing can be made of it, and neither has what needs ROS; `make test` runs them all.
@@ -76,24 +80,33 @@ class PublicFunction:
 
 @dataclass
 class Tree:
-    """All public functions of a folder, and what its protocols and base classes declare."""
+    """All public functions of a folder, and what its protocols and base classes declare.
+
+    `declared` and `protocols` hold, for each method as `signature` gives it, the text of its section Raises.
+    """
 
     functions: list[PublicFunction] = field(default_factory=list)
-    declared: dict[str, set[str]] = field(default_factory=dict)  # name of a class → its methods, as `signature` gives
-    protocols: set[str] = field(default_factory=set)  # the methods of protocols
+    declared: dict[str, dict[str, str]] = field(default_factory=dict)  # name of a class → its methods
+    protocols: dict[str, str] = field(default_factory=dict)  # the methods of protocols
+    in_tables: set[str] = field(default_factory=set)  # the names of functions in tables
 
-    def is_declared_elsewhere(self, function: PublicFunction) -> bool:
-        """Say whether the method is described by a protocol or a base class of its own class."""
-        if function.owner is None or _is_protocol(function.owner):
-            return False
-        wanted = signature(function)
+    def described_elsewhere(self, function: PublicFunction) -> str | None:
+        """Return what the type of its table, a protocol or a base class says it raises; None if none describes it."""
+        if function.owner is None:
+            in_table = function.node.name in self.in_tables
+            return self.protocols.get(signature(function, '__call__')) if in_table else None
+        if _is_protocol(function.owner):
+            return None
         bases = [ast.unparse(base).split('[')[0].split('.')[-1] for base in function.owner.bases]
-        return wanted in self.protocols or any(wanted in self.declared.get(base, set()) for base in bases)
+        described = [self.protocols, *(self.declared.get(base, {}) for base in bases)]
+        wanted = signature(function)
+        found = [methods[wanted] for methods in described if wanted in methods]
+        return '\n'.join(found) if found else None
 
 
-def signature(function: PublicFunction) -> str:
-    """Return what two methods share that do the same: the name and the names of the parameters."""
-    return f'{function.node.name}({", ".join(argument.arg for argument in function.arguments)})'
+def signature(function: PublicFunction, name: str = '') -> str:
+    """Return what two methods share that do the same: the name, or another one, and the names of the parameters."""
+    return f'{name or function.node.name}({", ".join(argument.arg.lstrip("_") for argument in function.arguments)})'
 
 
 def _is_protocol(node: ast.ClassDef) -> bool:
@@ -114,18 +127,26 @@ def _read_file(path: Path, tree: Tree) -> None:
     for node in ast.parse(path.read_text(encoding='utf-8')).body:
         if isinstance(node, Function) and not node.name.startswith('_'):
             tree.functions.append(PublicFunction(path, node))
+        elif isinstance(node, ast.Assign | ast.AnnAssign) and node.value:
+            tree.in_tables |= {item.id for item in ast.walk(node.value) if isinstance(item, ast.Name)}
         elif isinstance(node, ast.ClassDef):
+            public = {'__call__'} if _is_protocol(node) else set()
             methods = [
                 PublicFunction(path, item, node)
                 for item in node.body
-                if isinstance(item, Function) and not item.name.startswith('_')
+                if isinstance(item, Function) and (not item.name.startswith('_') or item.name in public)
             ]
-            declared = {signature(method) for method in methods}
-            tree.declared.setdefault(node.name, set()).update(declared)
+            declared = {signature(method): _raises(method) for method in methods}
+            tree.declared.setdefault(node.name, {}).update(declared)
             if _is_protocol(node):
-                tree.protocols |= declared
+                for method, text in declared.items():
+                    tree.protocols[method] = f'{tree.protocols.get(method, "")}\n{text}'
             if not node.name.startswith('_'):
                 tree.functions += methods
+
+
+def _raises(function: PublicFunction) -> str:
+    return sections(ast.get_docstring(function.node) or '').get('Raises', '')
 
 
 def sections(docstring: str) -> dict[str, str]:
@@ -158,11 +179,12 @@ def faults(function: PublicFunction, tree: Tree) -> list[str]:
     """Return what the docstring of one function lacks, each in a few words."""
     found = sections(ast.get_docstring(function.node) or '')
     missing = []
-    if not function.is_property and not tree.is_declared_elsewhere(function):
+    elsewhere = tree.described_elsewhere(function)
+    if not function.is_property and elsewhere is None:
         missing += [f'Parameters: {name}' for name in _undescribed(function, found.get('Parameters', ''))]
         if _needs_returns(function) and not {'Returns', 'Yields'} & set(found):
             missing.append('Returns')
-    text = found.get('Raises', '')
+    text = f'{found.get("Raises", "")}\n{elsewhere or ""}'
     missing += [f'Raises: {name}' for name in sorted(raised(function.node)) if not re.search(rf'\b{name}\b', text)]
     return missing
 

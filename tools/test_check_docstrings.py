@@ -59,6 +59,37 @@ def test_what_carries_out_a_protocol_is_described_there_and_only_there(tmp_path:
     ]
 
 
+def test_an_exception_that_the_protocol_names_is_not_named_again(tmp_path: Path) -> None:
+    code = (
+        'class Arm(Protocol):\n    """One."""\n\n    def move(self):\n        """Move it.\n\n        Raises\n'
+        '        ------\n        ArmFault\n            If it stands.\n        """\n\n\n'
+        'class Ur:\n    """One."""\n\n    def move(self):\n        """Move it."""\n        raise ArmFault\n\n\n'
+        'class Rails:\n    """One."""\n\n    def move(self):\n        """Move it."""\n        raise ValueError\n'
+    )
+    assert lacks(tmp_path, code) == ['Raises: ValueError']
+
+
+TABLE = (
+    'class Distance(Protocol):\n    """One."""\n\n    def __call__(self, x, y, z, /):\n        """Get.{text}"""\n\n\n'
+    'def euclidean(x, y, _z):\n    """Return it."""\n\n\n'
+    'def manhattan(x, y, angle):\n    """Return it."""\n\n\n'
+    'def unused(x, y, z):\n    """Return it."""\n\n\n'
+    "DISTANCES: Mapping[str, Distance] = {{'l2': euclidean, 'l1': manhattan}}\n"
+)
+SECTIONS = '\n\n        Parameters\n        ----------\n        x, y, z\n            m.\n        '
+
+
+def test_a_function_that_fills_a_table_is_described_at_the_type_of_the_table(tmp_path: Path) -> None:
+    assert lacks(tmp_path, TABLE.format(text=SECTIONS)) == [
+        'Parameters: x; Parameters: y; Parameters: angle',
+        'Parameters: x; Parameters: y; Parameters: z',
+    ]
+
+
+def test_the_type_of_a_table_describes_its_parameters(tmp_path: Path) -> None:
+    assert lacks(tmp_path, TABLE.format(text=''))[0] == 'Parameters: x; Parameters: y; Parameters: z'
+
+
 def test_a_class_without_a_doctest_is_found_unless_another_one_shows_it(tmp_path: Path) -> None:
     module = tmp_path / 'module.py'
     module.write_text(

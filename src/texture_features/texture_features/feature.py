@@ -134,7 +134,18 @@ class Feature(Protocol):
         """Name of each value of one channel; '' for the only value of a feature."""
 
     def __call__(self, windows: WindowBatch) -> Array:
-        """Return the values; finite for finite samples."""
+        """Return the values; finite for finite samples.
+
+        Parameters
+        ----------
+        windows
+            Windows of one input.
+
+        Returns
+        -------
+        (..., n_channels, n_values)
+            Of each channel, or (..., 1, n_values) where there are none for each channel.
+        """
 
 
 def centred(rows: Array) -> Array:

@@ -20,7 +20,7 @@ from texture_drivers.daq.sensor import daq
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
 from texture_simulation.emulator import Emulator, EmulatorParams
-from texture_simulation.live_sensor import live_biotac, live_daq
+from texture_simulation.live_catalogue import live_biotac, live_daq
 from texture_simulation.scene import load_scene
 
 pytestmark = pytest.mark.realtime

@@ -16,7 +16,7 @@ from texture_core.parameters import param
 from texture_simulation.devices.device import EmulatedDevice
 from texture_simulation.devices.faults import ByteFaults
 from texture_simulation.finger_receiver import FingerStateReceiver
-from texture_simulation.live_sensor import LIVE_SENSORS, MakeLiveSensor, live_tsf85
+from texture_simulation.live_catalogue import LIVE_SENSORS, MakeLiveSensor, live_tsf85
 from texture_simulation.scene import Scene, load_scene
 
 BURST_S = 0.005

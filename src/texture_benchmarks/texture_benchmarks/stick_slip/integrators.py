@@ -19,22 +19,7 @@ SETTLED = 1e-6  # an eigenvalue so much smaller than the largest belongs to what
 
 
 def explicit_euler(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step:
-    """Return Euler's step: state + step·rate.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    step_s
-        Length of an integration step.
-    exp
-        `math.exp` for one slide in floats, `numpy.exp` for arrays.
-
-    Returns
-    -------
-    callable
-        Takes a Tip, speed and force at the end of the step, returns the next Tip.
-    """
+    """Return Euler's step: state + step·rate."""
 
     def step(stretch: Value, slip: Value, bend: Value, speed: Value, force: Value) -> State:
         slope = rate(friction, Tip(stretch, slip, bend), speed, force, exp)
@@ -44,22 +29,7 @@ def explicit_euler(friction: StickSlip, step_s: float, exp: Any = math.exp) -> S
 
 
 def runge_kutta_4(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step:
-    """Return the classical step of fourth order.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    step_s
-        Length of an integration step.
-    exp
-        `math.exp` for one slide in floats, `numpy.exp` for arrays.
-
-    Returns
-    -------
-    callable
-        Takes a Tip, speed and force at the end of the step, returns the next Tip.
-    """
+    """Return the classical step of fourth order."""
 
     def ahead(tip: Tip, slope: Tip, by_s: float) -> Tip:
         return Tip(tip[0] + by_s * slope[0], tip[1] + by_s * slope[1], tip[2] + by_s * slope[2])
@@ -77,22 +47,7 @@ def runge_kutta_4(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
 
 
 def exponential(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step:
-    """Return a split step: each of slip, bend and stretch in turn, solved exactly while the others stand still.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    step_s
-        Length of an integration step.
-    exp
-        `math.exp` for one slide in floats, `numpy.exp` for arrays.
-
-    Returns
-    -------
-    callable
-        Takes a Tip, speed and force at the end of the step, returns the next Tip.
-    """
+    """Return a split step: each of slip, bend and stretch in turn, solved exactly while the others stand still."""
     f = friction
 
     def step(stretch: Value, slip: Value, bend: Value, speed: Value, force: Value) -> State:
@@ -111,42 +66,12 @@ def exponential(friction: StickSlip, step_s: float, exp: Any = math.exp) -> Step
 
 
 def euler_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) -> float:
-    """Return the longest step of Euler's method: |1 + step·λ| ≤ 1 for each eigenvalue that decays.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    slip_m_s
-        Speed of the tip over the surface; 0 if it sticks.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    float
-        s; inf if every step is stable.
-    """
+    """Return the longest step of Euler's method: |1 + step·λ| ≤ 1 for each eigenvalue that decays."""
     return min(-2 * root.real / abs(root) ** 2 for root in _decaying(friction, slip_m_s, force_n))
 
 
 def runge_kutta_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) -> float:
-    """Return the longest step of the classical Runge–Kutta method: |R(step·λ)| ≤ 1 for each eigenvalue that decays.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    slip_m_s
-        Speed of the tip over the surface; 0 if it sticks.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    float
-        s; inf if every step is stable.
-    """
+    """Return the longest step of the classical Runge–Kutta method: |R(step·λ)| ≤ 1 for each eigenvalue that decays."""
 
     def growth(size: float, direction: complex) -> float:
         z = size * direction
@@ -162,20 +87,6 @@ def exponential_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) ->
     """Return the longest split step: h·K·tanh(h·D/2m) = 2·D for a spring K and a damper D; h²·K = 4·m without damper.
 
     Sticking, the bristles are part of the spring; sliding, they relax exactly and only the skin is left.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    slip_m_s
-        Speed of the tip over the surface; 0 if it sticks.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    float
-        s; inf if every step is stable.
     """
     f = friction
     sticking = slip_m_s == 0.0

@@ -18,7 +18,16 @@ class Predictor(Protocol):
     """Predict from features, as plain arrays."""
 
     def __call__(self, X: Array) -> Array:
-        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
+        """Return log-probabilities up to a constant of the window.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n_labels)
+        """
 
 
 class HiddenPredictor(Protocol):

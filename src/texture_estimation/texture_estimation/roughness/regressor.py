@@ -18,10 +18,16 @@ class RegressorPredictor(Protocol):
     """Predict grades of windows, as plain arrays."""
 
     def __call__(self, X: Array) -> tuple[Array, Array]:
-        """Return grade and its standard deviation, (...,) each, of (..., n_features).
+        """Return grade and its standard deviation.
 
-        The grade is NaN where the regressor has no answer; the standard deviation is 0 if the regressor does not know
-        it.
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (...,), (...,)
+            NaN as the grade where the regressor has no answer; 0 as the deviation if the regressor does not know it.
         """
 
 

@@ -40,18 +40,8 @@ class ChronologicalSplit:
             raise InvalidParameter(f'train_size is {train_size}; a fraction above 0 and below 1 is needed')
         self.train_size = train_size
 
-    def get_n_splits(self, X: object = None, y: object = None, groups: object = None) -> int:
-        """Return 1.
-
-        Parameters
-        ----------
-        X, y, groups
-            Not used; scikit-learn's splitters take them.
-
-        Returns
-        -------
-        int
-        """
+    def get_n_splits(self, *_args: object, **_named: object) -> int:
+        """Return 1, whatever else scikit-learn's splitters take."""
         return 1
 
     def split(  # X is there because scikit-learn's splitters have it
@@ -60,14 +50,7 @@ class ChronologicalSplit:
         y: AnyArray,
         groups: AnyArray | None = None,
     ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-        """Yield the rows that train and those that test.
-
-        Parameters
-        ----------
-        y : (n,)
-            Label of each row; rows come in the order of time.
-        groups : (n,)
-            Slide of each row, whose rows stay together; without it each row is a slide of its own.
+        """Yield the rows that train and those that test; rows are in the order of time, those of a group stay together.
 
         Raises
         ------

@@ -49,27 +49,6 @@ def circular(request: ExplorationRequest, home: Vector, touch: TouchParams, limi
     """Plan `turns` turns on a circle around `home`; the slide begins at the angle `direction_rad` of the circle.
 
     The finger comes down before that angle, and gains its speed on the circle.
-
-    Parameters
-    ----------
-    request
-        What the operator asks for; 0 takes the default of a number.
-    home
-        Centre of the circle, m, in the frame of the surface.
-    touch
-        How the finger approaches, presses and lifts.
-    limits
-        Allowed speeds, forces and workspace.
-
-    Returns
-    -------
-    Motion
-        Ready for its first step.
-
-    Raises
-    ------
-    MotionRefused
-        If a number is out of its range, does not belong to this motion, or the circle leaves the workspace.
     """
     request = limits.complete(request, DEFAULTS)
     _check_speed(request, limits)

@@ -141,27 +141,6 @@ def in_hand_sliding(request: ExplorationRequest, home: Vector, touch: TouchParam
     """Plan strokes of `distance_m` to and fro, for `duration_s`.
 
     Which fingers slide and which hold is the hand's business (`texture_exploration.arms.in_hand`).
-
-    Parameters
-    ----------
-    request
-        What the operator asks for; 0 takes the default of a number.
-    home
-        Place where the strokes begin, m, in the frame of the surface.
-    touch
-        How the finger approaches, presses and lifts.
-    limits
-        Allowed speeds, forces and workspace.
-
-    Returns
-    -------
-    Motion
-        Ready for its first step.
-
-    Raises
-    ------
-    MotionRefused
-        If a number is out of its range, does not belong to this motion, or a stroke leaves the workspace.
     """
     return _plan(limits.complete(request, DEFAULTS), home, touch, limits, ends=whole_strokes)
 

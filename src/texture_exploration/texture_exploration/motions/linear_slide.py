@@ -34,29 +34,7 @@ class StraightPath:
 
 
 def linear_slide(request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits) -> Motion:
-    """Plan a slide of `distance_m` at constant speed, with a ramp before and after it.
-
-    Parameters
-    ----------
-    request
-        What the operator asks for; 0 takes the default of a number.
-    home
-        Place where the slide begins, m, in the frame of the surface.
-    touch
-        How the finger approaches, presses and lifts.
-    limits
-        Allowed speeds, forces and workspace.
-
-    Returns
-    -------
-    Motion
-        Ready for its first step.
-
-    Raises
-    ------
-    MotionRefused
-        If a number is out of its range, does not belong to this motion, or the path leaves the workspace.
-    """
+    """Plan a slide of `distance_m` at constant speed, with a ramp before and after it."""
     request = limits.complete(request, DEFAULTS)
     _check_free_distance(request, home, touch, limits)
     follower = PathFollower(StraightPath(request.distance_m, request.direction_rad), touch.arm_lag_s)

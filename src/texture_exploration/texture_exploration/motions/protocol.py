@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -48,6 +47,31 @@ class Motion(Protocol):
         """What happened, in one sentence."""
 
 
-# Checks a request against the limits, fills in the defaults and returns the motion; `home` is where it begins and
-# to which height it lifts. Raises MotionRefused.
-Planner = Callable[[ExplorationRequest, Vector, TouchParams, SafetyLimits], Motion]
+class Planner(Protocol):
+    """Plans a motion: checks a request against the limits and fills in the defaults."""
+
+    def __call__(
+        self, request: ExplorationRequest, home: Vector, touch: TouchParams, limits: SafetyLimits, /
+    ) -> Motion:
+        """Return a motion, ready for its first step.
+
+        Parameters
+        ----------
+        request
+            What the operator asks for; 0 takes the default of a number.
+        home
+            Place where the slide begins and to which height it lifts, m, in the frame of the surface.
+        touch
+            How the finger approaches, presses and lifts.
+        limits
+            Allowed speeds, forces and workspace.
+
+        Returns
+        -------
+        Motion
+
+        Raises
+        ------
+        MotionRefused
+            If a number is out of its range, does not belong to this motion, or the path leaves the workspace.
+        """

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Protocol
 
 import numpy as np
 from scipy.signal import resample_poly
@@ -56,8 +57,26 @@ class SlideWindows:
         return rms
 
 
-# (windows of an input, strength, random) -> samples (n_windows, n_samples, n_channels)
-Disturbance = Callable[[SlideWindows, float, np.random.Generator], Array]
+class Disturbance(Protocol):
+    """Changes windows as a disturbance of some strength would."""
+
+    def __call__(self, windows: SlideWindows, strength: float, rng: np.random.Generator, /) -> Array:
+        """Return the samples of the windows with the disturbance.
+
+        Parameters
+        ----------
+        windows
+            Windows of one input.
+        strength
+            How strong; each disturbance says in which unit.
+        rng
+            Source of all that is random.
+
+        Returns
+        -------
+        (n_windows, n_samples, n_channels)
+            In the unit of the signal.
+        """
 
 
 def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
@@ -88,82 +107,25 @@ def at_speed(windows: SlideWindows, speed: float, count: int) -> Array:
 
 
 def add_noise(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
-    """Add white noise with a multiple of the root mean square of the slide.
-
-    Parameters
-    ----------
-    windows
-        Windows of one input.
-    strength
-        Standard deviation of the noise over the root mean square of each channel.
-    rng
-        Source of the noise.
-
-    Returns
-    -------
-    (n_windows, n_samples, n_channels)
-        In the unit of the signal.
-    """
+    """Add white noise with a multiple, the strength, of the root mean square of the slide."""
     return windows.samples + strength * windows.rms * rng.standard_normal(windows.samples.shape)
 
 
 def amplify(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Multiply the vibration.
-
-    Parameters
-    ----------
-    windows
-        Windows of one input; slow channels are returned as they are.
-    strength
-        Factor.
-    _rng
-        Not used; every disturbance takes one.
-
-    Returns
-    -------
-    (n_windows, n_samples, n_channels)
-        In the unit of the signal.
-    """
+    """Multiply the vibration by the strength; slow channels stay as they are."""
     return strength * windows.samples if windows.vibration else windows.samples
 
 
 def add_drift(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Add an offset that grows by a multiple of the root mean square of the slide per second.
-
-    Parameters
-    ----------
-    windows
-        Windows of one input.
-    strength
-        Growth of the offset per second over the root mean square of each channel, 1/s.
-    _rng
-        Not used; every disturbance takes one.
-
-    Returns
-    -------
-    (n_windows, n_samples, n_channels)
-        In the unit of the signal; the offset goes on from window to window.
-    """
+    """Add an offset that grows by a multiple of the root mean square of the slide per second, from window to window."""
     times = windows.starts_s[:, None] + np.arange(windows.samples.shape[1]) / windows.rate_hz
     return windows.samples + strength * windows.rms * times[..., None]
 
 
 def hold_lost(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
-    """Replace a fraction of the vibration, by bursts, by the last value before.
+    """Replace a fraction of the vibration, by bursts of 10 ms, by the last value before; slow channels stay.
 
-    Parameters
-    ----------
-    windows
-        Windows of one input; slow channels are returned as they are.
-    strength
-        Fraction of the samples that is lost, 0 to 1, in bursts of 10 ms.
-    rng
-        Source of the places of the bursts.
-
-    Returns
-    -------
-    (n_windows, n_samples, n_channels)
-        In the unit of the signal; the first sample of a window is never lost.
+    The first sample of a window is never lost.
     """
     n_windows, n_samples, _ = windows.samples.shape
     if not windows.vibration:
@@ -177,22 +139,7 @@ def hold_lost(windows: SlideWindows, strength: float, rng: np.random.Generator) 
 
 
 def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
-    """Limit the vibration to a multiple of its root mean square about the mean.
-
-    Parameters
-    ----------
-    windows
-        Windows of one input; slow channels are returned as they are.
-    strength
-        Limit over the root mean square of each channel.
-    _rng
-        Not used; every disturbance takes one.
-
-    Returns
-    -------
-    (n_windows, n_samples, n_channels)
-        In the unit of the signal.
-    """
+    """Limit the vibration to a multiple of its root mean square about the mean; slow channels stay as they are."""
     if not windows.vibration:
         return windows.samples
     limit = strength * windows.rms
@@ -202,19 +149,7 @@ def clip(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> A
 def low_pass(windows: SlideWindows, strength: float, _rng: np.random.Generator) -> Array:
     """Filter the vibration by a low-pass of first order whose cut-off is a multiple of the sampling rate.
 
-    Parameters
-    ----------
-    windows
-        Windows of one input; slow channels are returned as they are.
-    strength
-        Cut-off frequency over the sampling rate.
-    _rng
-        Not used; every disturbance takes one.
-
-    Returns
-    -------
-    (n_windows, n_samples, n_channels)
-        In the unit of the signal.
+    Slow channels stay as they are.
     """
     if not windows.vibration:
         return windows.samples
@@ -228,19 +163,7 @@ def low_pass(windows: SlideWindows, strength: float, _rng: np.random.Generator) 
 def other_finger(windows: SlideWindows, strength: float, rng: np.random.Generator) -> Array:
     """Filter the vibration by a smooth random response with this standard deviation in dB; shift slow channels.
 
-    Parameters
-    ----------
-    windows
-        Windows of one input; of slow channels the gains and offsets change.
-    strength
-        Standard deviation of the response over frequency, dB.
-    rng
-        Source of the response.
-
-    Returns
-    -------
-    (n_windows, n_samples, n_channels)
-        In the unit of the signal; the mean over the slide stays for vibration.
+    The mean over the slide stays for vibration; of slow channels the gains and offsets change.
     """
     n_channels = windows.samples.shape[2]
     deviation = windows.samples - windows.mean

@@ -76,30 +76,9 @@ class BiotacSlide:
 def import_biotac20(
     source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
 ) -> list[Path]:
-    """Write one bag a material, 'material01' and so on, and return their paths.
+    """Write one bag a material, 'material01' and so on, from files materialNN.npz, and return their paths.
 
-    Parameters
-    ----------
-    source
-        Folder of the files materialNN.npz.
-    out
-        Folder for the bags; made if missing.
-    slides
-        Which slides of each material, such as '1-30'; '' for all.
-    materials
-        Names of materials; none for all.
-    channels
-        'fast' for the vibration (PAC, 2200 Hz) alone, 'all' for the slow channels (100 Hz) too.
-
-    Returns
-    -------
-    list of Path
-        Of the bags.
-
-    Raises
-    ------
-    InvalidData
-        If the source lacks files or slides, or a bag exists already.
+    The vibration is PAC at 2200 Hz, the slow channels have 100 Hz.
     """
     if channels not in ('fast', 'all'):
         raise InvalidData(f"channels are '{channels}'; 'fast' or 'all' is needed")

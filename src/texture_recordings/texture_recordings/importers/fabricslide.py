@@ -88,36 +88,14 @@ DATA = SlideFile('runs.npz', STREAM, place, slide)
 def import_fabricslide(
     source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
 ) -> list[Path]:
-    """Write one bag a fabric or grating ('Canvas', 'Board10mm'), and return their paths.
+    """Write one bag a fabric or grating ('Canvas', 'Board10mm') from runs.npz, and return their paths.
 
     The runs of a fabric are numbered by direction (down first), then force, speed and repeat: of a complete fabric 1-60
     go down and 61-120 up, and within them each force has twelve in a row. Rows are 28 ms apart and are written as they
-    are, on `signal_static`. Force: the grip was regulated to a mean reading of the taxels, not to newtons; `force_n`
-    holds that reading in hundreds of counts, which distinguishs forces and orders them, and is no force in newtons.
-    Direction: +π/2 up, −π/2 down. The states say `contact` while the finger speeds up and `lift` while it slows down.
-
-    Parameters
-    ----------
-    source
-        Folder of runs.npz.
-    out
-        Folder for the bags; made if missing.
-    slides
-        Which runs of each fabric, such as '1-60'; '' for all.
-    materials
-        Names of fabrics or gratings; none for all.
-    channels
-        'all': the taxels are slow channels, and there are no fast ones.
-
-    Returns
-    -------
-    list of Path
-        Of the bags.
-
-    Raises
-    ------
-    InvalidData
-        If the source lacks the file or runs, or a bag exists already.
+    are, on `signal_static`; there is no vibration, so `channels` must be 'all'. Force: the grip was regulated to a mean
+    reading of the taxels, not to newtons; `force_n` holds that reading in hundreds of counts, which distinguishes and
+    orders forces, and is no force in newtons. Direction: +π/2 up, −π/2 down. The states say `contact` while the finger
+    speeds up and `lift` while it slows down.
     """
     if channels != 'all':
         raise InvalidData(f"channels are '{channels}'; this finger has slow taxels alone, import 'all'")

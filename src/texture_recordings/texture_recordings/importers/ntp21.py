@@ -105,36 +105,13 @@ DATA = SlideFile('slides.npz', STREAM, place, slide)
 def import_ntp21(
     source: str | Path, out: str | Path, slides: str = '', materials: Sequence[str] = (), channels: str = 'all'
 ) -> list[Path]:
-    """Write one bag a texture, 'texture00' and so on, and return their paths.
+    """Write one bag a texture, 'texture00' and so on, from slides.npz, and return their paths.
 
     The slides of a texture are numbered by speed, and by force within a speed: with four speeds and four forces, 1-4
     are the slowest, of rising force, and 13-16 the fastest. The recorded stamps jitter by half a sample while the
     samples are evenly spaced (read so, the speeds agree better with each other): each slide is read as evenly spaced
     from its first stamp to its last, and brought from its own rate (310 to 323 Hz) to 320 Hz by a cubic spline.
-    `force_n` is the force beyond first contact.
-
-    Parameters
-    ----------
-    source
-        Folder of slides.npz.
-    out
-        Folder for the bags; made if missing.
-    slides
-        Which slides of each texture, such as '1-12'; '' for all.
-    materials
-        Names of textures; none for all.
-    channels
-        'fast' and 'all' are the same here: the nine taxels at 320 Hz.
-
-    Returns
-    -------
-    list of Path
-        Of the bags.
-
-    Raises
-    ------
-    InvalidData
-        If the source lacks the file or slides, or a bag exists already.
+    `force_n` is the force beyond first contact. Fast channels and all are the same: the nine taxels.
     """
     if channels not in ('fast', 'all'):
         raise InvalidData(f"channels are '{channels}'; 'fast' or 'all' is needed")

@@ -129,6 +129,20 @@ class TableReader(Protocol):
     def __call__(self, path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
         """Yield the tables of a file.
 
+        Parameters
+        ----------
+        path
+            The file.
+        place
+            Its name for sentences.
+        mapping
+            Says how the file is read and what is wanted of it.
+
+        Yields
+        ------
+        Table
+            Its columns are read when asked for.
+
         Raises
         ------
         InvalidData

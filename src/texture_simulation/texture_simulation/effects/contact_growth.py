@@ -28,23 +28,11 @@ class PatchGrowth:
     )
 
     def blur_growth(self, force_n: Array) -> Array | float:
-        """Return how much larger the contact is than at 1 N.
-
-        Returns
-        -------
-        (...)
-            Factor of the contact size, of the shape of `force_n`.
-        """
+        """Return how much larger the contact is than at 1 N."""
         return _power(force_n, self.exponent)
 
     def gain_growth(self, force_n: Array) -> Array | float:
-        """Return 1.
-
-        Returns
-        -------
-        (...)
-            Factor of the stiffness, of the shape of `force_n`.
-        """
+        """Return 1."""
         return 1.0
 
 
@@ -60,21 +48,9 @@ class ForceGain:
     )
 
     def blur_growth(self, force_n: Array) -> Array | float:
-        """Return 1.
-
-        Returns
-        -------
-        (...)
-            Factor of the contact size, of the shape of `force_n`.
-        """
+        """Return 1."""
         return 1.0
 
     def gain_growth(self, force_n: Array) -> Array | float:
-        """Return how much stronger a texture is measured than at 1 N.
-
-        Returns
-        -------
-        (...)
-            Factor of the stiffness, of the shape of `force_n`.
-        """
+        """Return how much stronger a texture is measured than at 1 N."""
         return _power(force_n, self.exponent)

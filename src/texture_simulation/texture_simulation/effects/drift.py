@@ -25,21 +25,7 @@ class Drift:
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
     ) -> SignalFilter:
-        """Return what adds the drift.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        channels
-            Number of channels.
-        slow
-            Whether the stream is the slow one.
-        """
+        """Return what adds the drift."""
         at = np.zeros((*batch_shape, 1, channels))
         step = self.count_per_sqrt_s / np.sqrt(rate_hz)
 

@@ -28,21 +28,7 @@ class Dropouts:
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
     ) -> SignalFilter:
-        """Return what holds the samples.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        channels
-            Number of channels.
-        slow
-            Whether the stream is the slow one.
-        """
+        """Return what holds the samples."""
         length = max(1, round(self.length_s * rate_hz))
         held = np.zeros((*batch_shape, 1, channels))  # the last good sample
         left = np.zeros(batch_shape, dtype=np.intp)  # samples that are still to be held

@@ -22,11 +22,5 @@ class FingerSpread:
     )
 
     def gain(self, path: Trajectory, finger: int) -> Array | float:
-        """Return the factor of a finger.
-
-        Returns
-        -------
-        float
-            Factor on the variation of the force, the same at all points.
-        """
+        """Return the factor of a finger, the same at all points."""
         return float(np.exp(self.relative * np.random.default_rng([SALT, finger]).standard_normal()))

@@ -25,21 +25,7 @@ class MainsHum:
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
     ) -> SignalFilter:
-        """Return what adds the hum; its phase is another in each slide.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        channels
-            Number of channels.
-        slow
-            Whether the stream is the slow one.
-        """
+        """Return what adds the hum; its phase is another in each slide."""
         phase = rng.uniform(0, 2 * np.pi, (*batch_shape, 1))
         turn, done = 2 * np.pi * self.mains_hz / rate_hz, 0
 

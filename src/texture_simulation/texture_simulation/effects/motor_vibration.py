@@ -32,17 +32,7 @@ class MotorVibration:
     )
 
     def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
-        """Return what adds the ripple.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        """
+        """Return what adds the ripple."""
         travelled_m = rng.uniform(0, 1 / self.steps_1_m, (*batch_shape, 1))
         last: tuple[Array, Array] | None = None
 

@@ -25,21 +25,7 @@ class Noise:
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
     ) -> SignalFilter:
-        """Return what adds the noise.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        channels
-            Number of channels.
-        slow
-            Whether the stream is the slow one.
-        """
+        """Return what adds the noise."""
         spread = self.slow_count if slow else self.fast_count
 
         def add(samples: Samples) -> Samples:

@@ -20,21 +20,7 @@ class Quantisation:
     def start_signal(
         self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape, channels: int, *, slow: bool
     ) -> SignalFilter:
-        """Return what rounds the samples.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        channels
-            Number of channels.
-        slow
-            Whether the stream is the slow one.
-        """
+        """Return what rounds the samples."""
         return self._round
 
     def _round(self, samples: Samples) -> Samples:

@@ -33,17 +33,7 @@ class Skids:
     length_s: float = param(0.05, 'Sets how long the skin sticks before it jumps.', unit='s', low=1e-3, high=1.0)
 
     def start_path(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> TrajectoryFilter:
-        """Return what lets the skin lag behind the finger.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        """
+        """Return what lets the skin lag behind the finger."""
         length, kept = max(1, round(self.length_s * rate_hz)), math.exp(-1 / (CATCH_UP_S * rate_hz))
         since = np.full(batch_shape, 10**9)  # points since the last skid began
         held = [np.zeros(batch_shape), np.zeros(batch_shape)]  # where

@@ -33,17 +33,7 @@ class Skin:
     )
 
     def start_force(self, rng: np.random.Generator, rate_hz: float, batch_shape: BatchShape) -> ForceFilter:
-        """Return what filters the variation.
-
-        Parameters
-        ----------
-        rng
-            Random numbers of this effect.
-        rate_hz
-            Sampling rate of the samples or points.
-        batch_shape
-            () for one slide, (count,) for many at once.
-        """
+        """Return what filters the variation."""
         skin = Filter(self.sections(rate_hz))
 
         def through(path: Trajectory, variation_n: Array) -> Array:

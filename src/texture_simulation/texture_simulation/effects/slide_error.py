@@ -24,22 +24,7 @@ class SlideError:
     )
 
     def slide(self, speed_m_s: Array, force_n: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Return speed and force as they become, of the same shape.
-
-        Parameters
-        ----------
-        speed_m_s : (count,)
-            Planned speeds.
-        force_n : (count,)
-            Planned normal forces.
-        rng
-            Random numbers of this effect.
-
-        Returns
-        -------
-        (count,), (count,)
-            Speeds in m/s and forces in N.
-        """
+        """Return speed and force as they become, of the same shape."""
         return (
             speed_m_s * np.maximum(MIN_SHARE, 1 + self.speed * rng.standard_normal(speed_m_s.shape)),
             force_n * np.maximum(MIN_SHARE, 1 + self.force * rng.standard_normal(force_n.shape)),

@@ -57,13 +57,7 @@ class AnySkinModel:
         self._converter = Converter(scene, rng, RATE_HZ, channels, LIMITS, batch_shape=batch_shape)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return the field in µT.
-
-        Returns
-        -------
-        dict
-            Samples by topic, (..., n_samples, 15) µT.
-        """
+        """Return the field in µT, (..., n_samples, 15)."""
         return {tables.SIGNAL: self.advance(path)}
 
     def advance(self, path: Trajectory) -> Array:

@@ -93,13 +93,7 @@ class BioTacModel:
         return points_per_frame(self._layout)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return PAC, and the slow channels if wanted, in counts.
-
-        Returns
-        -------
-        dict
-            Samples by topic, (..., n_samples, n_channels) counts.
-        """
+        """Return PAC, and the slow channels if wanted, in counts."""
         placed, pressure_pa = self._pressure_pa(path)
         fast = {'signal': self._fast.exact(self._pac(pressure_pa))}
         return {**fast, 'signal_static': self._slow.exact(self._frames(placed, pressure_pa))} if slow else fast

@@ -64,13 +64,7 @@ class DaqModel:
         self._converter = Converter(scene, rng, RATE_HZ, ELEMENTS, LIMITS, batch_shape=batch_shape)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return the 8 channels in V.
-
-        Returns
-        -------
-        dict
-            Samples by topic, (..., n_samples, 8) V.
-        """
+        """Return the 8 channels in V, (..., n_samples, 8)."""
         return {tables.TOPIC: VOLT_PER_COUNT * self._converter.exact(self._exact(path))}
 
     def advance(self, path: Trajectory) -> NDArray[np.int16]:

@@ -76,6 +76,10 @@ class MakeModel(Protocol):
             () for one slide at a time, (count,) for many at once.
         settled
             Whether its filters have forgotten how the touch began.
+
+        Returns
+        -------
+        SensorModel
         """
 
 

@@ -59,13 +59,7 @@ class PapillArrayModel:
         )
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return forces (N) and displacements (mm) of the pillars.
-
-        Returns
-        -------
-        dict
-            Samples by topic, (..., n_samples, 54).
-        """
+        """Return forces (N) and displacements (mm) of the pillars, (..., n_samples, 54)."""
         measured = self.advance(path)[..., OVERSAMPLING - 1 :: OVERSAMPLING, :, :]
         return {tables.SIGNAL: measured.reshape(*measured.shape[:-2], -1)}
 

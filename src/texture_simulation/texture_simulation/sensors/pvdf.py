@@ -58,13 +58,7 @@ class PvdfModel:
         self._slow = Converter(scene, rng, tables.FORCE_RATE_HZ, 1, LIMITS, batch_shape=batch_shape, slow=True)
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return the charge of the film in pC, and the force in N if wanted.
-
-        Returns
-        -------
-        dict
-            Samples by topic, (..., n_samples, 1) pC and N.
-        """
+        """Return the charge of the film in pC, and the force in N if wanted, (..., n_samples, 1) each."""
         force_n = self._pressed_n(path)
         fast = {tables.FILM_TOPIC: tables.FILM_PC_PER_COUNT * self._fast.exact(self._charge(force_n))}
         if not slow:

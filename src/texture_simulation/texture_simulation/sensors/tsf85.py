@@ -77,13 +77,7 @@ class Tsf85Model:
         )
 
     def streams(self, path: Trajectory, *, slow: bool = True) -> Mapping[str, Samples]:
-        """Return the dynamic channel, and the taxels if wanted, in counts.
-
-        Returns
-        -------
-        dict
-            Samples by topic, (..., n_samples, n_channels) counts.
-        """
+        """Return the dynamic channel, and the taxels if wanted, in counts."""
         placed = self.touch.placed(path)
         fast = {'signal': self._fast.exact(self._dynamic(placed))}
         return {**fast, 'signal_static': self._slow.exact(self._images(placed))} if slow else fast

@@ -24,20 +24,6 @@ def semi_implicit(friction: StickSlip, step_s: float, exp: Any = math.exp) -> St
         (mass/h + c + N·σ2)·w + N·(σ0·bend' + σ1·(bend' − bend)/h) = mass·slip/h + k·stretch + c·speed
 
     The Stribeck curve g and σ1 are taken at the old slip first, then once again at the slip that this gave.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    step_s
-        Length of an integration step.
-    exp
-        `math.exp` for one slide in floats, `numpy.exp` for arrays.
-
-    Returns
-    -------
-    callable
-        Takes a Tip, speed and force at the end of the step, returns the next Tip.
     """
     stiffness, damping, viscous = friction.skin_n_m, friction.skin_n_s_m, friction.viscous_s_m
     bristle, bristle_damping = friction.bristle_1_m, friction.bristle_s_m
@@ -72,20 +58,6 @@ def semi_implicit_limit_s(friction: StickSlip, slip_m_s: float, force_n: float) 
     """Return the longest semi-implicit step: h²·k = 4·m + 2·h·D + h²·N·σ0, with D all damping and σ0 only if sticking.
 
     Only the skin's own swing limits it, and not even that while bristles stiffer than the skin hold.
-
-    Parameters
-    ----------
-    friction
-        Friction of the surface, and the skin.
-    slip_m_s
-        Speed of the tip over the surface; 0 if it sticks.
-    force_n
-        Normal force, at least 0.
-
-    Returns
-    -------
-    float
-        s; inf if every step is stable.
     """
     f = friction
     sticking = slip_m_s == 0.0

@@ -49,13 +49,7 @@ class TipDrag:
         self._forward: tuple[Array, Array] | None = None  # the direction that counts as forward, (..., 1)
 
     def advance(self, path: Trajectory) -> Array:
-        """Return the force that the sensor senses beside the shape of the surface, (..., n), N.
-
-        Parameters
-        ----------
-        path
-            The next points of one slide or of many, with the normal force on the tip; n of them.
-        """
+        """Return the force that the sensor senses beside the shape of the surface, (..., n), N."""
         if not len(path):
             return np.zeros_like(path.x_m)
         speed_m_s, force_n = self._along(path), np.maximum(path.force_n, 0.0)

@@ -39,16 +39,6 @@ class Circles:
     duty: float = param(0.5, 'Sets the share of the pitch that a square ring takes.', low=0.05, high=0.95)
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions, (..., n).
-
-        Parameters
-        ----------
-        x_m : (..., n)
-            Positions along x.
-        y_m : (..., n)
-            Positions along y.
-        blur_m : (..., n) or (..., 1)
-            Standard deviation of the contact that averages.
-        """
+        """Return the blurred height at positions, (..., n)."""
         radius_m = np.hypot(x_m - self.centre_x_m, y_m - self.centre_y_m)
         return self.depth_m * profile(radius_m, blur_m, self.pitch_m, self.shape, self.duty)

@@ -35,16 +35,6 @@ class Grating:
     duty: float = param(0.5, 'Sets the share of the pitch that a square ridge takes.', low=0.05, high=0.95)
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions, (..., n).
-
-        Parameters
-        ----------
-        x_m : (..., n)
-            Positions along x.
-        y_m : (..., n)
-            Positions along y.
-        blur_m : (..., n) or (..., 1)
-            Standard deviation of the contact that averages.
-        """
+        """Return the blurred height at positions, (..., n)."""
         across_m = x_m * math.cos(self.angle_rad) + y_m * math.sin(self.angle_rad)
         return self.depth_m * profile(across_m, blur_m, self.pitch_m, self.shape, self.duty)

@@ -46,17 +46,7 @@ class Grid:
     )
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions, (..., n).
-
-        Parameters
-        ----------
-        x_m : (..., n)
-            Positions along x.
-        y_m : (..., n)
-            Positions along y.
-        blur_m : (..., n) or (..., 1)
-            Standard deviation of the contact that averages.
-        """
+        """Return the blurred height at positions, (..., n)."""
         cosine, sine = math.cos(self.angle_rad), math.sin(self.angle_rad)
         mean = MEAN.get(self.shape, self.duty)
         along = profile(x_m * cosine + y_m * sine, blur_m, self.pitch_x_m, self.shape, self.duty)

@@ -53,15 +53,5 @@ class SelfAffine:
         return np.asarray(height * (self.rms_m / height.std()))
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions, (..., n).
-
-        Parameters
-        ----------
-        x_m : (..., n)
-            Positions along x.
-        y_m : (..., n)
-            Positions along y.
-        blur_m : (..., n) or (..., 1)
-            Standard deviation of the contact that averages.
-        """
+        """Return the blurred height at positions, (..., n)."""
         return tile_height(self, x_m, y_m, blur_m)

@@ -47,17 +47,7 @@ class Surface:
     friction: Any = None
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions.
-
-        Parameters
-        ----------
-        x_m, y_m : (..., n)
-        blur_m : (..., n), or (..., 1) where it stays the same
-
-        Returns
-        -------
-        (..., n) m, of zero mean over a large surface
-        """
+        """Return the blurred height at positions."""
         blur_m = np.clip(blur_m, MIN_BLUR_M, MAX_BLUR_M)
         height = np.zeros(np.broadcast_shapes(x_m.shape, y_m.shape, blur_m.shape))
         for term in self.terms:

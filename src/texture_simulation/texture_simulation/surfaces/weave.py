@@ -68,17 +68,7 @@ class Weave:
     seed: int = param(0, 'Sets the seed of the yarn positions.', low=0)
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
-        """Return the blurred height at positions, (..., n).
-
-        Parameters
-        ----------
-        x_m : (..., n)
-            Positions along x.
-        y_m : (..., n)
-            Positions along y.
-        blur_m : (..., n) or (..., 1)
-            Standard deviation of the contact that averages.
-        """
+        """Return the blurred height at positions, (..., n)."""
         x_m, y_m = self._even(x_m, y_m)
         across_x, across_y = 2 * np.pi / self.pitch_x_m * x_m, 2 * np.pi / self.pitch_y_m * y_m
         weak_x = np.exp(-0.5 * (2 * np.pi * blur_m / self.pitch_x_m) ** 2)

@@ -23,20 +23,6 @@ def ann_pairs(learner: AnnPairs, X: Array, y: Codes, groups: Codes) -> ScoresOfH
     Each network sees the examples of its pair, of 200 that are drawn from all labels, and makes ten steps of the
     Levenberg-Marquardt method, without a part held out to stop early; `exact` does what the learner does. Both
     accuracies are those of the whole half.
-
-    Parameters
-    ----------
-    learner
-        Learner of the recipe.
-    X : (n, n_features)
-        Features of all examples.
-    y, groups : (n,)
-        Number of the label and of the slide of each.
-
-    Returns
-    -------
-    callable
-        Takes which examples are used for training, (n,), returns scores (n, n_labels).
     """
     mean, scale = standardisation(X)
     standard = np.ascontiguousarray((X - mean) / scale)

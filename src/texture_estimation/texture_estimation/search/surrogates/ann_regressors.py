@@ -22,42 +22,12 @@ EXAMPLES = 16
 
 
 def ann1(regressor: Ann1, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-    """Return a scorer of one half split by one network whose output is the grade.
-
-    Parameters
-    ----------
-    regressor
-        Regressor of the recipe.
-    X : (n, n_features)
-        Features of all examples.
-    y, groups : (n,)
-        Grade and number of the texture of each.
-
-    Returns
-    -------
-    callable
-        Takes which examples are used for training, (n,), returns grades (n,).
-    """
+    """Return a scorer of one half split by one network whose output is the grade."""
     return _surrogate(regressor, X, y[None], groups, lambda outputs: np.clip(outputs[:, 0], SMOOTH, ROUGH))
 
 
 def ann5(regressor: Ann5, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-    """Return a scorer of one half split by a network for each grade.
-
-    Parameters
-    ----------
-    regressor
-        Regressor of the recipe.
-    X : (n, n_features)
-        Features of all examples.
-    y, groups : (n,)
-        Grade and number of the texture of each.
-
-    Returns
-    -------
-    callable
-        Takes which examples are used for training, (n,), returns grades (n,).
-    """
+    """Return a scorer of one half split by a network for each grade."""
     wanted = grade_membership(y).T.astype(np.float64)
     return _surrogate(regressor, X, wanted, groups, lambda outputs: mean_of_votes(outputs >= VOTE_THRESHOLD))
 

@@ -26,4 +26,9 @@ class RegressorSurrogate(Protocol):
         X : (n, n_features)
         y, groups : (n,)
             Grade that people gave, and number of the texture.
+
+        Returns
+        -------
+        callable
+            Takes which examples are used for training, (n,).
         """

@@ -27,4 +27,9 @@ class Surrogate(Protocol):
         X : (n, n_features)
         y, groups : (n,)
             Number of each example's label and slide.
+
+        Returns
+        -------
+        callable
+            Takes which examples are used for training, (n,).
         """

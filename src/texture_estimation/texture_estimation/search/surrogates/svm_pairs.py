@@ -29,20 +29,6 @@ def svm_pairs(learner: SvmPairs, X: Array, y: Codes, groups: Codes) -> ScoresOfH
 
     The kernel is computed once for all halves. So the features are standardised by all examples, not by the half
     alone: their scale differs by about one per cent, and no label is used. `exact` does it without that.
-
-    Parameters
-    ----------
-    learner
-        Learner of the recipe.
-    X : (n, n_features)
-        Features of all examples.
-    y, groups : (n,)
-        Number of the label and of the slide of each.
-
-    Returns
-    -------
-    callable
-        Takes which examples are used for training, (n,), returns scores (n, n_labels).
     """
     kernel = kernel_of(X, learner.kernel_scale, standardise=learner.standardise)
     votes = PairVotes(int(y.max()) + 1)

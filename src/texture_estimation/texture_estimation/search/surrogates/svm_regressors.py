@@ -14,22 +14,7 @@ from texture_estimation.search.surrogates.svm_pairs import CACHE_MB, TOLERANCE, 
 
 
 def svm5(regressor: Svm5, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
-    """Return a scorer with one SVM per grade, standardised over all examples as in `svm_pairs`.
-
-    Parameters
-    ----------
-    regressor
-        Regressor of the recipe.
-    X : (n, n_features)
-        Features of all examples.
-    y, groups : (n,)
-        Grade and number of the texture of each.
-
-    Returns
-    -------
-    callable
-        Takes which examples are used for training, (n,), returns grades (n,).
-    """
+    """Return a scorer with one SVM per grade, standardised over all examples as in `svm_pairs`."""
     from sklearn.svm import SVC  # noqa: PLC0415  # takes a second
 
     kernel = kernel_of(X, regressor.kernel_scale)

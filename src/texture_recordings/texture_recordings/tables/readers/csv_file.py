@@ -28,27 +28,7 @@ Line = tuple[int, str]  # its number in the file, from 1
 
 
 def read_csv(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the one table of a text file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    place
-        Its name for sentences.
-    mapping
-        Says how the file is read and what is wanted of it.
-
-    Yields
-    ------
-    Table
-        Its columns are read when asked for.
-
-    Raises
-    ------
-    InvalidData
-        If it is no such file, is damaged, or holds more than the limit.
-    """
+    """Yield the one table of a text file."""
     form = mapping.format
     with _lines(path, place, form) as lines:
         _, first = next(lines, (0, ''))

@@ -22,27 +22,7 @@ BROKEN = (OSError, ValueError, RuntimeError, KeyError, TypeError, OverflowError,
 
 
 def read_hdf5(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the tables of an HDF5 file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    place
-        Its name for sentences.
-    mapping
-        Says how the file is read and what is wanted of it.
-
-    Yields
-    ------
-    Table
-        Its columns are read when asked for.
-
-    Raises
-    ------
-    InvalidData
-        If it is no such file, is damaged, or holds more than the limit.
-    """
+    """Yield the tables of an HDF5 file."""
     yield from _tables(path, place, mapping, reverse=False)
 
 

@@ -37,27 +37,7 @@ COMPLEX = 0x800
 
 
 def read_mat(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the tables of a MATLAB file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    place
-        Its name for sentences.
-    mapping
-        Says how the file is read and what is wanted of it.
-
-    Yields
-    ------
-    Table
-        Its columns are read when asked for.
-
-    Raises
-    ------
-    InvalidData
-        If it is no such file, is damaged, or holds more than the limit.
-    """
+    """Yield the tables of a MATLAB file."""
     try:
         content = read_bounded(path, MAX_FILE_BYTES)
         if content.startswith(b'MATLAB 7.3'):

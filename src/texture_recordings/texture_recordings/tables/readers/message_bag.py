@@ -40,25 +40,6 @@ def read_message_bag(path: Path, place: str, mapping: TableMapping) -> Iterator[
     """Yield the one table of a bag: the topics that the mapping names, each with its time.
 
     Times are those of the headers, or of logging where there are none, from the first message of the bag on.
-
-    Parameters
-    ----------
-    path
-        The file.
-    place
-        Its name for sentences.
-    mapping
-        Says how the file is read and what is wanted of it.
-
-    Yields
-    ------
-    Table
-        Its columns are read when asked for.
-
-    Raises
-    ------
-    InvalidData
-        If it is no such file, is damaged, or holds more than the limit.
     """
     wanted = wanted_columns(mapping)
     topics: dict[str, _Topic] = {}

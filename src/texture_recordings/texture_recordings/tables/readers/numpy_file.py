@@ -13,27 +13,7 @@ from texture_recordings.tables.table import Table, budget_of
 
 
 def read_npz(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the tables of an .npz file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    place
-        Its name for sentences.
-    mapping
-        Says how the file is read and what is wanted of it.
-
-    Yields
-    ------
-    Table
-        Its columns are read when asked for.
-
-    Raises
-    ------
-    InvalidData
-        If it is no such file, is damaged, or holds more than the limit.
-    """
+    """Yield the tables of an .npz file."""
     try:
         with open_regular(path) as opened, Archive(opened) as archive:
             archive.budget = budget_of(path.stat().st_size)
@@ -46,27 +26,7 @@ def read_npz(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
 
 
 def read_npy(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the one table of an .npy file, whose columns count from 0.
-
-    Parameters
-    ----------
-    path
-        The file.
-    place
-        Its name for sentences.
-    mapping
-        Says how the file is read and what is wanted of it.
-
-    Yields
-    ------
-    Table
-        Its columns are read when asked for.
-
-    Raises
-    ------
-    InvalidData
-        If it is no such file, is damaged, or holds more than the limit.
-    """
+    """Yield the one table of an .npy file, whose columns count from 0."""
     try:
         with open_regular(path) as opened:
             array = read_array(opened, budget_of(path.stat().st_size), records=True)

@@ -21,27 +21,7 @@ BROKEN = (OSError, ValueError, KeyError, TypeError, NotImplementedError, Overflo
 
 
 def read_parquet(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the one table of a Parquet file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    place
-        Its name for sentences.
-    mapping
-        Says how the file is read and what is wanted of it.
-
-    Yields
-    ------
-    Table
-        Its columns are read when asked for.
-
-    Raises
-    ------
-    InvalidData
-        If it is no such file, is damaged, or holds more than the limit.
-    """
+    """Yield the one table of a Parquet file."""
     parquet = library('pyarrow.parquet', 'Parquet files', 'parquet')
     try:
         with open_regular(path) as opened:

@@ -23,27 +23,7 @@ BROKEN = (OSError, ValueError, EOFError, struct.error, TypeError, LookupError, A
 
 
 def read_wav(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
-    """Yield the one table of a sound file, whose columns count from 0.
-
-    Parameters
-    ----------
-    path
-        The file.
-    place
-        Its name for sentences.
-    mapping
-        Says how the file is read and what is wanted of it.
-
-    Yields
-    ------
-    Table
-        Its columns are read when asked for.
-
-    Raises
-    ------
-    InvalidData
-        If it is no such file, is damaged, or holds more than the limit.
-    """
+    """Yield the one table of a sound file, whose columns count from 0."""
     from scipy.io import wavfile  # noqa: PLC0415 – recording needs no scipy
 
     try:
