@@ -137,3 +137,40 @@ def test_what_the_sensor_reports_of_itself_is_reported() -> None:
     sensor.details = {'serial number': 'A7'}
     reader = SensorReader(sensor, lambda *_: None)
     assert SensorHealth(reader, 0.0).report(1.0)[2]['serial number'] == 'A7'
+
+
+class TwoFingers(Scripted):
+    """A sensor with two fingers on one line."""
+
+    @property
+    def expected_rates_hz(self):
+        return {'finger0/signal': 1000.0, 'finger0/imu': 1000.0, 'finger1/signal': 1000.0}
+
+
+def two_fingers_after(*seconds: tuple[str, ...]) -> tuple[str, str]:
+    """Return the last of the reports, one for each second, in which so many topics streamed."""
+    reader = SensorReader(TwoFingers(''), lambda *_: None)
+    reader.fault = ''
+    health = SensorHealth(reader, 0.0)
+    for number, streaming in enumerate(seconds, 1):
+        for topic in streaming:
+            reader.published[topic] += 1000
+        level, message, _ = health.report(float(number))
+    return level, message
+
+
+BOTH = ('finger0/signal', 'finger0/imu', 'finger1/signal')
+
+
+def test_a_finger_that_drops_out_is_an_error_with_its_name() -> None:
+    assert two_fingers_after(BOTH, BOTH) == ('OK', 'streaming')
+    dropped = two_fingers_after(BOTH, BOTH[:2], BOTH[:2])
+    assert dropped == ('ERROR', 'no sample comes any more of finger1; check its plug')
+    assert two_fingers_after(BOTH, BOTH[:2], BOTH[:2], BOTH) == ('OK', 'streaming')
+
+
+def test_a_finger_that_never_came_and_a_silent_inertial_unit_are_warnings_of_a_rate() -> None:
+    for streaming in (BOTH[:2], ('finger0/signal', 'finger1/signal')):
+        level, message = two_fingers_after(streaming, streaming, streaming)
+        assert level == 'WARN'
+        assert 'is off by more than' in message

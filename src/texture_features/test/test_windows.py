@@ -294,3 +294,18 @@ def test_a_stream_that_ended_is_forgotten_when_another_has_run_for_as_long_as_is
     for batch in stream(0.6, begin_s=1.0)[-40:]:
         kept.add(batch)
     assert [run.next_sample for run in kept.buffers] == [600]
+
+
+def test_a_finger_that_drops_out_beside_another_is_named_and_two_silent_ones_are_not() -> None:
+    fingers = ('finger0/signal', 'finger1/signal')
+    cutter = WindowCutter(PARAMS, fingers)
+    batches = stream(2.0, batch=500)
+    for topic in fingers:
+        cutter.add_signal(topic, batches[0])
+    cutter.time_out(100.0)
+    assert cutter.dropped(100.0) == ()
+    for number, batch in enumerate(batches[1:], 1):
+        cutter.add_signal('finger0/signal', batch)
+        cutter.time_out(100.0 + 0.5 * number)
+    assert cutter.dropped(101.5) == ('finger1/signal',)
+    assert cutter.dropped(103.0) == ()  # nothing comes at all: the sensor itself reports that

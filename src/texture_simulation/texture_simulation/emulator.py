@@ -15,8 +15,10 @@ from texture_core.catalogue import find
 from texture_core.parameters import param
 from texture_simulation.devices.device import EmulatedDevice
 from texture_simulation.devices.faults import ByteFaults
+from texture_simulation.devices.tsf85 import EmulatedTsf85
+from texture_simulation.devices.tsf85_encoder import FINGERS
 from texture_simulation.finger_receiver import FingerStateReceiver
-from texture_simulation.live_catalogue import LIVE_SENSORS, MakeLiveSensor, live_tsf85
+from texture_simulation.live_catalogue import LIVE_SENSORS, MakeLiveSensor, live_tsf85, live_tsf85_pair
 from texture_simulation.scene import Scene, load_scene
 
 BURST_S = 0.005
@@ -51,6 +53,12 @@ class EmulatorParams:
     )
     pvdf_link: str = param('', "Sets the path of the link to a PVDF finger beside the sensor; '' leaves it out.")
     plugged: bool = param(True, 'Plugs the emulated sensor in; setting it to false at run time unplugs it.')
+    unplugged_finger: int = param(
+        -1,
+        'Sets the finger of a TSF-85 whose plug is out of the hub, which may be set at run time; -1 is none.',
+        low=-1,
+        high=1,
+    )
     bit_flips: float = param(
         0.0,
         'Sets the probability that one bit of a byte of the sensor flips on the line; it may be set at run time.',
@@ -92,7 +100,8 @@ class Emulator:
             name: partial(live_tsf85, layout=name, finger=params.finger, long_stamps=params.long_stamps)
             for name in ('tsf85', 'tsf85_3x4')
         }
-        makers: dict[str, MakeLiveSensor] = {**LIVE_SENSORS, **tsf85}
+        pair = partial(live_tsf85_pair, long_stamps=params.long_stamps)
+        makers: dict[str, MakeLiveSensor] = {**LIVE_SENSORS, **tsf85, 'tsf85_pair': pair}
         sensor = params.sensor or self.scene.sensor
         find(makers, sensor, 'sensor')
         links = [(sensor, params.sensor_link), ('daq', params.daq_link), ('pvdf', params.pvdf_link)]
@@ -105,6 +114,7 @@ class Emulator:
         self._commands: list[Callable[[], None]] = []
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name='emulator', daemon=True)
+        self.unplug_finger(params.unplugged_finger)
 
     def __enter__(self) -> Emulator:
         self.start()
@@ -163,6 +173,12 @@ class Emulator:
     def replug(self) -> None:
         """Plug the sensor in again; it gets another device name and counts from 0."""
         self._in_thread(self.device.plug)
+
+    def unplug_finger(self, finger: int) -> None:
+        """Pull the plug of one finger of a TSF-85 out of its hub; -1 plugs all in."""
+        device = self.device
+        if isinstance(device, EmulatedTsf85):
+            self._in_thread(partial(device.plug_fingers, [finger != other for other in range(FINGERS)]))
 
     def flip_bits(self, probability: float) -> None:
         """Make the line of the sensor a bad one; 0 makes it a good one again."""

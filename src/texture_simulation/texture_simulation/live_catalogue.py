@@ -20,7 +20,7 @@ from texture_simulation.devices.pvdf import EmulatedPvdf
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 from texture_simulation.live_sensor import LiveSensor
 from texture_simulation.scene import Scene
-from texture_simulation.sensors import anyskin, biotac, daq, papillarray, pvdf, tsf85
+from texture_simulation.sensors import anyskin, biotac, daq, papillarray, pvdf, tsf85, tsf85_pair
 from texture_simulation.surfaces.surface import Surface
 
 
@@ -83,6 +83,45 @@ def live_tsf85(
     """
     model = tsf85.Tsf85Model(scene, surface, rng, TSF85S[layout])
     device = EmulatedTsf85(link, rng, finger, long_stamps)
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.advance(*model.advance(path)),
+        device.skip,
+        rate_hz=RATE_HZ,
+        points=tsf85.OVERSAMPLING,
+    )
+
+
+def live_tsf85_pair(
+    scene: Scene,
+    surface: Surface,
+    link: FilePath,
+    rng: np.random.Generator,
+    *,
+    long_stamps: bool = True,
+) -> LiveSensor:
+    """Return a TSF-85 of which both fingers touch.
+
+    Parameters
+    ----------
+    scene
+        Scene: sensor, contact and effects.
+    surface
+        Surface that is touched.
+    link
+        Symbolic link that leads to the device.
+    rng
+        All random numbers: positions on the sample, effects, noise.
+    long_stamps
+        64-bit stamps (firmware from 1.1.7 on) or 16-bit ones.
+
+    Returns
+    -------
+    LiveSensor
+        Not started: its first `advance` is the beginning of its time.
+    """
+    model, device = tsf85_pair.Tsf85Pair(scene, surface, rng), EmulatedTsf85(link, rng, long_stamps=long_stamps)
     return LiveSensor(
         model,
         device,
@@ -162,6 +201,7 @@ def live_papillarray(scene: Scene, surface: Surface, link: FilePath, rng: np.ran
 
 LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'tsf85': live_tsf85,
+    'tsf85_pair': live_tsf85_pair,
     'tsf85_3x4': partial(live_tsf85, layout='tsf85_3x4'),
     'biotac': live_biotac,
     'daq': live_daq,

@@ -9,17 +9,33 @@ from texture_core.finger_state import FingerState
 from texture_core.signal import NANOSECONDS
 from texture_simulation.devices.device import EmulatedDevice
 from texture_simulation.finger_track import FingerTrack
-from texture_simulation.skin_contact import SkinContact
+from texture_simulation.surfaces.surface import Surface
 from texture_simulation.trajectory import Trajectory
 
 # After a longer stall of the machine the rest is skipped, and the driver sees a loss: the line's buffer takes no more.
 LONGEST_BURST_S = 0.25
 
 
+class Contact(Protocol):
+    """Where a finger, or several, touch a surface."""
+
+    @property
+    def surface(self) -> Surface:
+        """What is touched; it may be set."""
+
+    @surface.setter
+    def surface(self, surface: Surface) -> None: ...
+
+    def relocate(self) -> None:
+        """Let the sample lie otherwise from now on."""
+
+
 class ContactModel(Protocol):
     """What a sensor model lets the emulator change."""
 
-    touch: SkinContact
+    @property
+    def touch(self) -> Contact:
+        """Where it touches."""
 
 
 class LiveSensor:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from texture_core.exploration import ExplorationState
 from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_recordings.bag_writer import BagWriter
@@ -40,6 +41,12 @@ class SlidePlan:
     slide_s: float = param(3.0, 'Sets the duration of the steady part of a slide.', unit='s', low=0.1, high=600.0)
     direction_rad: float = param(
         0.0, 'Sets the direction of travel, from +x towards +y.', unit='rad', low=-10.0, high=10.0
+    )
+    fingers: int = param(
+        1,
+        "Sets the number of fingers that slide together; the topics of several are 'finger0/signal' and so on.",
+        low=1,
+        high=5,
     )
 
 
@@ -81,16 +88,29 @@ def _write_surface(path: Path, scene: Scene, plan: SlidePlan, start_ns: int, rng
     first: dict[str, int] = {}
     with BagWriter(path) as bag:
         for number in range(1, plan.slides + 1):
-            states, signals = simulate_exploration(
-                scene, path.name, plan.speed_m_s, plan.force_n, plan.slide_s,
-                start_ns=start_ns, exploration_id=f'{path.name}/slide{number:02d}', rng=rng,
-                direction_rad=plan.direction_rad,
-            )  # fmt: skip
+            states, signals = _slide(scene, plan, start_ns, f'{path.name}/slide{number:02d}', rng)
             streams = {topic: _running_on(batches, first, topic) for topic, batches in signals.items()}
             for log_ns, topic, value in _in_order(states, streams):
                 bag.write(topic, value, log_ns)
             start_ns = log_ns + PAUSE_NS
     return start_ns
+
+
+def _slide(
+    scene: Scene, plan: SlidePlan, start_ns: int, exploration_id: str, rng: np.random.Generator
+) -> tuple[list[ExplorationState], dict[str, Iterable[TactileSignal]]]:
+    """Return the states of a slide, and the signals of all its fingers by topic, each finger with traits of its own."""
+    surface = exploration_id.rpartition('/')[0]
+    signals: dict[str, Iterable[TactileSignal]] = {}
+    for finger in reversed(range(plan.fingers)):
+        states, of_finger = simulate_exploration(
+            scene, surface, plan.speed_m_s, plan.force_n, plan.slide_s,
+            start_ns=start_ns, exploration_id=exploration_id, rng=rng,
+            direction_rad=plan.direction_rad, finger=finger,
+        )  # fmt: skip
+        prefix = f'finger{finger}/' if plan.fingers > 1 else ''
+        signals |= {f'{prefix}{topic}': batches for topic, batches in of_finger.items()}
+    return states, signals
 
 
 def _running_on(batches: Iterable[TactileSignal], first: dict[str, int], topic: str) -> list[TactileSignal]:

@@ -93,6 +93,9 @@ class FeatureExtractor(Node):
         waiting = self._cutter.waiting_for
         if waiting:
             return 'WARN', f'nothing has come yet on {", ".join(waiting)}', numbers
+        dropped = self._cutter.dropped(time.monotonic())
+        if dropped:
+            return 'WARN', f'nothing comes any more on {", ".join(dropped)}; no window can be cut without it', numbers
         tare_faults = self._feature_set.tare_faults(self._sensors)
         if tare_faults:
             return 'WARN', '; '.join(tare_faults), numbers

@@ -22,6 +22,7 @@ from texture_features.windowing.sample_buffer import BufferedStream, SampleBuffe
 from texture_features.windowing.slide_coverage import CoveredSpan, SlideCoverage
 
 TIMEOUT_S = 0.3
+DROPPED_S = 1.0  # an input that is silent for so long while others come is reported
 ALL = 1 << 62
 
 
@@ -208,6 +209,16 @@ class WindowCutter:
     def waiting_for(self) -> tuple[str, ...]:
         """Inputs of which nothing has come yet."""
         return tuple(topic for topic, source in self._inputs.items() if not source.stream.buffers)
+
+    def dropped(self, now_s: float) -> tuple[str, ...]:
+        """Return the inputs that came once and are silent while another still comes, by the clock of `time_out`."""
+        ages_s = {
+            topic: 0.0 if source.received else now_s - source.received_s
+            for topic, source in self._inputs.items()
+            if source.stream.buffers
+        }
+        fresh = any(age_s < DROPPED_S for age_s in ages_s.values())
+        return tuple(topic for topic, age_s in ages_s.items() if fresh and age_s >= DROPPED_S)
 
     @property
     def counts(self) -> dict[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,10 @@ class EmulatedTsf85(EmulatedDevice):
         super().reset()
         self._clock_ms = 0
         self.started = False
+
+    def plug_fingers(self, plugged: Sequence[bool]) -> None:
+        """Pull the plugs of fingers, or plug them in again, one flag a finger; the hub stays on its line."""
+        self._encoder.plug(plugged)
 
     def advance(self, dynamic: Counts, images: Image) -> None:
         """Let as many milliseconds pass as there are dynamic values, and send them if started.

@@ -7,7 +7,7 @@ images every millisecond in packets of their own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,15 +38,21 @@ class Tsf85Encoder:
 
     def __init__(self, finger: int = 0, long_stamps: bool = True, stamped: bool = True) -> None:
         self._finger = finger
+        self._plugged = (True,) * FINGERS
         self._long_stamps = long_stamps
         self._stamped = stamped
         self._stamp_type = '>u8' if long_stamps else '>u2'
         self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
         self._stamp_at = slice(5, 5 + np.dtype(self._stamp_type).itemsize) if stamped else slice(4, 4)
 
+    def plug(self, plugged: Sequence[bool]) -> None:
+        """Send items of the fingers that are plugged in alone, one flag a finger."""
+        self._plugged = tuple(plugged)
+        self._template = np.frombuffer(self._resting_packet(), dtype=np.uint8)
+
     def _resting_packet(self) -> bytes:
         items = b'\x70' + bytes(8 if self._long_stamps else 2) if self._stamped else b''
-        for finger in range(FINGERS):
+        for finger in self._present:
             head = finger << 2
             items += bytes([0x20 | head, 0, 0])
             items += bytes([0x30 | head]) + RESTING_ACCELERATION + bytes([0x40 | head]) + RESTING_ROTATION
@@ -97,7 +103,7 @@ class Tsf85Encoder:
         if self._stamped:
             rows[:, self._stamp_at] = stamps[:, None].view(np.uint8)
         for finger, counts in self._by_finger(dynamic.T):
-            at = self._stamp_at.stop + finger * 17 + 1
+            at = self._stamp_at.stop + self._present.index(finger) * 17 + 1
             rows[:, at : at + 2] = counts.astype('>i2')[:, None].view(np.uint8)
         images = [_image_packet(finger, taxels) for finger, taxels in self._by_finger(image)]
         for number, row in enumerate(rows):
@@ -106,8 +112,13 @@ class Tsf85Encoder:
             yield row.tobytes()
 
     def _by_finger(self, values: NDArray[Any]) -> Iterator[tuple[int, NDArray[Any]]]:
-        """Yield finger and values of each that senses, (n,) or (2, n)."""
-        yield from [(self._finger, values)] if values.ndim == 1 else enumerate(values)
+        """Yield finger and values of each that senses and is plugged in, (n,) or (2, n)."""
+        each = [(self._finger, values)] if values.ndim == 1 else enumerate(values)
+        yield from ((finger, row) for finger, row in each if self._plugged[finger])
+
+    @property
+    def _present(self) -> list[int]:
+        return [finger for finger, plugged in enumerate(self._plugged) if plugged]
 
 
 def _image_packet(finger: int, taxels: NDArray[Any]) -> bytes:

@@ -14,7 +14,7 @@ from texture_core.ros.run import run
 from texture_simulation.emulator import Emulator, EmulatorParams
 
 # What an operator can do at run time: swap the sample, unplug the sensor, disturb the line.
-CHANGEABLE = ('surface', 'plugged', 'bit_flips')
+CHANGEABLE = ('surface', 'plugged', 'unplugged_finger', 'bit_flips')
 
 
 class EmulatorNode(Node):
@@ -46,6 +46,7 @@ class EmulatorNode(Node):
         except UnknownName as error:
             raise InvalidParameter(str(error)) from error
         self._emulator.flip_bits(params.bit_flips)
+        self._emulator.unplug_finger(params.unplugged_finger)
         if params.plugged != self._params.plugged:
             (self._emulator.replug if params.plugged else self._emulator.unplug)()
         self._params = params
