@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch
+from texture_evaluation.evaluate import evaluate
+from texture_evaluation.train import train_from_bags
 from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import cut_recording
 from texture_recordings.bag_writer import BagWriter
@@ -58,3 +60,20 @@ def test_lost_samples_leave_windows_out_and_no_more(simulated: Path, tmp_path: P
     assert 0 < len(broken.labels) < len(whole.labels)
     kept = {row.tobytes() for row in whole.values}
     assert all(row.tobytes() in kept for row in broken.values)
+
+
+def test_a_joined_recipe_is_trained_from_bags_of_two_fingers(
+    tmp_path: Path,
+) -> None:
+    plan = SlidePlan(slides=6, slide_s=1.2, fingers=2)
+    bags = write_simulated(tmp_path, plan, np.random.default_rng(3), surfaces=('glass', 'ridge_2mm_deep'))
+    model = train_from_bags('two-fingers', bags, '1-4')
+    topics = ('finger0/signal', 'finger1/signal')
+    assert model.recipe.feature_set.topics == topics
+    slides = SlideDataset.from_bags(bags, topics=topics).slides
+    for slide in slides:  # each finger has traits of its own, at the same time
+        first, second = (slide.signals[topic] for topic in topics)
+        assert first[0].stamp_ns == second[0].stamp_ns
+        assert not np.array_equal(first[0].samples, second[0].samples)
+    figures = evaluate(model, bags, '5-6').as_json()
+    assert figures['window_accuracy'] > 0.9

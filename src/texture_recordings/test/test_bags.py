@@ -18,7 +18,7 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.features import FeatureVector
 from texture_core.signal import TactileSignal
 from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import find_bags, read_bag, read_raw
+from texture_recordings.bags import find_bags, read_bag, read_raw, topics_in
 from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode, encode
 
 if sys.version_info >= (3, 14):
@@ -102,6 +102,29 @@ def test_of_several_namespaces_one_must_be_named(tmp_path: Path) -> None:
         list(read_bag(tmp_path / 'bag', namespace='middle'))
     ((_, _, value),) = read_bag(tmp_path / 'bag', namespace='/right')
     assert value.first_sample == 2
+
+
+def test_the_fingers_of_an_explorer_are_of_its_namespace_and_keep_their_names(tmp_path: Path) -> None:
+    state = VALUES[1][1]
+    with BagWriter(tmp_path / 'bag') as bag:
+        for arm in ('left', 'right'):
+            bag.write(f'{arm}/exploration', state, STAMP_NS)
+        for topic in ('left/finger0/signal', 'left/finger1/signal', 'right/signal'):
+            bag.write(topic, signal(), STAMP_NS)
+    assert topics_in(tmp_path / 'bag', 'left') == ['exploration', 'finger0/signal', 'finger1/signal']
+    assert [topic for topic, _, _ in read_bag(tmp_path / 'bag', ('finger1/signal', 'signal'), 'left')] == [
+        'finger1/signal'
+    ]
+    assert {topic for topic, _, _ in read_bag(tmp_path / 'bag', None, 'right')} == {'exploration', 'signal'}
+    with pytest.raises(InvalidData, match='the namespaces /left, /right; name one of them'):
+        topics_in(tmp_path / 'bag')
+
+
+def test_without_an_explorer_each_folder_of_signals_is_a_namespace(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / 'bag') as bag:
+        for topic in ('finger0/signal', 'finger1/signal'):
+            bag.write(topic, signal(), STAMP_NS)
+    assert [topic for topic, _, _ in read_bag(tmp_path / 'bag', namespace='finger1')] == ['signal']
 
 
 def test_only_the_stretch_asked_for_is_read(tmp_path: Path) -> None:

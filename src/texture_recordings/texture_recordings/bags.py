@@ -32,6 +32,9 @@ BROKEN = (
 )  # fmt: skip
 
 
+EXPLORATION = 'exploration'
+
+
 class RawMessage(NamedTuple):
     """One message as it lies in a bag.
 
@@ -112,7 +115,25 @@ def read_raw(
     InvalidData
         If there is no bag, it is damaged or foreign, or has several namespaces and none was named.
     """
-    return _read(Path(path), lambda connection: True, namespace, start_ns, stop_ns)
+    return (message for _, message in read_named(path, namespace, start_ns, stop_ns))
+
+
+def read_named(
+    path: str | Path, namespace: str | None = None, start_ns: int | None = None, stop_ns: int | None = None
+) -> Iterator[tuple[str, RawMessage]]:
+    """Yield what `read_raw` yields, each with the name of its topic below its namespace, 'signal' or 'finger0/signal'.
+
+    Parameters
+    ----------
+    path, namespace, start_ns, stop_ns
+        As of `read_raw`.
+
+    Raises
+    ------
+    InvalidData
+        As `read_raw` does.
+    """
+    return _read(Path(path), lambda connection, name: True, namespace, start_ns, stop_ns)
 
 
 def read_bag(
@@ -124,15 +145,16 @@ def read_bag(
 ) -> Iterator[tuple[str, int, Any]]:
     """Yield (topic, log time in ns, data class of texture_core) in the order of log times.
 
-    Only messages of the suite are read. Topics are named by their last part, 'signal' for '/left/signal', in
-    `topics` as in the answer; samples are views of the bytes read. The other arguments are those of `read_raw`.
+    Only messages of the suite are read. Topics are named as below their namespace, 'signal' for '/left/signal' and
+    'finger0/signal' for the first of several fingers, in `topics` as in the answer; samples are views of the bytes
+    read. The other arguments are those of `read_raw`.
 
     Parameters
     ----------
     path
         The bag.
     topics
-        Last parts of the topics to read; None for all.
+        Names of the topics to read below their namespace; None for all.
     namespace
         Only topics of this namespace; None if the bag has but one.
     start_ns, stop_ns
@@ -141,7 +163,7 @@ def read_bag(
     Yields
     ------
     (str, int, object)
-        Last part of the topic, log time in ns, and data class.
+        Name of the topic below its namespace, log time in ns, and data class.
 
     Raises
     ------
@@ -151,10 +173,10 @@ def read_bag(
     wanted = None if topics is None else set(topics)
     signals: dict[str, SignalDecoder] = {}
 
-    def chosen(connection: Connection) -> bool:
-        return connection.msgtype in MESSAGES and (wanted is None or short_name(connection.topic) in wanted)
+    def chosen(connection: Connection, name: str) -> bool:
+        return connection.msgtype in MESSAGES and (wanted is None or name in wanted)
 
-    for message in _read(Path(path), chosen, namespace, start_ns, stop_ns):
+    for name, message in _read(Path(path), chosen, namespace, start_ns, stop_ns):
         try:
             if message.msgtype == TYPES[TactileSignal]:
                 value: Any = signals.setdefault(message.topic, SignalDecoder()).decode(message.data)
@@ -162,7 +184,30 @@ def read_bag(
                 value = decode(message.data, message.msgtype)
         except InvalidData as error:
             raise InvalidData(f"the bag '{path}' is damaged: {error}; record it again") from error
-        yield short_name(message.topic), message.log_ns, value
+        yield name, message.log_ns, value
+
+
+def topics_in(path: str | Path, namespace: str | None = None) -> list[str]:
+    """Return the names of the topics of the suite in a bag, below their namespace, sorted.
+
+    Parameters
+    ----------
+    path, namespace
+        As of `read_raw`.
+
+    Raises
+    ------
+    InvalidData
+        As `read_raw` does.
+    """
+    names: set[str] = set()
+
+    def note(connection: Connection, name: str) -> bool:
+        names.update([name] if connection.msgtype in MESSAGES else [])
+        return False
+
+    assert not list(_read(Path(path), note, namespace, None, None))
+    return sorted(names)
 
 
 def read_foreign(path: str | Path, chosen: Callable[[Connection], bool]) -> Iterator[RawMessage]:
@@ -180,18 +225,19 @@ def read_foreign(path: str | Path, chosen: Callable[[Connection], bool]) -> Iter
     InvalidData
         If there is no bag or it is damaged.
     """
-    return _read(Path(path), chosen, None, None, None, foreign=True)
+    found = _read(Path(path), lambda connection, name: chosen(connection), None, None, None, foreign=True)
+    return (message for _, message in found)
 
 
 def _read(
     path: Path,
-    chosen: Callable[[Connection], bool],
+    chosen: Callable[[Connection, str], bool],
     namespace: str | None,
     start_ns: int | None,
     stop_ns: int | None,
     *,
     foreign: bool = False,
-) -> Iterator[RawMessage]:
+) -> Iterator[tuple[str, RawMessage]]:
     if not is_bag(path):
         raise InvalidData(_no_bag(path))
     try:
@@ -205,7 +251,8 @@ def _read(
                 if hasattr(storage, 'chunks'):
                     check_index(storage)
             own = reader.connections if foreign else _of_namespace(path, reader.connections, namespace)
-            connections = [c for c in own if chosen(c)]
+            names = topic_names(c.topic for c in reader.connections if c.msgtype in MESSAGES)
+            connections = [c for c in own if chosen(c, names.get(c.topic, c.topic))]
             if not connections or not reader.message_count:
                 return
             missing = sum(connection.msgcount for connection in connections)
@@ -213,7 +260,8 @@ def _read(
                 missing -= 1
                 budget.spend(len(data))
                 limit.spend(len(data), connection.msgtype == TYPES[TactileSignal])
-                yield RawMessage(connection.topic, connection.msgtype, log_ns, data)
+                name = names.get(connection.topic, connection.topic)
+                yield name, RawMessage(connection.topic, connection.msgtype, log_ns, data)
             if missing and start_ns is None and stop_ns is None:
                 raise ReaderError(f'{missing} of its messages are missing')
     except BROKEN as error:
@@ -245,11 +293,39 @@ def _of_namespace(path: Path, connections: list[Connection], namespace: str | No
             raise InvalidData(
                 f"the bag '{path}' was recorded with another definition of {connection.msgtype}; record it again"
             )
-    found = sorted({c.topic.rsplit('/', 1)[0] or '/' for c in ours})
+    names = topic_names(c.topic for c in ours)
+    namespaces = {topic: topic.removesuffix(name).rstrip('/') or '/' for topic, name in names.items()}
+    found = sorted(set(namespaces.values()))
     if namespace is None and len(found) > 1:
         raise InvalidData(f"the bag '{path}' has the namespaces {', '.join(found)}; name one of them")
     prefix = found[0] if namespace is None else '/' + namespace.strip('/')
     if prefix not in found:
         raise InvalidData(f"the bag '{path}' has no namespace '{prefix}'; it has {', '.join(found)}")
     common = [c for c in connections if c.topic == '/diagnostics']
-    return [c for c in ours if (c.topic.rsplit('/', 1)[0] or '/') == prefix] + common
+    return [c for c in ours if namespaces[c.topic] == prefix] + common
+
+
+def topic_names(topics: Iterable[str]) -> dict[str, str]:
+    """Return the name of each topic below its namespace, which is the folder of its explorer.
+
+    Several fingers of one explorer stream on 'finger0/signal' and so on; a topic without an explorer above it belongs
+    to the folder in which it is.
+
+    Examples
+    --------
+    >>> topic_names(['/left/exploration', '/left/finger0/signal', '/right/signal'])
+    {'/left/exploration': 'exploration', '/left/finger0/signal': 'finger0/signal', '/right/signal': 'signal'}
+    """
+    given = list(topics)
+    explorers = {_folder(topic) for topic in given if short_name(topic) == EXPLORATION}
+    names = {}
+    for topic in given:
+        folder = _folder(topic)
+        while folder and folder not in explorers:
+            folder = _folder(folder)
+        names[topic] = topic.removeprefix(f'{folder}/') if folder in explorers else short_name(topic)
+    return names
+
+
+def _folder(topic: str) -> str:
+    return topic.rpartition('/')[0]

@@ -12,7 +12,7 @@ from texture_core.signal import TactileSignal
 from texture_features.segmentation.segments import SegmentationParams
 from texture_features.segmentation.slide_segmenter import segment_recording
 from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import RawMessage, find_bags, read_bag, read_raw, short_name
+from texture_recordings.bags import RawMessage, find_bags, read_bag, read_named
 
 FAST_TOPIC, SLOW_TOPIC, STATE_TOPIC = 'signal', 'signal_static', 'exploration'
 
@@ -98,11 +98,11 @@ def _write(path: Path, out: Path, states: Sequence[ExplorationState], namespace:
     waiting = list(states)
     with BagWriter(out) as bag:
         prefix = ''
-        for message in read_raw(path, namespace):
-            prefix = prefix or _prefix(message)
+        for name, message in read_named(path, namespace):
+            prefix = prefix or _prefix(name, message)
             while waiting and waiting[0].stamp_ns <= message.log_ns:
                 _put(bag, waiting.pop(0), prefix)
-            if short_name(message.topic) != STATE_TOPIC:
+            if name != STATE_TOPIC:
                 bag.write_raw(message)
         for state in waiting:
             _put(bag, state, prefix)
@@ -112,6 +112,6 @@ def _put(bag: BagWriter, state: ExplorationState, prefix: str) -> None:
     bag.write(f'{prefix}/{STATE_TOPIC}', state, state.stamp_ns)
 
 
-def _prefix(message: RawMessage) -> str:
+def _prefix(name: str, message: RawMessage) -> str:
     """Return the namespace of a message of the finger, '' for the root."""
-    return '' if message.topic == '/diagnostics' else message.topic.rsplit('/', 1)[0]
+    return '' if message.topic == '/diagnostics' else message.topic.removesuffix(f'/{name}')

@@ -17,13 +17,14 @@ from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
 from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import RawMessage
+from texture_recordings.bags import RawMessage, short_name
 from texture_recordings.cdr import SignalDecoder
 from texture_recordings.continuity import Continuity
 from texture_recordings.ros.topics import TOPICS, Topic
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
 POLL_S = 0.2
+DISCOVERY_S = 0.5  # how often it is asked what else is published
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class RecordParams:
 
 
 class RecordNode(Node):
-    """Write every message of the suite's topics to a bag, with the time of its arrival."""
+    """Write every message of the suite's topics, in its namespace and below it, to a bag, with its time of arrival."""
 
     def __init__(self) -> None:
         super().__init__('record')
@@ -50,10 +51,13 @@ class RecordNode(Node):
         self._error: OSError | None = None
         self._writer = threading.Thread(target=self._write, name='writer')
         self._writer.start()
+        self._namespace = self.get_namespace().rstrip('/')
+        self._subscribed: set[str] = set()
         for topic in TOPICS.values():
-            self._subscribe(topic)
+            self._subscribe(topic, self.resolve_topic_name(topic.name))
         self._diagnostics = Diagnostics(self, self._report)
         self.create_timer(POLL_S, self._check)
+        self.create_timer(DISCOVERY_S, self._find_more)
         self.get_logger().info(f"recording {', '.join(TOPICS)} to '{self._path}'")
 
     def shutdown(self) -> None:
@@ -68,12 +72,21 @@ class RecordNode(Node):
             self.get_logger().info(f"'{self._path}' is complete: {self._report()[1]}")
             self._diagnostics.end()
 
-    def _subscribe(self, topic: Topic) -> None:
-        name = self.resolve_topic_name(topic.name)
+    def _find_more(self) -> None:
+        """Subscribe to what has appeared below the namespace: further fingers, and the nodes of further namespaces."""
+        for name, types in self.get_topic_names_and_types():
+            topic = TOPICS.get(short_name(name))
+            ours = topic is not None and name.startswith(f'{self._namespace}/')
+            if topic is not None and ours and name not in self._subscribed and topic.msgtype in types:
+                self._subscribe(topic, name)
+                self.get_logger().info(f"recording '{name}', too")
+
+    def _subscribe(self, topic: Topic, name: str) -> None:
+        self._subscribed.add(name)
         # Deep queues: a burst must not be lost while the executor is busy. Volatile: of an exploration that was over
         # before the recording began, the states alone would come, without the signal.
         qos = QoSProfile(depth=1000, reliability=topic.qos.reliability)
-        self.create_subscription(topic.type, topic.name, lambda raw: self._on_message(name, topic, raw), qos, raw=True)
+        self.create_subscription(topic.type, name, lambda raw: self._on_message(name, topic, raw), qos, raw=True)
 
     def _on_message(self, name: str, topic: Topic, raw: bytes) -> None:
         message = RawMessage(name, topic.msgtype, self.get_clock().now().nanoseconds, raw)

@@ -17,7 +17,7 @@ from texture_core.errors import DeviceError, InvalidParameter, TextureError
 from texture_core.parameters import param
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
-from texture_recordings.bags import RawMessage, find_bags, read_raw, short_name
+from texture_recordings.bags import RawMessage, find_bags, read_named, short_name, topics_in
 from texture_recordings.ros.topics import TOPICS
 from texture_recordings.schedule import Schedule
 from texture_recordings.slides import find_slides
@@ -60,9 +60,9 @@ class ReplayNode(Node):
         self._params = declare(self, ReplayParams)
         if not self._params.bag:
             raise InvalidParameter("parameter 'bag' is ''; give the bag to replay")
-        self._messages = self._chosen()
-        topics = {name: TOPICS[name] for name in INPUTS}
-        self._outputs = {name: self.create_publisher(t.type, t.name, t.qos) for name, t in topics.items()}
+        self._messages, names = self._chosen()
+        topics = {name: TOPICS[short_name(name)] for name in names}
+        self._outputs = {name: self.create_publisher(t.type, name, t.qos) for name, t in topics.items()}
         self._counts: Counter[str] = Counter()
         self._stop = threading.Event()
         self._error: TextureError | None = None
@@ -75,14 +75,20 @@ class ReplayNode(Node):
         self._stop.set()
         self._player.join()
 
-    def _chosen(self) -> Iterator[RawMessage]:
-        """Return the messages to publish; a bag that cannot be read is refused here, before any thread runs."""
+    def _chosen(self) -> tuple[Iterator[tuple[str, RawMessage]], set[str]]:
+        """Return the messages to publish, each with its topic, and all topics.
+
+        A bag that cannot be read is refused here, before any thread runs.
+        """
         namespace = self._params.from_namespace or None
         bags = find_bags([self._params.bag])
+        inside = {name for bag in bags for name in topics_in(bag, namespace) if short_name(name) in INPUTS}
+        # With several fingers there is no topic of a single one.
+        names = {'exploration', *inside} if any('/' in name for name in inside) else set(INPUTS)
         if not self._params.slides:
-            return (message for bag in bags for message in read_raw(bag, namespace))
+            return (message for bag in bags for message in read_named(bag, namespace)), names
         chosen = find_slides(bags, self._params.slides, namespace)
-        return (message for s in chosen for message in read_raw(s.bag, namespace, s.start_ns, s.stop_ns))
+        return (message for s in chosen for message in read_named(s.bag, namespace, s.start_ns, s.stop_ns)), names
 
     def _check(self) -> None:
         """End the node when the player is through; a fault of the player is raised where it is seen."""
@@ -113,14 +119,15 @@ class ReplayNode(Node):
 
     def _listeners(self) -> dict[str, int]:
         """Return how many subscriptions there are; those of `features` tell that a classifier is ready, too."""
-        matched = {name: self._outputs[name].get_subscription_count() for name in ('signal', 'exploration')}
-        return {**matched, 'features': self.count_subscribers('features')}
+        counts = {name: output.get_subscription_count() for name, output in self._outputs.items()}
+        # Of several fingers the live graph may use one.
+        signal = max(count for name, count in counts.items() if short_name(name) != 'exploration')
+        return {'signal': signal, 'exploration': counts['exploration'], 'features': self.count_subscribers('features')}
 
     def _publish_all(self) -> None:
         schedule = Schedule(self._params.rate, self._params.longest_pause_s)
         start, latest_s = time.monotonic(), 0.0
-        for message in self._messages:
-            name = short_name(message.topic)
+        for name, message in self._messages:
             if name not in self._outputs:
                 continue
             ahead_s = schedule.due_s(message.log_ns) - (time.monotonic() - start)
