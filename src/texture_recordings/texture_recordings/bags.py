@@ -128,6 +128,11 @@ def read_named(
     path, namespace, start_ns, stop_ns
         As of `read_raw`.
 
+    Yields
+    ------
+    (str, RawMessage)
+        Name below the namespace, and the message.
+
     Raises
     ------
     InvalidData

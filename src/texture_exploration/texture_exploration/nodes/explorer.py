@@ -120,14 +120,19 @@ class ExplorerNode(Node):
         params = declare(self, SignalWatchParams)
         if not params.watch_signal:
             return no_signal_watch
-        watch = SignalWatch(params.signal_timeout_s, time.monotonic_ns)
-        # The bytes as they come: what they say is the business of others.
-        self.create_subscription(msg.TactileSignal, 'signal', lambda _data: watch.on_samples(), SENSOR_QOS, raw=True)
+        # The full name tells which finger of which arm; at the root 'signal' is what everybody calls it.
+        names = {topic: self.resolve_topic_name(topic).removeprefix('/') for topic in params.topics}
+        watch = SignalWatch(params.signal_timeout_s, time.monotonic_ns, tuple(names.values()))
+        for topic, name in names.items():
+            # The bytes as they come: what they say is the business of others.
+            self.create_subscription(
+                msg.TactileSignal, topic, lambda _data, name=name: watch.on_samples(name), SENSOR_QOS, raw=True
+            )
         return watch.signal_fault
 
     def _follow_parameters(self) -> None:
         """Let changed parameters hold from the next exploration on; those of arm and sensor are fixed."""
-        on_change(self, EarlyStoppingParams, partial(setattr, self, '_certainty'))
+        on_change(self, EarlyStoppingParams, partial(setattr, self, '_early_stopping'))
         on_change(self, TouchParams, partial(setattr, self._explorer, 'touch'))
         on_change(self, SafetyLimits, partial(setattr, self._explorer, 'limits'))
 

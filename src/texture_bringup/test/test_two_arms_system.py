@@ -1,0 +1,119 @@
+"""Two arms in two namespaces, one of them with two fingers, as a user starts them: they explore at once."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
+from texture_msgs.msg import TactileSignal  # noqa: E402
+
+from texture_bringup.demo.isolation import free_port  # noqa: E402
+from texture_bringup.ros.operator import ExplorationResult, Operator  # noqa: E402
+from texture_core.exploration import ExplorationRequest  # noqa: E402
+from texture_core.ros.local_graph import LocalGraph  # noqa: E402
+from texture_core.ros.qos import SENSOR_QOS  # noqa: E402
+from texture_evaluation.train import train_from_bags  # noqa: E402
+from texture_launch.child import ChildLauncher  # noqa: E402
+from texture_recordings.bags import topics_in  # noqa: E402
+from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
+
+DOMAIN = 84
+DEADLINE_S = 90.0
+SURFACES = {'left': 'glass', 'right': 'ridge_2mm_deep'}
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
+LONG = ExplorationRequest('linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.09)
+FINGERS = 'finger0/signal finger1/signal'
+STREAMS = ('left/signal', 'right/finger0/signal', 'right/finger1/signal')
+# A busy machine may hold up the emulated robots for longer than real ones are allowed to be silent.
+PATIENT = {
+    'state_timeout_s': 2.0,
+    'estimate_timeout_s': 20.0,
+    'signal_timeout_s': 3.0,
+}
+
+
+def trained(folder: Path, recipe: str, fingers: int) -> Path:
+    """Return the path of a model of simulated slides."""
+    plan = SlidePlan(slides=4, speed_m_s=0.05, force_n=1.0, slide_s=1.0, fingers=fingers)
+    bags = write_simulated(folder / f'{recipe}_bags', plan, np.random.default_rng(0), surfaces=tuple(SURFACES.values()))
+    train_from_bags(recipe, bags, out=folder / recipe)
+    return folder / f'{recipe}.skops'
+
+
+@pytest.fixture
+def arms(tmp_path: Path):
+    (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': PATIENT}}))
+    models = {'left': trained(tmp_path, 'default', 1), 'right': trained(tmp_path, 'two-fingers', 2)}
+    given: dict[str, Any] = {'robot': 'emulator', 'right_sensor': 'tsf85_pair', 'right_signal_topics': FINGERS}
+    given |= {'right_recipe': 'two-fingers', 'record_both': True, 'both_bag': tmp_path / 'bag'}
+    for arm, surface in SURFACES.items():
+        given[f'{arm}_surface'], given[f'{arm}_model'] = surface, models[arm]
+        given[f'{arm}_params'], given[f'{arm}_device'] = tmp_path / 'patient.yaml', tmp_path / f'{arm}_sensor'
+        given[f'{arm}_finger_port'] = free_port()
+    environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(tmp_path)}
+    with ChildLauncher('two_arms', given, environment, tmp_path / 'nodes.log') as launcher:
+        yield launcher
+
+
+def at_once(do: Callable[[str], ExplorationResult]) -> dict[str, ExplorationResult]:
+    """Do something with each arm at the same time."""
+    with ThreadPoolExecutor() as pool:
+        done: dict[str, Future[ExplorationResult]] = {arm: pool.submit(do, arm) for arm in SURFACES}
+        return {arm: future.result() for arm, future in done.items()}
+
+
+def errors(reports: list[DiagnosticArray]) -> dict[str, str]:
+    """Return what nodes reported as errors, by their names."""
+    statuses = [status for report in reports for status in report.status]
+    return {status.name: status.message for status in statuses if status.level == DiagnosticStatus.ERROR}
+
+
+def test_two_arms_explore_at_once_with_their_own_estimates_and_a_finger_that_drops_out_is_named(arms, tmp_path) -> None:
+    def explore(arm: str) -> ExplorationResult:
+        with Operator(arm, DOMAIN, arms.check) as operator:
+            operator.wait_for_explorer(DEADLINE_S)
+            operator.wait_for_listeners(('exploration', 'features'), 1, arms.check)
+            return operator.explore(SLIDE)
+
+    def lose_a_finger(arm: str) -> ExplorationResult:
+        lost: list[str] = []
+
+        def on_progress(state: Any, _texture: Any) -> None:
+            if arm == 'right' and state.phase.value == 'slide' and not lost:
+                lost.append(state.exploration_id)
+                with Operator(arm, DOMAIN, arms.check) as other:
+                    other.set_parameters('emulator', {'unplugged_finger': 1})
+
+        with Operator(arm, DOMAIN, arms.check) as operator:
+            operator.wait_for_explorer(DEADLINE_S)
+            return operator.explore(LONG if arm == 'right' else SLIDE, on_progress)
+
+    with LocalGraph(DOMAIN, deadline_s=DEADLINE_S) as graph:
+        reports = graph.listen(DiagnosticArray, '/diagnostics')
+        streams = [graph.listen(TactileSignal, name, SENSOR_QOS) for name in STREAMS]
+        graph.until(lambda: all(streams))
+        explored = at_once(explore)
+        assert {arm: result.message for arm, result in explored.items()} == dict.fromkeys(
+            SURFACES, 'the motion ended as asked'
+        ), arms.log.read_text()
+        assert {arm: result.texture.label for arm, result in explored.items()} == SURFACES
+        assert all(result.texture.final and result.texture.windows for result in explored.values())
+
+        explored = at_once(lose_a_finger)
+        assert (explored['left'].success, explored['left'].texture.label) == (True, SURFACES['left'])
+        assert not explored['right'].success
+        assert explored['right'].message.startswith("no samples have come on 'right/finger1/signal' for")
+        graph.until(lambda: 'finger1' in errors(reports).get('/right/sensor', ''))
+        assert '/left/sensor' not in errors(reports[-5:])
+    arms.stop()
+    assert 'finger1/signal' in topics_in(tmp_path / 'bag', 'right')
+    assert {'signal', 'exploration', 'texture'} <= set(topics_in(tmp_path / 'bag', 'left'))
