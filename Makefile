@@ -4,11 +4,14 @@ RUN := .venv/bin/ros-run
 # Tests that run against the clock mostly wait, but a crowd of them would disturb one another. One that fails in the crowd
 # runs once more with nothing beside it, and both results are printed; it fails if it fails alone.
 TEST_JOBS ?= 2
-REALTIME_JOBS ?= 3
+REALTIME_JOBS ?= 4
+TESTS := $(RUN) python -m pytest --dist loadfile
+ALONE = { echo 'Tests against the clock failed beside others; they run again, alone:'; \
+	$(RUN) python -m pytest -m "$(1)" --last-failed --last-failed-no-failures none; }
 # Public recordings for evaluation, if they lie beside the repository or where the user says.
 export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
-.PHONY: setup demo test lint benchmark docs clean
+.PHONY: setup demo test test-benchmarks lint benchmark docs clean
 
 setup:
 	@$(PYTHON) tools/workspace.py
@@ -24,10 +27,13 @@ lint: setup
 	@$(RUN) python tools/check_docstrings.py
 
 test: setup lint
-	@$(RUN) python -m pytest -n $(TEST_JOBS) --dist loadfile -m "not realtime" --doctest-modules
-	@$(RUN) python -m pytest -n $(REALTIME_JOBS) --dist loadfile -m realtime || { \
-	  echo 'Tests against the clock failed beside others; they run again, alone:'; \
-	  $(RUN) python -m pytest -m realtime --last-failed --last-failed-no-failures none; }
+	@$(TESTS) -n $(TEST_JOBS) -m "not realtime and not benchmark" --doctest-modules
+	@$(TESTS) -n $(REALTIME_JOBS) -m "realtime and not benchmark" || $(call ALONE,realtime and not benchmark)
+
+# Benchmarks and experiments in reduced size, endurance, and pages whose every line is run.
+test-benchmarks: setup
+	@$(TESTS) -n $(TEST_JOBS) -m "benchmark and not realtime"
+	@$(TESTS) -n $(TEST_JOBS) -m "benchmark and realtime" || $(call ALONE,benchmark and realtime)
 
 benchmark: setup
 	@.venv/bin/texture benchmark all

@@ -52,17 +52,20 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         os.chdir(before)
 
 
+@pytest.mark.benchmark
 def test_the_page_shows_the_file_that_its_script_writes(said: str) -> None:
     first = Path('my_csv/2031-05-01 linen v20.csv').read_text().split('\n')[:4]
     assert '\n'.join(first) in PAGE
 
 
+@pytest.mark.benchmark
 def test_the_page_shows_what_the_import_prints(said: str) -> None:
     shown = PAGE.split('```text\n')[2].split('```')[0]
     assert shown in said
     assert 'signal: 9000 samples at 100 Hz; jitter 1.22 ms rms' in said
 
 
+@pytest.mark.benchmark
 def test_a_reader_ends_with_figures_charts_and_a_file(said: str) -> None:
     for name in ('figure.png', 'figures.json', 'figures/recipes_own.png', 'figures/recipes_own.md', 'slides.parquet'):
         assert Path(name).stat().st_size > 200, name

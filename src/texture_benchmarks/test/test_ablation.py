@@ -94,6 +94,7 @@ def test_every_effect_is_named_by_a_scene_or_measured_by_itself() -> None:
     assert {name for scene in with_one_more(two_ridges()).values() for name in scene.effects} == set(ADDED)
 
 
+@pytest.mark.benchmark
 def test_scenes_are_cheap_drive_devices_in_time_and_every_term_is_weighed(tmp_path: Path) -> None:
     result = scenes.run(BenchmarkOptions(tmp_path, quick=True))
     numbers = result.numbers

@@ -17,12 +17,14 @@ def test_an_unknown_benchmark_and_missing_data_are_refused_with_a_sentence(tmp_p
             BENCHMARKS['biotac20'](BenchmarkOptions(tmp_path, data))
 
 
+@pytest.mark.benchmark
 def test_the_clock_keeps_its_guarantee_where_arrivals_do_not(tmp_path: Path) -> None:
     result, _ = run_benchmark('clock', BenchmarkOptions(tmp_path, quick=True))
     assert max(result.numbers['clock_ms']) < result.numbers['target_ms'] < min(result.numbers['arrival_ms'])
     assert all(chart.is_file() for chart in result.charts)
 
 
+@pytest.mark.benchmark
 @pytest.mark.ros
 def test_every_window_is_answered_through_the_graph(tmp_path: Path) -> None:
     result, path = run_benchmark('latency', BenchmarkOptions(tmp_path, quick=True))

@@ -36,6 +36,7 @@ def test_an_input_without_features_is_not_asked_for() -> None:
     )
 
 
+@pytest.mark.benchmark
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 def test_what_is_smallest_is_hardly_worse_than_the_best(tmp_path: Path) -> None:
     result = BENCHMARKS['ablation'](BenchmarkOptions(tmp_path, DATA, quick=True))

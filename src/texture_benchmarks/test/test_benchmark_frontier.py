@@ -31,6 +31,7 @@ def test_what_takes_too_long_is_not_tried_in_a_larger_size() -> None:
     assert list(costs('naive_bayes', sizes, limit_s=60.0, seed=0)) == sizes
 
 
+@pytest.mark.benchmark
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 def test_longer_windows_are_recognised_more_often(tmp_path: Path) -> None:
     result = BENCHMARKS['frontier'](BenchmarkOptions(tmp_path, DATA, quick=True))

@@ -13,6 +13,7 @@ from texture_benchmarks.result import BenchmarkOptions
 pytestmark = pytest.mark.realtime
 
 
+@pytest.mark.benchmark
 def test_force_speed_and_circle_are_kept_and_the_limit_is_foretold(tmp_path: Path) -> None:
     result, path = run_benchmark('motion', BenchmarkOptions(tmp_path, quick=True))
     numbers, targets = result.numbers, result.numbers['targets']

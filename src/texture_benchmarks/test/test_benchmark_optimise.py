@@ -1,5 +1,7 @@
 from pathlib import Path
 
+import pytest
+
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.optimise.cases import CASES, DATA, LINEAR
 from texture_benchmarks.result import BenchmarkOptions
@@ -12,6 +14,7 @@ def test_searches_have_the_size_of_the_papers() -> None:
     assert sizes == {(20, 30, 20)}
 
 
+@pytest.mark.benchmark
 def test_every_search_ends_with_a_recipe_evaluated_by_its_learner_and_the_charts_are_drawn(tmp_path: Path) -> None:
     result = BENCHMARKS['optimise_large'](BenchmarkOptions(tmp_path, quick=True))
     assert set(result.numbers['searches']) == set(CASES)

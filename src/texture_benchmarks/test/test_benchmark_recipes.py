@@ -116,6 +116,7 @@ def test_the_front_holds_what_is_neither_dearer_nor_worse_than_another() -> None
     assert pareto_front([(3.0, 0.9), (1.0, 0.5), (2.0, 0.4), (2.0, 0.7), (4.0, 0.9)]) == [1, 3, 0]
 
 
+@pytest.mark.benchmark
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 def test_recorded_slides_are_recognised_by_all_and_the_table_is_whole(tmp_path: Path) -> None:
     result = BENCHMARKS['recipes'](BenchmarkOptions(tmp_path, DATA, quick=True))
@@ -133,6 +134,7 @@ def test_recorded_slides_are_recognised_by_all_and_the_table_is_whole(tmp_path: 
     assert set(result.numbers['ntp21']) == {'one force out', 'one speed out'}
 
 
+@pytest.mark.benchmark
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 def test_the_shorter_run_tries_the_vibration_of_later_slides(tmp_path: Path) -> None:
     result = BENCHMARKS['recipes_later'](BenchmarkOptions(tmp_path, DATA, quick=True))
@@ -171,6 +173,7 @@ def loud_and_quiet(folder: Path) -> Path:
     return folder / 'bags'
 
 
+@pytest.mark.benchmark
 def test_a_recipe_and_estimators_of_ones_own_stand_beside_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = types.ModuleType('my_estimators')
     module.NearestMean = NearestMean

@@ -6,7 +6,7 @@ import pytest
 from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.result import BenchmarkOptions
 
-pytestmark = pytest.mark.realtime
+pytestmark = [pytest.mark.benchmark, pytest.mark.realtime]
 
 
 def test_where_there_is_a_checksum_nothing_false_is_believed(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from texture_benchmarks.result import BenchmarkOptions
 DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
 
 
+@pytest.mark.benchmark
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 def test_decisions_on_a_few_recorded_slides_are_reported_in_figures_and_charts(tmp_path: Path) -> None:
     result, path = run_benchmark('decisions', BenchmarkOptions(out=tmp_path, quick=True, data=DATA))

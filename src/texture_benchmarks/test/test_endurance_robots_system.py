@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-pytestmark = [pytest.mark.realtime, pytest.mark.ros]
+pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_benchmarks.endurance.robot_faults import HAND, RAILS, UR, PlannedRobotFault, RobotSession, RobotTrial  # noqa: E402

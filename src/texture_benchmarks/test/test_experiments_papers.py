@@ -29,6 +29,7 @@ def outcome(decided: list[int] | np.ndarray) -> MethodResult:
     return MethodResult(SURFACES, CODES, CONDITIONS, np.array(decided)[None], none_training, 0.0)
 
 
+@pytest.mark.benchmark
 @pytest.mark.parametrize('protocol', PROTOCOLS, ids=lambda protocol: protocol.name)
 def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(protocol: Protocol, tmp_path: Path) -> None:
     result, path = run_experiment(protocol.name, Experiment(tmp_path, quick=True))
@@ -64,6 +65,7 @@ def test_an_experiment_whose_paper_searches_for_nothing_refuses_to_tune(name: st
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.benchmark
 def test_a_search_sees_the_training_slides_alone_and_its_recipe_is_tried_on_the_rest(tmp_path, monkeypatch) -> None:
     seen: dict = {}
     monkeypatch.setattr(report, 'outcomes', lambda *args, **kwargs: seen.update(outcomes(*args, **kwargs)) or seen)

@@ -41,6 +41,7 @@ def test_a_course_of_examples_ends_as_good_as_training_again(tmp_path: Path) -> 
     assert sorted(path.name for path in (tmp_path / 'm.added').iterdir())[-1] == '00004.json'
 
 
+@pytest.mark.benchmark
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 def test_recorded_materials_are_added_slide_by_slide(tmp_path: Path) -> None:
     result, _ = run_benchmark('learning', BenchmarkOptions(tmp_path, DATA, quick=True))

@@ -105,7 +105,9 @@ def assert_equal(live_estimates: Estimates, offline_estimates: Estimates) -> Non
         )
 
 
-@pytest.mark.parametrize(('rate', 'slides', 'domain_id'), [(1.0, '5', 53), (5.0, '5-6', 54)])
+@pytest.mark.parametrize(
+    ('rate', 'slides', 'domain_id'), [pytest.param(1.0, '5', 53, marks=pytest.mark.benchmark), (5.0, '5-6', 54)]
+)
 def test_simulated_slides_are_evaluated_live_as_offline(
     rate: float, slides: str, domain_id: int, simulated: Path, tmp_path: Path
 ) -> None:
@@ -115,6 +117,7 @@ def test_simulated_slides_are_evaluated_live_as_offline(
     assert (health['lost_samples'], health['skipped']) == ('0', '0')
 
 
+@pytest.mark.benchmark
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 @pytest.mark.parametrize(('recipe', 'rate'), [('default', 1.0), ('vibration-and-taxels', 5.0)])
 def test_recorded_slides_are_evaluated_live_as_offline(recipe: str, rate: float, tmp_path: Path) -> None:

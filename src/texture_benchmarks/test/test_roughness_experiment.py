@@ -19,6 +19,7 @@ def outcome(tmp_path_factory):
     return result, out
 
 
+@pytest.mark.benchmark
 def test_ours_grades_textures_never_measured_better_than_the_papers_heads_and_than_always_three(outcome) -> None:
     numbers = outcome[0].numbers
     errors = {name: parts['unseen']['error'] for name, parts in numbers['regressors'].items()}
@@ -30,6 +31,7 @@ def test_ours_grades_textures_never_measured_better_than_the_papers_heads_and_th
     assert max(other[f'{speed} m/s, 2.5 N']['error'] for speed in ('0.10', '0.20')) <= 0.9
 
 
+@pytest.mark.benchmark
 def test_windows_with_skids_are_refused_and_others_are_not(outcome) -> None:
     skids = outcome[0].numbers['skids']
     assert skids['without']['refused'] < 0.02
@@ -37,6 +39,7 @@ def test_windows_with_skids_are_refused_and_others_are_not(outcome) -> None:
     assert skids['with']['error_of_the_others'] < skids['with']['error_of_all']
 
 
+@pytest.mark.benchmark
 def test_the_table_names_every_texture_and_the_charts_are_drawn(outcome) -> None:
     result, _ = outcome
     text = '\n'.join(result.lines)
@@ -44,6 +47,7 @@ def test_the_table_names_every_texture_and_the_charts_are_drawn(outcome) -> None
     assert all(matplotlib.image.imread(chart).std() > 0 for chart in result.charts)
 
 
+@pytest.mark.benchmark
 def test_the_search_writes_recipes_that_can_be_trained(outcome) -> None:
     result, out = outcome
     assert set(result.numbers['tuning']) == {'ANN1', 'ANN5', 'SVM5'}

@@ -15,6 +15,7 @@ def test_data_that_is_missing_is_refused_with_a_sentence(tmp_path: Path) -> None
         run_benchmark('speed_force', BenchmarkOptions(tmp_path, tmp_path))
 
 
+@pytest.mark.benchmark
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
 def test_few_surfaces_are_recognised_at_speeds_and_forces_that_were_not_trained(tmp_path: Path) -> None:
     result, path = run_benchmark('speed_force', BenchmarkOptions(tmp_path, DATA, quick=True))

@@ -1,9 +1,12 @@
 from pathlib import Path
 
+import pytest
+
 from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.result import BenchmarkOptions
 
 
+@pytest.mark.benchmark
 def test_the_default_is_stable_with_margin_and_limits_lie_where_predicted(tmp_path: Path) -> None:
     result, written = run_benchmark('stick_slip', BenchmarkOptions(tmp_path, quick=True))
     numbers = result.numbers

@@ -70,6 +70,7 @@ def test_outcomes_are_counted_at_the_first_certain_estimate_and_at_the_end() -> 
     assert dataclasses.astuple(outcome) == (4, 1, 1, 0, 1, pytest.approx(1.5), 2)
 
 
+@pytest.mark.benchmark
 def test_the_quick_form_on_simulated_slides_gives_figures_and_a_chart(tmp_path: Path) -> None:
     result = run(BenchmarkOptions(out=tmp_path, quick=True))
     assert [chart.name for chart in result.charts] == ['trust.png']

@@ -44,6 +44,7 @@ def test_a_split_that_cannot_be_made_gets_one_sentence(split: str, sentence: str
     assert sentence in capsys.readouterr().err
 
 
+@pytest.mark.benchmark
 def test_a_local_cluster_of_two_workers_cross_validates_and_searches_as_one_core_does(
     bags: Path, tmp_path: Path
 ) -> None:
