@@ -82,9 +82,10 @@ def hold(motors):
 
 STALLED = 'the finger stalled: in 250 ms it moved by'
 # Robot, module it needs, what happens, how it is mended, what is told, and how soon at most.
+LOST = 'lost|silent|not answered|ended'
 FAULTS = {
     'ur freezes': (ur, 'rtde_control', ControllerProcess.freeze, ControllerProcess.resume, 'silent|not answered', 0.15),
-    'ur dies': (ur, 'rtde_control', ControllerProcess.stop, ControllerProcess.start, 'lost|silent|not answered|ended', 0.15),
+    'ur dies': (ur, 'rtde_control', ControllerProcess.stop, ControllerProcess.start, LOST, 0.15),
     'ur stops protectively': (
         ur, 'rtde_control', lambda c: c.ask('emulate protective stop'), nothing, 'protective stop', 0.1,
     ),
