@@ -4,9 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.errors import TextureError
+from texture_core.errors import InvalidParameter, TextureError
+from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search.genetic_search import SearchParams
+from texture_evaluation import found_recipes
+from texture_evaluation.evaluate import evaluate
 from texture_evaluation.found_recipes import Wanted, checkpoint_of
 from texture_evaluation.optimise import optimise_from_bags
 from texture_evaluation.train import train_from_bags
@@ -62,8 +65,31 @@ def test_each_pair_of_surfaces_gets_a_recipe(simulated: Path, tmp_path: Path) ->
     wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
     written = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
     assert (tmp_path / 'best-glass-vs-leather.yaml').is_file()
-    assert len(written.files) == 4
-    assert written.lines[-1].startswith('all pairs together, most pairs won: training ')
+    assert len(written.files) == 5
+    assert 'all pairs together, most pairs won: training ' in written.lines[-1]
+
+
+def test_the_variables_of_all_pairs_are_trained_as_one_model(simulated: Path, tmp_path: Path) -> None:
+    wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
+    optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
+    model = load_model(train_from_bags(str(tmp_path / 'best.yaml'), [simulated]).save(tmp_path / 'model'))
+    assert model.recipe.learner_name == 'tuned_pairs'
+    assert '3 of 3 pairs have variables of their own' in model.training['calibration']
+    assert evaluate(model, [simulated]).as_json()['window_accuracy'] > 0.9
+
+
+def test_pairs_that_cannot_be_joined_are_written_alone_and_it_is_said_why(
+    simulated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise InvalidParameter("the pairs differ in 'windows'")
+
+    monkeypatch.setattr(found_recipes, 'joined_recipe', refuse)
+    wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
+    written = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
+    assert not (tmp_path / 'best.yaml').exists()
+    assert (tmp_path / 'best-glass-vs-leather.yaml').is_file()
+    assert written.lines[-1] == "no recipe of all pairs was written: the pairs differ in 'windows'"
 
 
 def test_grades_are_tuned_by_a_roughness_recipe(simulated: Path, tmp_path: Path) -> None:

@@ -10,7 +10,9 @@ import yaml
 
 from texture_core.errors import InvalidParameter
 from texture_core.files import writing
+from texture_estimation.recipe import Recipe
 from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.joined_pairs import joined_recipe
 from texture_estimation.search.optimise import Finalist, SearchResult
 from texture_estimation.search.pairs import PairSearchResult, beside
 from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
@@ -35,7 +37,7 @@ class Wanted:
     grades
         CSV file with the grade of every surface, or the name of a shipped table; '' to distinguish surfaces.
     per_pair
-        Tune a recipe for each pair of surfaces by itself.
+        Tune the variables of each pair of surfaces by themselves; one recipe joins them.
     """
 
     recipe: str
@@ -105,13 +107,15 @@ def write_found(found: SearchResult[Any], wanted: Wanted, params: SearchParams, 
     return Written((*recipes, checkpoint_of(target), chart), tuple(lines))
 
 
-def write_pairs(pairs: PairSearchResult, wanted: Wanted, params: SearchParams, target: Path) -> Written:
-    """Write the recipes that the searches of all pairs found, with a chart beside them.
+def write_pairs(pairs: PairSearchResult, base: Recipe, wanted: Wanted, params: SearchParams, target: Path) -> Written:
+    """Write the recipe that joins what the searches of all pairs found, those of the pairs, and a chart beside them.
 
     Parameters
     ----------
     pairs
         What was found.
+    base
+        Recipe from which the search began.
     wanted
         What was tuned.
     params
@@ -140,7 +144,12 @@ def write_pairs(pairs: PairSearchResult, wanted: Wanted, params: SearchParams, t
         f'tested {100 * pairs.record.test.mean():.1f} %'
     )
     lines = [f'{path}: {_scores(finalist)}' for path, finalist in recipes.items()]
-    return Written((*recipes, chart), (*lines, together))
+    try:
+        joined = joined_recipe({pair: found.best.recipe for pair, found in pairs.by_pair.items()}, base)
+    except InvalidParameter as error:
+        return Written((*recipes, chart), (*lines, together, f'no recipe of all pairs was written: {error}'))
+    _write(joined, target, _origin(wanted, params), together)
+    return Written((target, *recipes, chart), (*lines, f'{target}: {together}'))
 
 
 def write_recipe(finalist: Finalist[Any], path: Path, origin: str) -> None:
@@ -160,9 +169,13 @@ def write_recipe(finalist: Finalist[Any], path: Path, origin: str) -> None:
     InvalidParameter
         If the file cannot be written.
     """
-    content = yaml.safe_dump(finalist.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
+    _write(finalist.recipe, path, origin, _scores(finalist))
+
+
+def _write(recipe: Any, path: Path, origin: str, scores: str) -> None:
+    content = yaml.safe_dump(recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
     with writing(path):
-        path.write_text(f'# {origin}\n# {_scores(finalist)}.\n{content}', encoding='utf-8')
+        path.write_text(f'# {origin}\n# {scores}.\n{content}', encoding='utf-8')
 
 
 def _origin(wanted: Wanted, params: SearchParams) -> str:

@@ -42,6 +42,11 @@ OF_RECIPES: Mapping[str, str] = {
     'ets-roughness-ann5': 'ets-roughness-ann5',
     'ets-roughness-svm5': 'ets-roughness-svm5',
 }
+# All pairs of one model share the length of the windows, so it is not searched for each of them.
+OF_PAIRS: Mapping[str, str] = {
+    'ets-circular-ann': 'ets-circular-pairs-ann',
+    'ets-circular-svm': 'ets-circular-pairs-svm',
+}
 OF_LEARNERS: Mapping[str, str] = {
     'ann_pairs': 'ann-pairs',
     'svm_pairs': 'svm-pairs',
@@ -130,7 +135,7 @@ def optimise_from_bags(
                 tell=lambda pair, said: tell(' – '.join(pair), said),
                 **options,
             )
-            return write_pairs(pairs, wanted, params, target)
+            return write_pairs(pairs, space.base, wanted, params, target)
         task: Any = RoughnessTask(read_grades(wanted.grades)) if wanted.grades else ClassificationTask()
         found = optimise(
             space, search_slides, params, task, parallel_map=parallel_map, tell=lambda said: tell('', said), **options
@@ -151,7 +156,8 @@ def _space(wanted: Wanted) -> RecipeSpace[Any]:
     else:
         recipe = with_channels(load_recipe(wanted.recipe), wanted.channels)
         learner = recipe.learner_name
-    search = wanted.search or OF_RECIPES.get(recipe.name) or OF_LEARNERS.get(learner)
+    of_pairs = OF_PAIRS.get(recipe.name) if wanted.per_pair else None
+    search = wanted.search or of_pairs or OF_RECIPES.get(recipe.name) or OF_LEARNERS.get(learner)
     if not search:
         raise InvalidParameter(
             f"recipe '{recipe.name}' has no search space of its own, nor has '{learner}'; "

@@ -86,7 +86,7 @@ def with_channels(recipe: Recipe, channels: str) -> Recipe:
         raise InvalidParameter(f"channels are '{channels}'; 'fast' or 'all' is needed")
     if channels == 'all':
         return recipe
-    inputs = tuple(item for item in recipe.feature_set.inputs if item.topic == FAST_TOPIC)
+    inputs = tuple(item for item in recipe.feature_set.inputs if item.topics == (FAST_TOPIC,))
     if not inputs:
         raise InvalidParameter(f"recipe '{recipe.name}' has no input '{FAST_TOPIC}'; use it with all channels")
     feature_set = replace(recipe.feature_set, inputs=inputs, _layouts={})

@@ -114,3 +114,27 @@ def test_a_file_that_is_no_recipe_gets_one_sentence(tmp_path, text):
 def test_an_unknown_recipe_is_answered_with_the_nearest():
     with pytest.raises(UnknownName, match="did you mean 'default'"):
         FeatureSet.load('defalt')
+
+
+def test_one_input_is_described_twice_with_features_of_their_own() -> None:
+    recipe = {
+        'inputs': {
+            'signal': {'features': [{'spectral_peaks': {'peaks': 1}}]},
+            'signal#2': {'stretch_to_m_s': 0.1, 'features': [{'spectral_peaks': {'peaks': 2}}, 'speed']},
+        }
+    }
+    features = FeatureSet.from_mapping(recipe)
+    assert features.topics == ('signal',)
+    assert FeatureSet.from_mapping(features.as_mapping()).as_mapping() == features.as_mapping()
+    tone = Window(np.sin(2 * np.pi * 100.0 * np.arange(1000) / 1000.0)[:, None], 1000.0, ('dynamic',))
+    vector = features.extract(CutWindow(0, 'slide', 1.0, 1.0, {'signal': tone}, speed_m_s=0.2))
+    found = dict(zip(vector.names, vector.values, strict=True))
+    assert found['signal/spectral_peaks/1/frequency_hz/dynamic'] == pytest.approx(100.0, abs=0.5)
+    assert found['signal#2/spectral_peaks/1/frequency_hz/dynamic'] == pytest.approx(50.0, abs=0.5)  # at half the speed
+    assert found['signal#2/speed'] == 0.2
+    assert len(found) == 2 + 4 + 1
+
+
+def test_a_further_description_of_an_input_needs_a_name() -> None:
+    with pytest.raises(InvalidParameter, match="has a name after '#', as in 'signal#2'"):
+        FeatureSet.from_mapping({'inputs': {'signal#': {'features': ['hjorth']}}})

@@ -36,6 +36,7 @@ InputLayout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of 
 
 MOTION_FEATURES = (Speed, Force)
 JOINT = '+'  # between the topics of a joint input
+AGAIN = '#'  # between a topic and the name of a further description of it
 RAW, SUBTRACTED = 'raw', 'tared'
 
 
@@ -43,11 +44,16 @@ RAW, SUBTRACTED = 'raw', 'tared'
 class InputFeatures:
     """The features of one input, or of several joined ('signal+signal_static'): (name, feature) in their order.
 
+    One input may be described several times, with other features or parameters: what follows a '#' in its name
+    distinguishes the descriptions ('signal', 'signal#2').
+
     Examples
     --------
     >>> item = InputFeatures('signal+signal_static', (('speed', Speed()),))
     >>> item.topics, item.as_mapping()
     (('signal', 'signal_static'), {'features': [{'speed': {}}]})
+    >>> InputFeatures('signal#2', (('speed', Speed()),)).topics
+    ('signal',)
     """
 
     topic: str
@@ -57,7 +63,7 @@ class InputFeatures:
     @cached_property
     def topics(self) -> tuple[str, ...]:
         """What is subscribed to."""
-        return tuple(self.topic.split(JOINT))
+        return tuple(self.topic.partition(AGAIN)[0].split(JOINT))
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the section of a recipe."""
@@ -295,7 +301,9 @@ def _input(topic: str, section: Any, where: str) -> InputFeatures:
         raise InvalidParameter(
             f"{place}: came {safe_repr(section)}; a list under 'features' is needed, such as [hjorth]"
         )
-    topics = topic.split(JOINT)
+    topics = topic.partition(AGAIN)[0].split(JOINT)
+    if AGAIN in topic and not topic.partition(AGAIN)[2]:
+        raise InvalidParameter(f"{place}: a further description of an input has a name after '#', as in 'signal#2'")
     if not all(topics) or len(set(topics)) < len(topics):
         raise InvalidParameter(f"{place}: inputs are joined by their names, as in 'signal+signal_static', each once")
     chosen = [choose(FEATURES, entry, 'feature', place) for entry in section['features']]

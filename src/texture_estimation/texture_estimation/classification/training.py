@@ -15,7 +15,7 @@ from texture_estimation.classification.evidence_rules import EvidenceRule, decid
 from texture_estimation.classification.novelty_training import SlideTrace, fit_novelty
 from texture_estimation.incremental.training_examples import TrainingExamples
 from texture_estimation.learners.augmented_examples import AugmentedExamples
-from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.learner import Codes, Fitted, of_examples
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.log_probabilities import is_tied, log_loss
 from texture_estimation.model import TextureModel
@@ -62,12 +62,13 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     _check(examples)
     labels, codes = np.unique(examples.labels, return_inverse=True)
     slides, groups = np.unique(examples.groups, return_inverse=True)
-    fitted = _fit(recipe, examples, codes, groups)
+    trained = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
+    fitted = _fit(trained, examples, codes, groups)
     overlap = min(examples.hop_s / examples.window_s, 1.0)
     slides_held_out = _held_out_slides(fitted, codes, groups, recipe.evidence, overlap)
     tempering_exponent = _fit_tempering_exponent(slides_held_out, recipe.evidence)
     decisions = recipe.training
-    rule, novelty_detector = _fit_open_set(recipe, fitted, examples, slides_held_out, tempering_exponent)
+    rule, novelty_detector = _fit_open_set(trained, fitted, examples, slides_held_out, tempering_exponent)
     return TextureModel(
         name=name or recipe.name,
         labels=tuple(labels.tolist()),

@@ -15,12 +15,14 @@ from texture_estimation.learners.svm_linear import SvmLinear
 from texture_estimation.learners.svm_max_wins import SvmMaxWins
 from texture_estimation.learners.svm_pairs import SvmPairs
 from texture_estimation.learners.svm_rbf import SvmRbf
+from texture_estimation.learners.tuned_pairs import TunedPairs
 
 LEARNERS: Mapping[str, type[Learner]] = {
     'mlp': Mlp,  # one hidden layer, softmax, calibrated
     'svm_rbf': SvmRbf,  # Cortes & Vapnik 1995, one against one, calibrated
     'ann_pairs': AnnPairs,  # Roberge et al.
     'svm_pairs': SvmPairs,  # Roberge et al.
+    'tuned_pairs': TunedPairs,  # Roberge et al.: a set of variables for each pair
     'naive_bayes': NaiveBayes,  # Jamali & Sammut 2010
     'svm_linear': SvmLinear,  # Kaboli et al. 2015
     'passive_aggressive': PassiveAggressive,  # Crammer et al. 2006; Kaboli et al. 2015

@@ -136,3 +136,26 @@ class Learner(Protocol):
     @staticmethod
     def predictor(parameters: Mapping[str, Any]) -> Predictor:
         """Return the predictor made from the stored parameters."""
+
+
+def of_examples(learner: Learner, names: Sequence[str], labels: Sequence[str]) -> Learner:
+    """Return the learner as it is, or for examples with these features and textures if its parameters name them.
+
+    A learner whose parameters do has a method of this name, as `TunedPairs` has.
+
+    Parameters
+    ----------
+    learner
+        Of a recipe.
+    names : (n_features,)
+        Of the features.
+    labels : (n_labels,)
+        Of the textures, in the order of their numbers.
+
+    Returns
+    -------
+    Learner
+        That `fit` may be called of.
+    """
+    bind: Callable[[Sequence[str], Sequence[str]], Learner] | None = getattr(learner, 'of_examples', None)
+    return bind(names, labels) if bind else learner

@@ -13,7 +13,7 @@ from texture_core.errors import InvalidData
 from texture_estimation.search.labelled_windows import Cut
 from texture_estimation.search.parallel import ParallelMap, serial_map
 from texture_features.feature import Feature, WindowBatch
-from texture_features.feature_set import FeatureSet, InputFeatures
+from texture_features.feature_set import JOINT, FeatureSet, InputFeatures
 from texture_features.features.spectral_peaks import SpectralPeaks, by_frequency
 from texture_features.windowing.time_stretch import Stretched
 from texture_features.windowing.windows import WindowParams
@@ -120,7 +120,7 @@ class FeatureCache:
         return np.concatenate(blocks, axis=1)
 
     def _windows(self, params: WindowParams, item: InputFeatures) -> list[WindowBatch]:
-        key = (params, item.topic, None)
+        key = (params, JOINT.join(item.topics), None)
         if key not in self._chunks:
             inputs = self._cut(params).inputs
             first, *others = (inputs[topic] for topic in item.topics)
@@ -131,7 +131,7 @@ class FeatureCache:
         return self._chunks[key]
 
     def _key(self, params: WindowParams, item: InputFeatures, feature: Feature) -> Key:
-        return params, item.topic, self._source(feature)
+        return params, JOINT.join(item.topics), self._source(feature)
 
     def _source(self, feature: Feature) -> Any:
         """Return the feature from whose values those of `feature` are taken."""

@@ -24,7 +24,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('-o', '--out', required=True, metavar='FILE', help='recipe that is written, such as best.yaml')
     parser.add_argument('--search', default='', metavar='NAME', help='search space: a shipped one, or a YAML file')
     parser.add_argument('--grades', default='', metavar='FILE', help='CSV file texture,grade: tune a roughness recipe')
-    parser.add_argument('--per-pair', action='store_true', help='a recipe for each pair of surfaces by itself')
+    parser.add_argument('--per-pair', action='store_true', help='a set of variables for each pair of surfaces')
     parser.add_argument(
         '--objective', choices=OBJECTIVES, default=usual.objective, help='accuracy alone, or its front with computing'
     )
