@@ -141,7 +141,7 @@ def test_the_shorter_run_tries_the_vibration_of_later_slides(tmp_path: Path) -> 
     assert set(result.numbers) == {'references', 'MiniRocket', VIBRATION}
     assert set(result.numbers[VIBRATION]) == {'by time'}
     assert result.split == 'by time: trained on slides 1-30 of each surface, tested on the later ones'
-    assert [chart.name for chart in result.charts] == ['recipes_later.png']
+    assert [chart.name for chart in result.charts] == ['recipes_later.png', 'recipes_later_sliding.png']
 
 
 class NearestMean:

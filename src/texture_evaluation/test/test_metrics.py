@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -71,6 +73,15 @@ def test_what_is_not_classified_counts_as_not_recognised_and_stands_in_no_column
     }  # fmt: skip
     assert metrics.accuracy_at([silent], 0.5) == 0.0
     np.testing.assert_array_equal(metrics.confusion([silent], ('a', 'b')), [[1, 0], [0, 0]])
+
+
+def test_the_curve_of_windows_that_vote_has_a_point_for_each_complete_vote_alone() -> None:
+    voted = [dataclasses.replace(result, voters=3) for result in RESULTS]
+    seconds, accuracy = metrics.curve(voted)
+    assert seconds.tolist() == pytest.approx([0.7, 1.0])  # after the third and the sixth window
+    assert accuracy.tolist() == [0.5, 1.0]
+    seconds, _ = metrics.curve([dataclasses.replace(result, voters=9) for result in RESULTS])
+    assert seconds.tolist() == pytest.approx([1.0])  # no vote was complete: the slide's end decides
 
 
 def test_the_curve_ends_where_the_shortest_slide_ends() -> None:

@@ -223,4 +223,4 @@ def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEven
         before = estimate.windows
     alone = single_decisions(model, np.stack(used)) if used else []
     final = next((estimate for estimate in reversed(estimates) if estimate.final), None)
-    return SlideResult(slide.surface, alone, received, final), taken_us
+    return SlideResult(slide.surface, alone, received, final, model.recipe.evidence.group), taken_us

@@ -29,12 +29,22 @@ class SlideResult:
         The estimate after each window, from all evidence so far.
     final
         The estimate at the end of the slide; None takes the last one for it.
+    voters
+        Number of windows that vote together: a decision is made when that many more have come. 0: each window decides.
     """
 
     surface: str
     window_labels: Sequence[str]
     estimates: Sequence[TextureEstimate]
     final: TextureEstimate | None = None
+    voters: int = 0
+
+    @property
+    def decisions(self) -> Sequence[TextureEstimate]:
+        """The estimates with which a decision is made: all, or those of complete votes; of none is one, the last."""
+        return (self.estimates[self.voters - 1 :: self.voters] if self.voters else self.estimates) or self.estimates[
+            -1:
+        ]
 
     @property
     def end(self) -> TextureEstimate:
@@ -225,6 +235,8 @@ def confusion(results: Sequence[SlideResult], labels: Sequence[str]) -> AnyArray
 def curve(results: Sequence[SlideResult]) -> tuple[Array, Array]:
     """Return seconds of sliding and the share of slides recognised after them, as far as every slide reaches.
 
+    The times are those at which decisions are made: windows that vote together decide when their vote is complete.
+
     Returns
     -------
     (n,)
@@ -233,7 +245,7 @@ def curve(results: Sequence[SlideResult]) -> tuple[Array, Array]:
         Share recognised, 0 to 1.
     """
     shortest = min((result.estimates[-1].evidence_s for result in results), default=0.0)
-    times = sorted({round(e.evidence_s, 6) for result in results for e in result.estimates})
+    times = sorted({round(e.evidence_s, 6) for result in results for e in result.decisions})
     times = [seconds for seconds in times if seconds <= shortest + TOLERANCE_S]
     points = [(seconds, accuracy) for seconds in times if (accuracy := accuracy_at(results, seconds)) is not None]
     return np.array([seconds for seconds, _ in points]), np.array([accuracy for _, accuracy in points])

@@ -10,11 +10,13 @@ from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from sklearn.model_selection import LeaveOneGroupOut
 
-from texture_benchmarks.charts import front_chart
+from texture_benchmarks.charts import evidence_chart, front_chart
 from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.imported_data import imported
+from texture_benchmarks.papers.recipe_digest import digest_of
 from texture_benchmarks.recipes import minirocket
 from texture_benchmarks.recipes.own_method import (
     BESIDE,
@@ -113,6 +115,16 @@ VARIANTS: Mapping[str, Variant] = {
     'hu-log-pca-svm, 99 % of the variance': Variant({'variance': 0.99, 'gamma': 1.0, 'c': 10.0}),
     'jamali-naive-bayes-5, overlapping': Variant(apart_s=OVERLAPPING_S),
 }
+# Shown over the sliding time: each paper's way of deciding, and ours.
+OVER_TIME = (
+    'default',
+    'ets-linear-svm',
+    'ets-linear-svm-vote',
+    'ets-linear-ann-vote',
+    'ets-circular-svm',
+    'kaboli-svm',
+    'jamali-naive-bayes-5',
+)
 # They describe what only an array of taxels measures.
 NEEDS_ARRAY = frozenset({'any-speed'})
 # What is tried on one kind of data alone: windows overlap where the published figures are.
@@ -228,7 +240,34 @@ def run_later(options: BenchmarkOptions) -> BenchmarkResult:
     """Try the shipped ones on the vibration of later slides alone, in a sixth of the time."""
     setting = biotac20_settings(options)[VIBRATION]
     later = replace(setting, splits=[split for split in setting.splits if split.name == LATER])
-    return result_of('recipes_later', _numbers({VIBRATION: later}, _shipped(options), options), options)
+    numbers = _numbers({VIBRATION: later}, _shipped(options), options)
+    for recipe, figures in numbers[VIBRATION][LATER].items():
+        if recipe != MINIROCKET:
+            figures['definition'] = digest_of(recipe)  # of what was measured
+    return later_result(numbers, options)
+
+
+def later_result(numbers: Mapping[str, Any], options: BenchmarkOptions) -> BenchmarkResult:
+    """Return the figures of later slides as a result, with the chart of decisions over the sliding time.
+
+    Parameters
+    ----------
+    numbers
+        Figures as plain values.
+    options
+        Where files are written.
+
+    Returns
+    -------
+    BenchmarkResult
+    """
+    result = result_of('recipes_later', numbers, options)
+    cells = numbers[VIBRATION][LATER]
+    lines = {name: cells[name]['decisions'] for name in OVER_TIME if 'decisions' in cells.get(name, {})}
+    path = options.out / 'recipes_later_sliding.png'
+    title = 'Recorded slides: decisions of recipes that vote, and of others, when they are made'
+    series = {name: (np.array(line['s']), np.array(line['share'])) for name, line in lines.items()}
+    return replace(result, charts=(*result.charts, evidence_chart(series, title, path)))
 
 
 def _shipped(options: BenchmarkOptions) -> Sequence[str]:
@@ -391,5 +430,5 @@ def _chart(numbers: Mapping[str, Any], path: Path) -> Path:
         for name, of_setting in numbers.items()
         for split, of_split in list(of_setting.items())[-1:]
     }
-    title = 'All recipes on recorded slides: single windows recognised, and time from window to estimate'
-    return front_chart(panels, title, ('time of a window (µs)', 'single windows recognised (%)'), path)
+    title = 'All recipes on recorded slides: single windows or votes that are right, and time from window to estimate'
+    return front_chart(panels, title, ('time of a window (µs)', 'single windows, or votes, recognised (%)'), path)

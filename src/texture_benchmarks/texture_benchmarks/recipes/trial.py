@@ -40,10 +40,12 @@ ROUNDING = 1e-9  # of a quotient of two times
 def figures_of(result: CrossValidation) -> dict[str, Any]:
     """Return the figures of one cell of the table."""
     results = result.pooled
+    seconds, shares = metrics.curve(results)
     return {
         'window_accuracy': metrics.window_accuracy(results),
         'accuracy_at_s': metrics.accuracy_at_times(results),
         'accuracy_at_end': metrics.accuracy_at_end(results),
+        'decisions': {'s': seconds.round(3).tolist(), 'share': shares.round(4).tolist()},
         'unclassified_windows': metrics.unclassified_windows(results),
         'unclassified_at_s': metrics.unclassified_at_times(results),
         'train_s': round(float(np.mean([fold.train_s for fold in result.folds])), 2),

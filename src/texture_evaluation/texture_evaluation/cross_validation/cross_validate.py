@@ -235,7 +235,7 @@ def predict_slides(model: TextureModel, features: LabelledFeatures) -> dict[str,
         estimates = [evidence.update(vector) for vector in windows]
         alone = single_decisions(model, np.stack([vector.values for vector in windows]))
         surface = str(features.labels[features.groups == slide][0])
-        results[slide] = SlideResult(surface, alone, estimates, evidence.update(end))
+        results[slide] = SlideResult(surface, alone, estimates, evidence.update(end), model.recipe.evidence.group)
     return results
 
 
