@@ -16,6 +16,7 @@ from texture_benchmarks.learning import run as learning
 from texture_benchmarks.load import run as load
 from texture_benchmarks.motion import run as motion
 from texture_benchmarks.next_motion import run as next_motion
+from texture_benchmarks.optimise import pairs_run as optimise_pairs
 from texture_benchmarks.optimise import run as optimise
 from texture_benchmarks.recipes import run as recipes
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
@@ -43,6 +44,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'robustness': robustness.run,  # where recipes break down as noise, wear, losses or speed errors grow
     'optimise': optimise.run,  # genetic searches of the papers' size, linear experiment: time, convergence
     'optimise_large': optimise.run_large,  # all of them, and the fronts of accuracy and computing; not in `all`
+    'optimise_pairs': optimise_pairs.run,  # what a search for each pair of textures chooses; not in `all`
     'learning': learning.run,  # trained slide by slide against trained again on the same slides
     'clock': clock.run,  # stamps in spite of late arrivals and drift
     'sensors': sensors.run,  # every sensor's line with faults
