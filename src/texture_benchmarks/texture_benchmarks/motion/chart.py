@@ -13,7 +13,7 @@ from texture_benchmarks.motion.trial import ForceControlMetrics
 from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 
-MARKERS = 'o^vsD'
+MARKERS = 'o^vsDP'
 TICKS = (0.2, 2, 20)
 
 STRAIGHT = ('linear_slide', 'in_hand_sliding')

@@ -148,7 +148,7 @@ class RobotUnderTest:
 ROBOTS: Mapping[str, RobotUnderTest] = {
     'emulated UR': RobotUnderTest(ur, 'rtde_control'),
     'emulated rails': RobotUnderTest(rails, 'serial'),
-    'emulated ROS controllers': RobotUnderTest(ros_controllers, 'rclpy'),
+    'emulated ROS controllers': RobotUnderTest(ros_controllers, 'rclpy', (SLIDE, CIRCLE, RUB)),
     # Motors tell their speed and current in coarse steps.
     'emulated hand': RobotUnderTest(
         hand, 'dynamixel_sdk', (RUB,), TouchParams(speed_tolerance=0.3, force_tolerance=0.2)

@@ -61,7 +61,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         name='motion',
         measured=(
             'one slide of 60 mm at 0.05 m/s and one of two turns at 0.1 m/s on a circle of 20 mm, with 1 N, for each '
-            'robot and stiffness; in the hand strokes of 20 mm at 0.02 m/s. Shares of what was asked for: overshoot '
+            'robot and stiffness; in the hand and with ROS controllers strokes of 20 mm at 0.02 m/s. '
+            'Shares of what was asked for: overshoot '
             'until the slide begins, force error (root mean square), largest and mean speed error of the slide; '
             f'largest distance from the circle. Of emulated robots the median of {REPEATS} slides'
         ),
