@@ -384,3 +384,31 @@ def test_touches_that_are_forgotten_are_made_again(robot):
         explorer.touch_surface()
         explorer.forget_touches()
     assert 'touch 1 taken' in explorer.touch_surface()
+
+
+def test_a_check_commands_nothing_and_leaves_the_topics():
+    robot = Robot(connect_timeout_s=0.1)
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    explorer.check()
+    assert (robot.sent, robot.closed) == ([], True)
+    robot.pose_comes = False
+    with pytest.raises(DeviceError, match='no pose comes on'):
+        explorer.check()
+    assert robot.sent == []
+
+
+def test_a_released_explorer_commands_rest_and_refuses_until_it_is_connected_again(robot):
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    explorer.connect()
+    explorer.release()
+    assert robot.is_commanded_to_rest
+    assert robot.closed
+    for ask in (
+        explorer.recover,
+        explorer.touch_surface,
+        lambda: explorer.begin('one', ExplorationRequest('linear_slide')),
+    ):
+        with pytest.raises(MotionRefused, match='no control of the arm'):
+            ask()
+    explorer.connect()
+    assert explorer.fault() == ''

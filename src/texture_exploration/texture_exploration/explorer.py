@@ -14,6 +14,7 @@ from texture_core.errors import DeviceError, InvalidData, MotionRefused, Texture
 from texture_core.exploration import ExplorationRequest, ExplorationState
 from texture_exploration.arms.protocol import (
     Arm,
+    Checkable,
     Counting,
     Rebootable,
     Recoverable,
@@ -72,7 +73,7 @@ class Explorer:
         self._lift_first = True  # nobody knows whether the finger presses
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
-        self._closed = False
+        self._closed = self._released = False
         self._touches = Touches()
 
     def connect(self) -> Vector:
@@ -88,9 +89,33 @@ class Explorer:
         self._lift_first = True
         self.arm.close()
         self.arm.connect()
+        self._released = False
         # After a fault the finger may hang anywhere; the first place is the one that the operator chose.
         self._home = self._home or self.arm.state().position
         return self._home
+
+    def check(self) -> None:
+        """See whether the arm answers, without keeping control of it.
+
+        Raises
+        ------
+        DeviceError
+            If it does not, or cannot move.
+        """
+        if isinstance(self.arm, Checkable):
+            self.arm.check()
+            return
+        try:
+            self.arm.connect()
+            self.arm.state()
+        finally:
+            self.arm.close()
+
+    def release(self) -> None:
+        """Abort, wait until the finger is lifted, let the arm go; until `connect`, requests are refused."""
+        with self._lock:
+            self._released = True
+        self._end_motion('the explorer let go of the arm')
 
     def now_ns(self) -> int:
         """Return the time on the clock of the states."""
@@ -253,7 +278,10 @@ class Explorer:
         """Abort, wait until the finger is lifted, let the arm go."""
         with self._lock:
             self._closed = True
-        self.stop('the explorer was shut down')
+        self._end_motion('the explorer was shut down')
+
+    def _end_motion(self, reason: str) -> None:
+        self.stop(reason)
         if self._thread is not None:
             self._thread.join(CLOSING_S)
         self.arm.close()
@@ -282,6 +310,10 @@ class Explorer:
         return self.arm.zeroed if isinstance(self.arm, Zeroing) else True
 
     def _check_idle(self) -> None:
+        if self._released:
+            raise MotionRefused(
+                'the explorer has no control of the arm; configure and activate it (ros2 lifecycle set)'
+            )
         if self.current is not None:
             raise MotionRefused(
                 f"exploration '{self.current.exploration_id}' is still running; wait for its end or stop it"

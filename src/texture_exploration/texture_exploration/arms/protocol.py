@@ -83,6 +83,14 @@ class Recoverable(Protocol):
 
 
 @runtime_checkable
+class Checkable(Protocol):
+    """An arm that can be asked whether it is there without taking control of it."""
+
+    def check(self) -> None:
+        """Return if it answers and could move; raise DeviceError, with what stands in the way, if not."""
+
+
+@runtime_checkable
 class Rebootable(Protocol):
     """An arm of motors that latch an error until they are rebooted."""
 

@@ -104,6 +104,22 @@ class RosControllersArm:
         self._lost = ''  # a fault that stays until the arm is recovered or connected again
         self._restart()
 
+    def check(self) -> None:
+        """Wait for the first pose, the first force and a controller that listens; nothing is commanded.
+
+        Raises
+        ------
+        DeviceError
+            If one of them does not come within `connect_timeout_s`; it names which.
+        """
+        self.close()
+        self._restart()
+        topics = self._open_topics(self._params)
+        try:
+            self._wait_for_controllers(topics)
+        finally:
+            topics.close()
+
     def connect(self) -> None:
         """Wait for the first pose, the first force and a controller that listens, and begin to command.
 

@@ -45,6 +45,16 @@ class UrArm:
         self._link: WorkerLink | None = None
         self._paused = False  # a stop by the safety system may have left our program paused
 
+    def check(self) -> None:
+        """Ask the controller whether its arm can move; no program is started, and no protective stop released.
+
+        Raises
+        ------
+        DeviceError
+            If it cannot be reached, or its arm cannot move.
+        """
+        check_ready(self._params.ip, self._params.probe_timeout_s, unlock=False)
+
     def connect(self) -> None:
         """Reach the controller and start its control program; release a protective stop if the parameters say so.
 

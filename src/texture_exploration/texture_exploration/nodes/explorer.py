@@ -13,7 +13,7 @@ import numpy as np
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.node import Node
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
@@ -53,14 +53,28 @@ class ArmParams:
 
 
 @dataclass(frozen=True)
+class StartParams:
+    """Who takes control of the arm."""
+
+    autostart: bool = param(
+        True,
+        'Configures and activates the node at start-up, which takes control of the arm; false leaves that to a '
+        'lifecycle manager.',
+    )
+
+
+@dataclass(frozen=True)
 class FrameParams:
     """The frame of what is published."""
 
     surface_frame_id: str = param('surface', 'Sets the frame of the surface in the headers of the published states.')
 
 
-class ExplorerNode(Node):
-    """Explore on request, as a service or as an action; publish what the finger is doing."""
+class ExplorerNode(LifecycleNode):
+    """Explore on request, as a service or as an action; publish what the finger is doing.
+
+    Configuring checks that the arm answers, activating takes control of it, deactivating lifts the finger and lets go.
+    """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('explorer', **kwargs)
@@ -96,6 +110,63 @@ class ExplorerNode(Node):
         self.create_timer(IDLE_PERIOD_S, self._publish_idle)
         Diagnostics(self, self._report)
         self._publish_idle()
+        self._active, self._autostart = False, declare(self, StartParams).autostart
+        if self._autostart:
+            self.trigger_configure()
+            self.trigger_activate()
+            self._autostart = False  # what follows was asked for by somebody
+        else:
+            self._explorer.release()
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """See whether the arm answers, without control of it."""
+        # The activation, which follows at once, sees that too.
+        if not self._autostart and not self._tried(self._explorer.check):
+            return TransitionCallbackReturn.FAILURE
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Take control of the arm; at the start of the node an arm that is not there yet is waited for."""
+        if not self._tried(self._explorer.connect) and not self._autostart:
+            self._explorer.release()
+            return TransitionCallbackReturn.FAILURE
+        self._active = True
+        return super().on_activate(state)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Lift the finger and let go of the arm."""
+        self._let_go()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Hold nothing, as already since the deactivation."""
+        self._let_go()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Lift the finger and let go of the arm, from whatever state."""
+        self._let_go()
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Let go of the arm after an internal error in a transition."""
+        self.get_logger().error('a transition broke off through an internal error; the arm is let go')
+        self._let_go()
+        return super().on_error(state)
+
+    def _let_go(self) -> None:
+        self._active = False
+        self._explorer.release()
+
+    def _tried(self, step: Callable[[], object]) -> bool:
+        """Return whether the arm allowed it; if not, log why."""
+        try:
+            step()
+        except DeviceError as error:
+            more = '; the next request tries again' if self._autostart else ''
+            self.get_logger().error(f'{error}{more}')
+            return False
+        return True
 
     def shutdown(self) -> None:
         """Lift the finger, let the arm go, leave nobody waiting."""
@@ -109,12 +180,7 @@ class ExplorerNode(Node):
         arm = arm_class(declare(self, arm_class.Params))
         touch = declare(self, TouchParams, changeable=True)
         limits = declare(self, SafetyLimits, changeable=True)
-        explorer = Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
-        try:
-            explorer.connect()
-        except DeviceError as error:
-            self.get_logger().error(f'{error}; the next request tries again')
-        return explorer
+        return Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
 
     def _watch_signal(self) -> Callable[[int], str]:
         params = declare(self, SignalWatchParams)
@@ -274,6 +340,8 @@ class ExplorerNode(Node):
             **self._explorer.counts,
             **{f'arm_{name}': count for name, count in self._explorer.arm_counts().items()},
         }
+        if not self._active:
+            return 'WARN', 'the explorer is not active: it has no control of the arm', numbers
         if fault:
             return 'ERROR', fault, numbers
         warning = self._explorer.warning()

@@ -1,0 +1,82 @@
+"""The nodes of a robot brought up in order: the explorer takes control of its arm last, or not at all."""
+
+import numpy as np
+import pytest
+from std_srvs.srv import Trigger
+from texture_msgs import msg, srv
+
+from texture_bringup.nodes.bring_up import BringUp
+from texture_core.errors import DeviceError
+from texture_core.exploration import ExplorationRequest
+from texture_core.ros.local_graph import LocalGraph
+from texture_drivers.nodes.sensor import SensorNode
+from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.nodes.explorer import ExplorerNode
+
+pytestmark = [pytest.mark.realtime, pytest.mark.ros]
+
+EXPLORER = {'autostart': False, 'start_height_m': 0.002, 'state_timeout_s': 2.0, 'watch_signal': False}
+
+
+@pytest.fixture
+def graph():
+    with LocalGraph(85, deadline_s=60.0) as graph:
+        yield graph
+
+
+@pytest.fixture
+def recording(tmp_path):
+    np.savez(tmp_path / 'slide.npz', samples=np.zeros((500, 1)), rate_hz=1000.0, channels=['film'])
+    return {'sensor': 'file', 'device': str(tmp_path / 'slide.npz'), 'config': '{loop: true}', 'autostart': False}
+
+
+def label(node):
+    return node._state_machine.current_state[1]
+
+
+def test_the_sensor_is_activated_before_the_explorer(graph, recording):
+    sensor, explorer = graph.add(SensorNode, **recording), graph.add(ExplorerNode, **EXPLORER)
+    assert (label(sensor), label(explorer)) == ('unconfigured', 'unconfigured')
+    explore = graph.peer.create_client(srv.Explore, 'explore')
+    graph.until(explore.service_is_ready)
+    refused = explore.call_async(srv.Explore.Request(motion='linear_slide'))
+    bring_up = graph.add(BringUp, nodes='sensor explorer')
+    graph.until(lambda: refused.done() and label(sensor) == 'active')
+    assert label(explorer) != 'active'
+    assert (refused.result().success, refused.result().exploration_id) == (False, '')
+    assert 'no control of the arm' in refused.result().message
+    graph.until(lambda: label(explorer) == 'active')
+    assert list(bring_up._waiting) in ([], ['explorer'])
+
+
+def test_a_node_that_is_not_there_is_named_and_the_explorer_is_not_activated(graph):
+    explorer = graph.add(ExplorerNode, **EXPLORER)
+    graph.add(BringUp, nodes='classifier explorer', timeout_s=0.5)
+    with pytest.raises(DeviceError, match=r"node '/classifier' is not there .* not activated or looked for: explorer"):
+        graph.until(lambda: False)
+    assert label(explorer) == 'unconfigured'
+
+
+def test_a_deactivated_explorer_lifts_lets_go_and_refuses_until_it_is_activated_again(graph):
+    explorer = graph.add(ExplorerNode, **{**EXPLORER, 'autostart': True})
+    states = graph.listen(msg.ExplorationState, 'exploration')
+    graph.until(lambda: states)
+    exploration = explorer._explorer.begin('one', ExplorationRequest('linear_slide', speed_m_s=0.01, distance_m=0.1))
+    graph.until(lambda: any(state.phase_name == 'slide' for state in states))
+    explorer.trigger_deactivate()
+    assert exploration.ended.is_set()
+    assert (exploration.outcome.success, exploration.outcome.message) == (False, 'the explorer let go of the arm')
+    with pytest.raises(DeviceError, match='not connected'):
+        explorer._explorer.arm.command(ArmCommand())
+    recover = graph.peer.create_client(Trigger, 'recover')
+    graph.until(recover.service_is_ready)
+    answer = recover.call_async(Trigger.Request())
+    graph.until(answer.done)
+    assert not answer.result().success
+    assert 'no control of the arm' in answer.result().message
+    explorer.trigger_activate()
+    assert explorer._explorer.fault() == ''
+    explorer.trigger_shutdown()
+    assert label(explorer) == 'finalized'
+    with pytest.raises(DeviceError, match='not connected'):
+        explorer._explorer.arm.command(ArmCommand())
