@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from texture_core.features import FeatureVector
-from texture_estimation.classification.evidence_rules import GroupedEvidence, MajorityVote
+from texture_estimation.classification.evidence_rules import GroupedEvidence, MajorityVote, SoftVote
 from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.fingerprint import fingerprint_difference
@@ -75,6 +75,19 @@ def test_the_same_windows_further_apart_weigh_more(model, make_examples):
         predict(model, vectors(vague, hop_s=0.5))[-1].confidence
         > predict(model, vectors(vague, hop_s=0.02))[-1].confidence
     )
+
+
+def test_windows_late_in_a_slide_change_its_label_less_where_the_recipe_says_so(model, examples):
+    start, end = (vectors(examples, label=label, hop_s=0.5) for label in ('felt', 'cork'))
+    later = [dataclasses.replace(vector, start_ns=vector.start_ns + 2_500_000_000) for vector in end]
+    slide = [*start[:5], *later[:8]]
+    alike, careful = (
+        dataclasses.replace(model, recipe=dataclasses.replace(model.recipe, evidence=SoftVote(late_weight=weight)))
+        for weight in (1.0, 0.25)
+    )
+    assert predict(alike, slide)[-1].label == 'cork'
+    assert predict(careful, slide)[-1].label == 'felt'
+    assert [e.label for e in predict(careful, slide[:5])] == [e.label for e in predict(alike, slide[:5])]
 
 
 def under(stream, **conditions):

@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, MajorityVote, SoftVote
+from texture_estimation.classification.evidence_rules import (
+    EVIDENCE_RULES,
+    GroupedEvidence,
+    MajorityVote,
+    SoftVote,
+    running_means,
+)
 from texture_estimation.log_probabilities import is_tied, log_softmax
 
 
@@ -62,3 +68,24 @@ def test_many_slides_at_once_are_joined_as_one_by_one(name):
     for mean, windows, expected in zip(means, effective_windows[:, 0], together, strict=True):
         alone = rule.log_posterior(mean, windows, 0.7)
         np.testing.assert_allclose(alone, expected, rtol=1e-12)  # sums may be ordered otherwise
+
+
+def test_windows_late_in_a_slide_count_as_much_as_the_rule_says():
+    evidence = np.array([[0.0, -1.0]] * 5 + [[-1.0, 0.0]] * 8)
+    counts = np.arange(1.0, 14.0)
+    equal, less = (running_means(SoftVote(late_weight=weight), evidence, counts) for weight in (1.0, 0.25))
+    np.testing.assert_allclose(equal[:5], less[:5])
+    np.testing.assert_allclose(equal[-1], [-8 / 13, -5 / 13])
+    np.testing.assert_allclose(less[-1], [-2 / 7, -5 / 7])  # eight quarters are two windows
+
+
+def test_a_vote_of_groups_counts_every_window_alike():
+    np.testing.assert_array_equal(MajorityVote().window_weights(np.array([1.0, 5.0, 50.0])), 1.0)
+
+
+def test_evidence_gathered_window_by_window_has_the_same_mean_as_all_at_once():
+    rule, grouped = SoftVote(late_weight=0.25), GroupedEvidence(n_labels=3)
+    evidence, counts = np.random.default_rng(0).normal(size=(9, 3)), np.linspace(1.0, 9.0, 9)
+    for row, count, mean in zip(evidence, counts, running_means(rule, evidence, counts), strict=True):
+        grouped.add(row, new_s=0.5, weight=float(rule.window_weights(count)))
+        np.testing.assert_allclose(grouped.mean, mean)

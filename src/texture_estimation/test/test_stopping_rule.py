@@ -55,12 +55,20 @@ def test_without_anything_held_out_confidence_alone_decides():
 
 
 def test_at_the_start_of_a_slide_a_smaller_novelty_score_is_needed():
-    rule = StoppingRule(confidence=0.9, novelty_score=4.0, early_novelty_score=1.0)
-    assert rule.certain(0.95, 3.0, 0.9)
-    assert not rule.certain(0.95, 3.0, 1.1)
-    assert rule.certain(0.95, 3.2, 1.1)
-    assert not rule.certain(0.95, 3.2, 4.1)
+    rule = StoppingRule(confidence=0.9, novelty_score=40.0, early_novelty_score=0.5)
+    assert rule.certain(0.95, 1.0, 0.49)
+    assert not rule.certain(0.95, 1.0, 0.51)
+    assert rule.certain(0.95, 2.0, 2.9)  # six times as much after each further window
+    assert not rule.certain(0.95, 2.0, 3.1)
+    assert rule.certain(0.95, 3.0, 17.0)
+    assert not rule.certain(0.95, 3.0, 19.0)
+    assert not rule.certain(0.95, 4.0, 41.0)
     assert not StoppingRule(novelty_score=0.5, early_novelty_score=1.0).certain(0.99, 1.0, 0.8)
+
+
+def test_the_early_limit_of_a_slide_of_any_length_is_a_number():
+    assert StoppingRule(confidence=0.9, early_novelty_score=0.05).certain(0.95, 5000.0, 3.0)
+    assert not StoppingRule(confidence=0.9, early_novelty_score=0.0).certain(0.95, 5000.0, 3.0)
 
 
 def course(right, novelty_score, disturbance=''):
@@ -90,5 +98,5 @@ def test_an_early_limit_is_kept_while_the_rest_of_the_rule_is_fitted():
     slides = [course(right=True, novelty_score=0.7)] * 50
     free, limited = (fit_open_set_rule(slides, 0.02, 0.007, limit) for limit in (1e6, 0.4))
     assert free.certain(0.99, 1.0, 0.7)
-    assert not limited.certain(0.99, 3.0, 0.7)
-    assert limited.certain(0.99, 3.5, 0.7)
+    assert not limited.certain(0.99, 1.2, 0.7)
+    assert limited.certain(0.99, 1.4, 0.7)  # 0.4 · 6^0.4 = 0.82

@@ -134,12 +134,13 @@ class EvidenceAccumulator:
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns
         new_ns = max(0, end - max(vector.start_ns, self._end_ns))
-        self._evidence.add(window_evidence, new_ns / NANOSECONDS)
         self._evidence_ns += new_ns
+        effective_windows = self._evidence_ns / self._window_ns
+        weight = float(model.recipe.evidence.window_weights(effective_windows))
+        self._evidence.add(window_evidence, new_ns / NANOSECONDS, weight)
         self._end_ns = max(end, self._end_ns)
         if self._novelty is not None:
             best = int(window_evidence.argmax())
-            effective_windows = self._evidence_ns / self._window_ns
             self._novelty.add(vector.values, model.activations(vector.values), best, effective_windows)
 
     def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
@@ -153,7 +154,7 @@ class EvidenceAccumulator:
                 model=model.name if model else '',
                 message=self._message or (NO_WINDOW if final else ''),
             )
-        # All windows have the same weight; their effective number follows from the sliding time that they cover.
+        # The effective number of windows follows from the sliding time that they cover, whatever their weights.
         effective_windows = self._evidence_ns / self._window_ns
         mean = self._evidence.mean
         deciding = self._evidence.time_s * NANOSECONDS / self._window_ns

@@ -66,7 +66,7 @@ class DecisionParams(TrainingParams):
         0.02, 'Largest fraction of wrong decisions when slides are stopped early.', low=0.0, high=1.0
     )
     max_disturbed_error_rate: float = param(
-        0.0085,
+        0.005,
         'Largest fraction of wrong decisions when disturbed copies of held-out slides are stopped early; most of them '
         'are too strange to be stopped at all.',
         low=0.0,
@@ -74,8 +74,9 @@ class DecisionParams(TrainingParams):
     )
     early_novelty_score: float = param(
         NEVER,
-        'Largest novelty score at which a slide may end within its first three windows; a smaller one costs sliding '
-        'time and makes wrong decisions under disturbances rarer.',
+        'Largest novelty score at which a slide may end after its first window, and six times as much after each '
+        'further one that does not overlap; a smaller one costs sliding time and makes wrong decisions under '
+        'disturbances rarer.',
         low=0.0,
         high=NEVER,
     )

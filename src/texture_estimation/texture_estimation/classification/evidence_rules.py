@@ -15,6 +15,9 @@ from texture_estimation.log_probabilities import log_softmax, softmax
 # A label without a single vote keeps so much, so that its logarithm is finite.
 MIN_SHARE = 1e-6
 ROUNDING = 1e-9
+# Effective windows from which a slide counts as late. The novelty of a slide rests on as many, and slides that drift
+# begin to look like other textures after them.
+FULL_WINDOWS = 5.0
 
 
 class EvidenceRule(Protocol):
@@ -41,6 +44,20 @@ class EvidenceRule(Protocol):
         -------
         (..., n_labels)
             What is averaged over the windows.
+        """
+
+    def window_weights(self, effective_windows: float | Array) -> Array:
+        """Return the weight of windows in the mean evidence.
+
+        Parameters
+        ----------
+        effective_windows : (n_windows,) or a number
+            Effective window count including each window.
+
+        Returns
+        -------
+        (n_windows,) or a number
+            1 for a window that counts fully.
         """
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
@@ -93,11 +110,22 @@ class SoftVote:
     [0.941, 0.059]
     """
 
+    late_weight: float = param(
+        1.0,
+        'Sets the weight of windows later than five that do not overlap, relative to those before; with a smaller one, '
+        'drift within a long slide changes its label less, and what shows late in a slide counts less.',
+        low=0.0,
+        high=1.0,
+    )
     group: ClassVar[int] = 0
 
     def window_evidence(self, log_probabilities: Array) -> Array:
         """Return the log-probabilities as they are."""
         return log_probabilities
+
+    def window_weights(self, effective_windows: float | Array) -> Array:
+        """Return 1 for the first FULL_WINDOWS effective windows, and `late_weight` for those after them."""
+        return np.where(np.asarray(effective_windows) > FULL_WINDOWS + ROUNDING, self.late_weight, 1.0)
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return log softmax(n^tempering_exponent · mean log p), the last axis being the textures."""
@@ -153,6 +181,10 @@ class MajorityVote:
         votes: Array = (best & alone).astype(np.float64)
         return votes
 
+    def window_weights(self, effective_windows: float | Array) -> Array:
+        """Return 1 for each window: votes are counted."""
+        return np.ones(np.shape(effective_windows))
+
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the logarithm of the shares of the votes; equal ones for all labels where the majority is lacking.
 
@@ -196,7 +228,7 @@ class GroupedEvidence:
         self._group = group
         self._newest = self._decides = _Sum(np.zeros(n_labels))
 
-    def add(self, evidence: Array, new_s: float) -> None:
+    def add(self, evidence: Array, new_s: float, weight: float = 1.0) -> None:
         """Add the evidence of a window, (n_labels,), which adds so much new sliding time.
 
         Parameters
@@ -205,10 +237,13 @@ class GroupedEvidence:
             Evidence of the window.
         new_s
             Sliding time that no window before it covers.
+        weight
+            Weight of the window in the mean, above 0 for the first one.
         """
         if self._group and self._newest.count == self._group:
             self._newest = _Sum(np.zeros(len(evidence)))
-        self._newest.evidence += evidence
+        self._newest.evidence += evidence if weight == 1.0 else weight * evidence
+        self._newest.weight += weight
         self._newest.count += 1
         self._newest.time_s += new_s
         if not self._group or self._newest.count == self._group:
@@ -216,8 +251,8 @@ class GroupedEvidence:
 
     @property
     def mean(self) -> Array:
-        """Mean evidence of the windows that decide, (n_labels,)."""
-        return self._decides.evidence / self._decides.count
+        """Weighted mean evidence of the windows that decide, (n_labels,)."""
+        return self._decides.evidence / self._decides.weight
 
     @property
     def time_s(self) -> float:
@@ -229,7 +264,35 @@ class GroupedEvidence:
 class _Sum:
     evidence: Array
     count: int = 0
+    weight: float = 0.0
     time_s: float = 0.0
+
+
+def running_means(rule: EvidenceRule, evidence: Array, effective_windows: Array) -> Array:
+    """Return the weighted mean evidence of a slide after each window, where all windows decide together.
+
+    Parameters
+    ----------
+    rule
+        Weighs the windows.
+    evidence : (n_windows, n_labels)
+        Of each window.
+    effective_windows : (n_windows,)
+        Effective window count including each window.
+
+    Returns
+    -------
+    (n_windows, n_labels)
+        Mean of the evidence up to each window.
+
+    Examples
+    --------
+    >>> running_means(SoftVote(), np.array([[0.0], [1.0]]), np.array([1.0, 2.0])).tolist()
+    [[0.0], [0.5]]
+    """
+    weights = rule.window_weights(effective_windows)[:, None]
+    means: Array = np.cumsum(weights * evidence, axis=0) / np.cumsum(weights, axis=0)
+    return means
 
 
 def deciding_rows(count: int, group: int) -> slice:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_estimation.classification.evidence_rules import EvidenceRule
+from texture_estimation.classification.evidence_rules import EvidenceRule, running_means
 from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted, Learner, Predictor, hidden_layer
 from texture_estimation.open_set.class_distance import ClassDistance
@@ -126,7 +126,11 @@ def fit_novelty(
                 log_probabilities = fitted.held_out[groups == slide.group]
             else:
                 continue
-            traces.append(_trace(slide, rule.window_evidence(log_probabilities), predictor, distances, overlap))
+            evidence = rule.window_evidence(log_probabilities)
+            effective_windows = 1.0 + np.arange(len(evidence), dtype=np.float64) * overlap
+            means = running_means(rule, evidence, effective_windows)
+            followed = SlideTrace(slide.truth, means, effective_windows, np.zeros((0, 0)), slide.disturbance)
+            traces.append(_with_scores(followed, slide, evidence, predictor, distances))
     final = learner.predictor(fitted.parameters)
     distances = _fit_distances(slides, copies, final if hidden_layer(final) else None, overlap)
     held_out_scores = [_scores_at(traces, level) for level in EFFECTIVE_WINDOWS]
@@ -196,23 +200,24 @@ def _fit_distances(
     }
 
 
-def _trace(
-    slide: _Slide, evidence: Array, predictor: Predictor | None, distances: Mapping[str, ClassDistance], overlap: float
+def _with_scores(
+    trace: SlideTrace,
+    slide: _Slide,
+    evidence: Array,
+    predictor: Predictor | None,
+    distances: Mapping[str, ClassDistance],
 ) -> SlideTrace:
+    """Return the trace of a slide, whose windows gave this evidence, with the scores of its novelty."""
     hidden = hidden_layer(predictor) if predictor is not None else None
     activations = hidden(slide.values) if hidden else [None] * len(slide.values)
-    count = np.arange(1, len(evidence) + 1)
-    means = np.cumsum(evidence, axis=0) / count[:, None]
-    effective_windows = np.asarray(1.0 + (count - 1) * overlap, dtype=np.float64)
-    highest = np.sort(means, axis=1)[:, -2:]
+    highest = np.sort(trace.means, axis=1)[:, -2:]
     novelty = SlideNovelty(distances, evidence.shape[1])
     scores = []
-    for number, label in enumerate(means.argmax(axis=1).tolist()):
-        novelty.add(
-            slide.values[number], activations[number], int(evidence[number].argmax()), float(effective_windows[number])
-        )
+    for number, label in enumerate(trace.means.argmax(axis=1).tolist()):
+        effective_windows = float(trace.effective_windows[number])
+        novelty.add(slide.values[number], activations[number], int(evidence[number].argmax()), effective_windows)
         scores.append(novelty.scores(label, float(highest[number, 1] - highest[number, 0])))
-    return SlideTrace(slide.truth, means, effective_windows, np.array(scores), slide.disturbance)
+    return replace(trace, scores=np.array(scores))
 
 
 def _scores_at(traces: Sequence[SlideTrace], effective_windows: float) -> Array:

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
-from texture_estimation.classification.evidence_rules import EvidenceRule, deciding_rows
+from texture_estimation.classification.evidence_rules import EvidenceRule, deciding_rows, running_means
 from texture_estimation.classification.novelty_training import SlideTrace, fit_novelty
 from texture_estimation.incremental.training_examples import TrainingExamples
 from texture_estimation.learners.augmented_examples import AugmentedExamples
@@ -216,10 +216,10 @@ def _held_out_slides(
             parts = [rows[deciding_rows(int(number), rule.group)] for number in count]
             means = np.stack([window_evidence_rows[part].mean(axis=0) for part in parts])
             deciding = np.array([len(part) for part in parts], dtype=np.float64)
+            effective_window_counts = 1.0 + (deciding - 1.0) * overlap
         else:
-            means = np.cumsum(window_evidence_rows[rows], axis=0) / count[:, None]
-            deciding = count.astype(np.float64)
-        effective_window_counts = 1.0 + (deciding - 1.0) * overlap
+            effective_window_counts = 1.0 + (count.astype(np.float64) - 1.0) * overlap
+            means = running_means(rule, window_evidence_rows[rows], effective_window_counts)
         slides.append(_HeldOut(int(codes[rows[0]]), means, effective_window_counts))
     return slides
 

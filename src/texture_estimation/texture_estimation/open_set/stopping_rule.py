@@ -17,10 +17,12 @@ Mask = NDArray[np.bool_]
 CONFIDENCES = 1.0 - np.geomspace(0.5, 1e-4, 50)
 MAX_WINDOWS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0)
 NEVER = 1e6
-ROUNDING = 1e-9
 # Smaller ones make later slides of a session, which drift, wait for long (trained on slides 1-20, tested on 21-30).
 NOVELTY_SCORES = (NEVER, 9.0, 6.0)
-EARLY_WINDOWS = 3.0  # effective windows within which the limit for the start of a slide holds
+# The limit for the start of a slide grows by this factor with each effective window: a limit that ends at one moment
+# lets many slides end right after it. Chosen among 3, 4, 5, 6 and 8 on slides 21-30, trained on 1-20.
+EARLY_GROWTH = 6.0
+MAX_EARLY_WINDOWS = 20.0  # beyond, the limit grows no more, so that it stays a number
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,8 @@ class StoppingRule:
     novelty_score
         Largest novelty score at which a slide is stopped.
     early_novelty_score
-        Largest one within the first EARLY_WINDOWS effective windows, if it is smaller: little evidence shows little of
-        what is novel.
+        Largest one after the first window, if it is smaller, and EARLY_GROWTH times as much after each further
+        effective window: little evidence shows little of what is novel.
 
     Examples
     --------
@@ -70,8 +72,8 @@ class StoppingRule:
         -------
         bool
         """
-        early = effective_windows <= EARLY_WINDOWS + ROUNDING
-        limit = min(self.novelty_score, self.early_novelty_score) if early else self.novelty_score
+        growing = EARLY_GROWTH ** (min(effective_windows, MAX_EARLY_WINDOWS) - 1.0)
+        limit = min(self.novelty_score, self.early_novelty_score * growing)
         confident = confidence >= self.confidence and novelty_score <= limit
         return confident or effective_windows >= self.max_windows
 
@@ -185,7 +187,8 @@ class _CourseTable:
         self._novelty = filled((course.novelty_scores for course in courses), np.inf)
         self._windows = filled((course.effective_windows for course in courses), np.nan)
         known = filled((course.known for course in courses), 0.0) > 0.0
-        known &= (self._novelty <= early_novelty_score) | (self._windows > EARLY_WINDOWS + ROUNDING)
+        growing = EARLY_GROWTH ** (np.fmin(self._windows, MAX_EARLY_WINDOWS) - 1.0)
+        known &= self._novelty <= early_novelty_score * growing
         self._confidences = np.where(known, filled((course.confidences for course in courses), -1.0), -1.0)
         self._wrong = filled((~course.right for course in courses), 0.0) > 0.0
         self._whole = np.array([course.effective_windows[-1] for course in courses])

@@ -90,7 +90,13 @@ def decided_by_slide(scores: Array, slides: Codes, rule: EvidenceRule, hop_share
             kept[rows[deciding_rows(len(rows), rule.group)]] = True
         member, scores = member[kept], scores[kept]
     counts = np.bincount(member)
-    window_evidence_rows = rule.window_evidence(log_softmax(scores))
+    overlap = min(hop_share, 1.0)
+    order = np.argsort(member, kind='stable')
+    place = np.empty(len(member))
+    place[order] = np.arange(len(member)) - np.repeat(np.cumsum(counts) - counts, counts)
+    weights = rule.window_weights(1.0 + overlap * place)
+    window_evidence_rows = weights[:, None] * rule.window_evidence(log_softmax(scores))
     sums = np.stack([np.bincount(member, weights=column) for column in window_evidence_rows.T], axis=1)
-    effective_windows = 1.0 + min(hop_share, 1.0) * (counts[:, None].astype(np.float64) - 1.0)
-    return decisions(rule.log_posterior(sums / counts[:, None], effective_windows, 1.0)), first
+    means = sums / np.bincount(member, weights=weights)[:, None]
+    effective_windows = 1.0 + overlap * (counts[:, None].astype(np.float64) - 1.0)
+    return decisions(rule.log_posterior(means, effective_windows, 1.0)), first
