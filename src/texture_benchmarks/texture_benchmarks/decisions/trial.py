@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,6 +65,7 @@ def try_recipe(recipe: Recipe, bags: list[Path], options: BenchmarkOptions) -> T
     tested = later.features(recipe.feature_set)
     unknown, draws = (1, 2) if options.quick else (UNKNOWN, DRAWS)
     labels, rng = np.unique(trained.labels), np.random.default_rng(options.seed)
+    trained = _without_disturbed_copies(trained)
     return Trial(
         recipe,
         model,
@@ -71,6 +73,15 @@ def try_recipe(recipe: Recipe, bags: list[Path], options: BenchmarkOptions) -> T
         report.as_json(),
         np.array([_rejected(recipe, trained, tested, rng.permutation(labels)[:unknown]) for _ in range(draws)]),
     )
+
+
+def _without_disturbed_copies(examples: LabelledFeatures) -> LabelledFeatures:
+    """Return the examples without the copies on which early stopping is fitted: it plays no part in what is unknown."""
+    if examples.augmented is None:
+        return examples
+    disturbed = examples.augmented.disturbed
+    none = disturbed.select(np.zeros(len(disturbed.groups), dtype=bool))
+    return dataclasses.replace(examples, augmented=dataclasses.replace(examples.augmented, disturbed=none))
 
 
 def _rejected(recipe: Recipe, trained: LabelledFeatures, tested: LabelledFeatures, unknown: AnyArray) -> Array:
