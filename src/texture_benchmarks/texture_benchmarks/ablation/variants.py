@@ -39,8 +39,7 @@ SLOW_VARIANTS: Mapping[str, Changes] = {
     'segments overlap by 0.62': {'mean_log_bands': {'overlap': 0.625}},
     'without log_variance': {'log_variance': None},
     'without log_difference_variance': {'log_difference_variance': None},
-    'without level': {'mean': None},
-    'vibration alone': {'log_variance': None, 'log_difference_variance': None, 'mean': None},
+    'vibration alone': {'log_variance': None, 'log_difference_variance': None},
     'slow channels alone': {'mean_log_bands': None, 'moments': None, 'power_autocorrelation': None},
 }
 KEPT_CHANNELS: Mapping[str, tuple[str, ...]] = {
