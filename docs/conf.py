@@ -37,6 +37,7 @@ MADE = {
     '<!-- parameters -->': reference.parameters,
     '<!-- papers -->': reference.papers,
     '<!-- grades -->': reference.grades,
+    '<!-- recipes later -->': reference.later,
     **{f'<!-- experiment {name} -->': partial(reference.experiment, name) for name in reference.EXPERIMENTS},
 }
 MORE_PAGES = '<!-- more pages -->'

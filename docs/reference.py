@@ -152,6 +152,23 @@ def grades(root: Path) -> str:
     return f'{about} {person}\n\n' + '\n'.join(rows) + '\n'
 
 
+def later(root: Path) -> str:
+    """Return a table of the recipes on later slides, each with the definition that was measured, best first."""
+    numbers = json.loads((root / CHARTS / 'recipes_later.json').read_text(encoding='utf-8'))['numbers']
+    [cells] = next(
+        setting for setting in numbers.values() if isinstance(setting, dict) and 'by time' in setting
+    ).values()
+    rows = [
+        '| recipe | single windows or votes | slides after 5 s | windows or votes unclassified | definition |',
+        '|---|---|---|---|---|',
+    ]
+    for name, cell in sorted(cells.items(), key=lambda item: -item[1]['window_accuracy']):
+        after = cell['accuracy_at_s']['5.0']
+        shares = (cell['window_accuracy'], after, cell['unclassified_windows'])
+        rows.append(f'| {name} | {" | ".join(map(percent, shares))} | {cell.get("definition", "an earlier one")} |')
+    return '\n'.join(rows) + '\n'
+
+
 def percent(share: float | list[float] | None) -> str:
     """Return a share in percent, with its interval if it has one."""
     if share is None:
