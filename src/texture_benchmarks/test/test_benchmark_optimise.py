@@ -1,10 +1,19 @@
+from itertools import combinations
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.optimise.cases import CASES, DATA, LINEAR
+from texture_benchmarks.optimise.pairs_run import CASES as PAIR_CASES
+from texture_benchmarks.optimise.pairs_run import counts, measured, recognised
 from texture_benchmarks.result import BenchmarkOptions
+from texture_estimation.learners.learner import of_examples
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.search.feature_cache import FeatureCache
+from texture_estimation.search.fitness import decisions
+from texture_estimation.search.joined_pairs import joined_recipe
 
 
 def test_searches_have_the_size_of_the_papers() -> None:
@@ -32,3 +41,39 @@ def test_the_short_bench_searches_the_linear_experiment_alone(tmp_path: Path) ->
     assert tuple(result.numbers['searches']) == LINEAR
     assert path.name == 'optimise.json'
     assert all(chart.is_file() for chart in result.charts)
+
+
+@pytest.mark.benchmark
+def test_choices_of_all_pairs_are_counted_and_the_pairs_are_tested_together(tmp_path: Path) -> None:
+    result, path = run_benchmark('optimise_pairs', BenchmarkOptions(tmp_path, quick=True))
+    assert path.name == 'optimise-pairs.json'
+    assert set(result.numbers['cases']) == set(PAIR_CASES)
+    for case in result.numbers['cases'].values():
+        assert sum(case['counts']['ranking'].values()) == len(case['chosen']) == 3
+        for shares in case['tested'].values():
+            assert 0.0 <= shares['recognised'][0] <= 1.0
+    linear = result.numbers['cases']['linear, SVM']
+    assert Recipe.from_mapping(linear['joined'], 'joined').learner_name == 'tuned_pairs'
+
+
+def test_counts_are_of_options_and_of_numbers_lowest_median_and_highest() -> None:
+    chosen = [{'ranking': 'frequency', 'peaks': peaks} for peaks in (2, 3, 15)]
+    assert counts(chosen) == {'ranking': {'frequency': 3}, 'peaks': [2.0, 3.0, 15.0]}
+
+
+def test_all_pairs_together_decide_as_the_one_model_that_joins_them() -> None:
+    case = PAIR_CASES['ten textures, SVM']
+    slides, trained_on = measured(case, BenchmarkOptions(Path(), quick=True))
+    names = np.unique(slides.labels).tolist()
+    base = load_recipe(case.recipe)
+    recipes = dict.fromkeys(combinations(names, 2), base)
+    together = recognised(recipes, slides, trained_on)
+    model = joined_recipe(recipes, base)
+    windows = slides(model.training_windows)
+    values = FeatureCache(slides).values(model.feature_set)
+    layout = ((windows.inputs['signal'].rate_hz, ('dynamic',)),)
+    learner = of_examples(model.learner, model.feature_set.names(layout), names)
+    codes = np.unique(slides.labels, return_inverse=True)[1]
+    fitted = learner.fit(values[trained_on], codes[trained_on], np.flatnonzero(trained_on))
+    decided = decisions(learner.predictor(fitted.parameters)(values[~trained_on]))
+    assert np.mean(decided == codes[~trained_on]) == pytest.approx(together['recognised'][0], abs=1e-4)
