@@ -22,6 +22,8 @@ VENV = ROOT / '.venv'
 PYTHON = VENV / 'bin' / 'python'
 LOCK = ROOT / 'tools' / 'requirements.txt'
 WANTED = ROOT / 'tools' / 'requirements.in'
+DISTRIBUTION = 'jazzy'
+INTERFACES = ROOT / 'tools' / 'interfaces'  # messages that the wheels of ROS lack
 SUPPORTED = [(3, minor) for minor in (10, 11, 12, 13)]
 # Prefixes of the machine that made the wheels, left in their CMake exports; both have a counterpart here.
 BUILD_INCLUDE = re.compile(r'/opt/python/cp\d+-cp\d+/include/python3\.\d+')
@@ -40,7 +42,7 @@ def main() -> int:
     fcntl.flock(lock, fcntl.LOCK_EX)  # two calls at once wait for each other
     try:
         interpreter = choose_interpreter()
-        sourced = sourced_ros()
+        sourced = checked_distribution(sourced_ros())
         made = once('venv', [], lambda: make_venv(interpreter, sourced), extra=sourced)
         installed = once('packages', [LOCK], lambda: install_packages(sourced), extra=made)
         once('build', built_files(), build, extra=f'{installed} {linked_files()}')
@@ -80,6 +82,16 @@ def sourced_ros() -> str:
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     foreign = [p for p in prefixes if p and not Path(p).is_relative_to(ROOT)]
     return os.environ.get('ROS_DISTRO', '') if foreign else ''
+
+
+def checked_distribution(sourced: str) -> str:
+    """Return the name of the sourced distribution, or ''; SetupError if the suite is not made for it."""
+    if sourced not in ('', DISTRIBUTION):
+        raise SetupError(
+            f"ROS 2 '{sourced}' is sourced in this shell, and the suite is made for '{DISTRIBUTION}'; open a shell "
+            f'without it, or source /opt/ros/{DISTRIBUTION}/setup.bash instead'
+        )
+    return sourced
 
 
 def once(step: str, inputs: list[Path], action: Callable[[], None], extra: str = '') -> str:
@@ -159,7 +171,9 @@ def fix_build_paths() -> None:
 
 def built_files() -> list[Path]:
     """Return every file of src/ from which the build makes something."""
-    return sorted({path for pattern in BUILT for path in (ROOT / 'src').glob(f'*/**/{pattern}') if path.is_file()})
+    places = (ROOT / 'src', INTERFACES)
+    found = {path for place in places for pattern in BUILT for path in place.glob(f'*/**/{pattern}')}
+    return sorted(path for path in found if path.is_file())
 
 
 def linked_files() -> list[Path]:
@@ -185,10 +199,18 @@ def build() -> None:
     }
     quiet = ['--event-handlers', 'console_direct-', 'console_stderr-', 'summary+']
     run(
-        PYTHON, '-m', 'colcon', 'build', '--merge-install', '--symlink-install', *quiet,
+        PYTHON, '-m', 'colcon', 'build', '--base-paths', 'src', *missing_interfaces(prefixes),
+        '--merge-install', '--symlink-install', *quiet,
         '--cmake-args', f'-DPython3_EXECUTABLE={PYTHON}', '-DBUILD_TESTING=OFF', '-G', 'Ninja', env=env,
     )  # fmt: skip
     write_commands(env)
+
+
+def missing_interfaces(prefixes: list[str]) -> list[Path]:
+    """Return the folders of the interfaces that no prefix has: they are built here, and never where ROS brings them."""
+    places = [Path(prefix) / 'share' for prefix in os.pathsep.join(prefixes).split(os.pathsep) if prefix]
+    names = sorted(path.name for path in INTERFACES.iterdir() if path.is_dir())
+    return [INTERFACES / name for name in names if not any((place / name / 'package.xml').exists() for place in places)]
 
 
 def wheel_libraries() -> list[str]:

@@ -1,0 +1,37 @@
+"""The set-up of the workspace, as far as it decides something."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+import workspace
+
+
+@pytest.mark.parametrize('sourced', ['', 'jazzy'])
+def test_no_ros_and_jazzy_are_taken(sourced: str) -> None:
+    assert workspace.checked_distribution(sourced) == sourced
+
+
+def test_another_distribution_is_refused_with_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
+    monkeypatch.setenv('ROS_DISTRO', 'humble')
+    assert workspace.main() == 2
+    said = capsys.readouterr().err
+    assert "ROS 2 'humble' is sourced in this shell" in said
+    assert 'source /opt/ros/jazzy/setup.bash' in said
+
+
+def test_an_interface_is_built_only_where_no_prefix_has_it(tmp_path: Path) -> None:
+    assert [path.name for path in workspace.missing_interfaces([str(tmp_path)])] == ['tf2_msgs']
+    share = tmp_path / 'share' / 'tf2_msgs'
+    share.mkdir(parents=True)
+    (share / 'package.xml').touch()
+    assert workspace.missing_interfaces(['/nowhere', str(tmp_path)]) == []
+
+
+def test_the_interfaces_of_the_set_up_are_hidden_from_a_workspace_that_holds_the_repository() -> None:
+    assert (workspace.INTERFACES.parent / 'COLCON_IGNORE').is_file()
