@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from texture_core.rotation import quaternion_matrix, rotation_matrix, rotation_vector
+from texture_core.rotation import quaternion, quaternion_matrix, rotation_matrix, rotation_vector
 
 
 def test_a_quarter_turn_about_z_brings_x_to_y() -> None:
@@ -44,3 +44,8 @@ def test_the_rotation_vector_of_a_matrix_gives_the_matrix_again(angle_rad: float
     vector = rotation_vector(matrix)
     assert rotation_matrix(vector) == pytest.approx(matrix, abs=1e-12)
     assert np.linalg.norm(vector) == pytest.approx(angle_rad, abs=1e-8)
+
+
+@pytest.mark.parametrize('turned', [(0.0, 0.0, 0.0), (1e-9, 0.0, 0.0), (0.3, -0.2, 0.9), (np.pi, 0.0, 0.0)])
+def test_a_quaternion_turns_as_its_rotation_vector(turned: tuple[float, ...]) -> None:
+    assert quaternion_matrix(quaternion(turned)) == pytest.approx(rotation_matrix(turned), abs=1e-12)

@@ -31,6 +31,29 @@ def rotation_matrix(rotation_vector_rad: Sequence[float] | Array) -> Array:
     return matrix
 
 
+def quaternion(rotation_vector_rad: Sequence[float] | Array) -> tuple[float, float, float, float]:
+    """Return the quaternion x, y, z, w of ROS that turns by |r| about the axis r/|r|.
+
+    Parameters
+    ----------
+    rotation_vector_rad : (3,)
+
+    Returns
+    -------
+    (4,)
+        Of length 1.
+
+    Examples
+    --------
+    >>> [round(value, 3) for value in quaternion((0.0, 0.0, np.pi / 2))]
+    [0.0, 0.0, 0.707, 0.707]
+    """
+    vector = np.array(rotation_vector_rad, dtype=float)
+    half = 0.5 * float(np.linalg.norm(vector))
+    x, y, z = (0.5 * np.sinc(half / np.pi) * vector).tolist()  # sin(half)/|r| in a form that holds for 0
+    return x, y, z, float(np.cos(half))
+
+
 def quaternion_matrix(quaternion: Sequence[float]) -> Array:
     """Return the matrix of a rotation that is given as the quaternion x, y, z, w of ROS.
 

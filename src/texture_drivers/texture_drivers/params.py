@@ -20,7 +20,10 @@ class SensorParams:
         '',
         "Sets the settings of the sensor: path of a YAML file or name of one in config/sensors; '' takes the defaults.",
     )
-    frame_id: str = param('fingertip', 'Sets the frame of the fingertip in the headers of the published messages.')
+    frame_id: str = param(
+        'fingertip',
+        'Sets the frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+    )
     batch_s: float = param(
         0.01,
         'Sets the duration of one published batch; a longer batch costs less computing time and adds latency.',

@@ -13,6 +13,7 @@ from texture_core.errors import InvalidData
 from texture_core.parameters import param
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
+from texture_core.ros.frames import frame_name
 from texture_core.ros.parameters import declare
 from texture_core.ros.qos import SENSOR_QOS
 from texture_core.ros.run import run
@@ -33,7 +34,10 @@ class BiotacAdaptorParams:
     finger: int = param(
         0, 'Sets the index of the finger that is converted; 0 is the first one of the message.', low=0, high=4
     )
-    frame_id: str = param('fingertip', 'Sets the frame of the fingertip in the headers of the published messages.')
+    frame_id: str = param(
+        'fingertip',
+        'Sets the frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+    )
 
 
 class BiotacAdaptor(Node):
@@ -43,7 +47,9 @@ class BiotacAdaptor(Node):
         super().__init__('biotac_adaptor', **kwargs)
         self._params = declare(self, BiotacAdaptorParams)
         layout = find(MESSAGES, self._params.message_type.rpartition('/')[2], 'layout of BioTac messages')
-        self._stream = BioTacMessageConverter(layout, self._params.finger, self._params.frame_id)
+        self._stream = BioTacMessageConverter(
+            layout, self._params.finger, frame_name(self.get_namespace(), self._params.frame_id)
+        )
         self._messages = self._refused = 0
         self._fault = ''
         self._signals = {topic: self.create_publisher(msg.TactileSignal, topic, SENSOR_QOS) for topic in TOPICS}

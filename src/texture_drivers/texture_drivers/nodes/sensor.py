@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -16,6 +16,7 @@ from texture_core.parameters import param
 from texture_core.protocols import Sensor
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.diagnostics import Diagnostics
+from texture_core.ros.frames import frame_name
 from texture_core.ros.parameters import declare, read
 from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
@@ -121,12 +122,17 @@ class SensorNode(LifecycleNode):
 
     def _publish(self, topic: str, batch: TactileSignal) -> None:
         published, baseline = self._watch.add(topic, batch)
-        self._topics[topic].publish(to_msg(published))
+        self._topics[topic].publish(to_msg(self._in_frame(topic, published)))
         if baseline is not None:
             self._publish_baseline(topic, baseline)
 
+    def _in_frame(self, topic: str, signal: TactileSignal) -> TactileSignal:
+        """Return a signal in the frame of its fingertip, as tf names it: 'left/finger0/fingertip'."""
+        finger = f'{self.get_namespace()}/{topic.rpartition("/")[0]}'
+        return replace(signal, frame_id=frame_name(finger, signal.frame_id))
+
     def _publish_baseline(self, topic: str, baseline: Baseline) -> None:
-        self._baselines[topic].publish(to_msg(baseline.as_signal()))
+        self._baselines[topic].publish(to_msg(self._in_frame(topic, baseline.as_signal())))
         self.get_logger().info(f"'{topic}' is tared")
 
     def _on_tare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -13,6 +13,7 @@ from texture_core.errors import InvalidData
 from texture_core.parameters import param
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
+from texture_core.ros.frames import frame_name
 from texture_core.ros.parameters import declare
 from texture_core.ros.qos import SENSOR_QOS
 from texture_core.ros.run import run
@@ -48,7 +49,10 @@ class Tsf85AdaptorParams:
         low=0.001,
         high=0.1,
     )
-    frame_id: str = param('fingertip', 'Sets the frame of the fingertip in the headers of the published messages.')
+    frame_id: str = param(
+        'fingertip',
+        'Sets the frame of the fingertip in the published messages; in a namespace NAMESPACE/ is put before it.',
+    )
 
 
 class Tsf85Adaptor(Node):
@@ -58,7 +62,9 @@ class Tsf85Adaptor(Node):
         super().__init__('tsf85_adaptor', **kwargs)
         params = self._params = declare(self, Tsf85AdaptorParams)
         settings = Tsf85Settings(imu=params.imu)
-        self._stream = Tsf85MessageConverter(params.finger, settings, params.static_rate_hz, params.frame_id)
+        self._stream = Tsf85MessageConverter(
+            params.finger, settings, params.static_rate_hz, frame_name(self.get_namespace(), params.frame_id)
+        )
         self._refused = self._received = 0
         self._fault = ''
         self._counts = dict(self._stream.counts)

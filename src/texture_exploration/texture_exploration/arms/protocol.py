@@ -120,6 +120,10 @@ class SurfaceBound(Protocol):
     """An arm with a base frame, in which the surface has a pose."""
 
     @property
+    def base_frame_id(self) -> str:
+        """Name of the base frame on tf."""
+
+    @property
     def surface_pose(self) -> tuple[float, ...]:
         """Pose of the surface in the base frame: place in m, then a rotation vector in rad, (6,)."""
 

@@ -207,6 +207,11 @@ class RosControllersArm:
             raise DeviceError(f'the arm did not recover: {fault}')
 
     @property
+    def base_frame_id(self) -> str:
+        """Name of the base frame on tf."""
+        return self._params.base_frame_id
+
+    @property
     def surface_pose(self) -> tuple[float, ...]:
         """Pose of the surface in the base frame."""
         return self._params.surface_pose

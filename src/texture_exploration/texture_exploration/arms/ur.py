@@ -17,6 +17,7 @@ from texture_exploration.arms.ur_probe import check_ready, unlock_protective_sto
 from texture_exploration.arms.ur_program import check_program
 from texture_exploration.arms.ur_tables import SAFETY_FAULTS
 
+BASE_FRAME_ID = 'base'  # as ur_robot_driver and UR's own description call it, without a prefix
 STANDSTILL = ArmCommand()
 RECOVERY_S = 6.0
 POLL_S = 0.01
@@ -152,6 +153,11 @@ class UrArm:
             if time.monotonic() > end_s:
                 raise DeviceError(f'the arm did not recover: {fault}; look at the pendant')
             time.sleep(POLL_S)
+
+    @property
+    def base_frame_id(self) -> str:
+        """Name of the base frame on tf."""
+        return BASE_FRAME_ID
 
     @property
     def surface_pose(self) -> tuple[float, ...]:

@@ -35,6 +35,7 @@ from texture_exploration.exploration import Exploration, no_signal_watch
 from texture_exploration.exploration_ids import ExplorationIds
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
+from texture_exploration.ros.frame_broadcaster import FrameBroadcaster, FrameParams
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.signal_watch import SignalWatch, SignalWatchParams
 
@@ -63,13 +64,6 @@ class StartParams:
     )
 
 
-@dataclass(frozen=True)
-class FrameParams:
-    """The frame of what is published."""
-
-    surface_frame_id: str = param('surface', 'Sets the frame of the surface in the headers of the published states.')
-
-
 class ExplorerNode(LifecycleNode):
     """Explore on request, as a service or as an action; publish what the finger is doing.
 
@@ -80,7 +74,8 @@ class ExplorerNode(LifecycleNode):
         super().__init__('explorer', **kwargs)
         self._early_stopping = declare(self, EarlyStoppingParams, changeable=True)
         self._explorer = self._make_explorer()
-        self._surface_frame_id = declare(self, FrameParams).surface_frame_id
+        self._frames = FrameBroadcaster(self, declare(self, FrameParams))
+        self._broadcast_surface()
         self._follow_parameters()
         self._ids = ExplorationIds(np.random.default_rng())
         self._open: dict[str, ExplorationEstimates] = {}  # explorations whose caller still waits, by id
@@ -283,6 +278,8 @@ class ExplorerNode(LifecycleNode):
             response.message, response.success = self._explorer.touch_surface(), True
         except (DeviceError, MotionRefused) as error:
             response.message = str(error)
+        else:
+            self._broadcast_surface()
         self.get_logger().info(f'touch_surface: {response.message}')
         return response
 
@@ -316,9 +313,15 @@ class ExplorerNode(LifecycleNode):
                 idle = ExplorationState(self._explorer.now_ns(), '', '', Phase.IDLE)
                 self._publish(self._stamped(idle))
 
+    def _broadcast_surface(self) -> None:
+        arm = self._explorer.arm
+        if isinstance(arm, SurfaceBound):
+            self._frames.surface(arm.base_frame_id, arm.surface_pose)
+
     def _publish(self, state: ExplorationState) -> None:
         try:
             self._states.publish(to_msg(state))
+            self._frames.fingertip(state)
         except RCLError:
             # After a shutdown of ROS nobody listens any more, but the finger still has to be lifted.
             if self.context.ok():
@@ -328,7 +331,7 @@ class ExplorerNode(LifecycleNode):
         """Return the state with its stamp on the clock of ROS instead of CLOCK_MONOTONIC."""
         age_ns = self._explorer.now_ns() - state.stamp_ns
         stamp_ns = self.get_clock().now().nanoseconds - age_ns
-        return replace(state, stamp_ns=stamp_ns, frame_id=self._surface_frame_id)
+        return replace(state, stamp_ns=stamp_ns, frame_id=self._frames.surface_frame_id)
 
     def _report(self) -> DiagnosticReport:
         current, fault = self._explorer.current, self._explorer.fault()

@@ -44,7 +44,7 @@ class FeatureExtractor(Node):
         self._invalid = 0
         self._reported = 0
         self._sent = 0
-        self._frame_id = ''  # of the fingertip
+        self._frame_id = ''  # of the fingertip, of several that of the first input
         self._sensors: dict[str, str] = {}  # by topic
         self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)
         self.create_subscription(msg.ExplorationState, 'exploration', self._on_state, STATE_QOS)
@@ -54,7 +54,8 @@ class FeatureExtractor(Node):
         self._diagnostics = Diagnostics(self, self._report)
 
     def _on_signal(self, topic: str, message: msg.TactileSignal) -> None:
-        self._frame_id = message.header.frame_id
+        if topic == self._feature_set.topics[0]:
+            self._frame_id = message.header.frame_id
         self._sensors[topic] = message.sensor
         self._add(partial(self._cutter.add_signal, topic), message)
 
