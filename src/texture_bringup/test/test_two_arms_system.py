@@ -101,6 +101,8 @@ def test_two_arms_explore_at_once_with_their_own_estimates_and_a_finger_that_dro
         reports = graph.listen(DiagnosticArray, '/diagnostics')
         streams = [graph.listen(TactileSignal, name, SENSOR_QOS) for name in STREAMS]
         graph.until(lambda: all(streams))
+        frames = [batches[-1].header.frame_id for batches in streams]
+        assert frames == ['left/fingertip', 'right/finger0/fingertip', 'right/finger1/fingertip']
         explored = at_once(explore)
         assert {arm: result.message for arm, result in explored.items()} == dict.fromkeys(
             SURFACES, 'the motion ended as asked'
