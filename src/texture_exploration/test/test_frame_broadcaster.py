@@ -69,7 +69,7 @@ def test_the_fingertip_is_broadcast_if_wanted_and_known():
     assert '/tf_static' not in owner.published
 
 
-def test_without_tf2_messages_only_the_wish_for_the_fingertip_is_refused(monkeypatch):
+def test_without_tf2_messages_only_a_fingertip_that_is_asked_for_is_refused(monkeypatch):
     def missing(name):
         raise ImportError(name)
 
