@@ -262,6 +262,22 @@ def test_trials_of_arrays_for_machine_learning_are_slides(tmp_path: Path) -> Non
     np.testing.assert_allclose(read[1], samples[3], atol=1e-6)
 
 
+def test_arrays_whose_axes_were_mixed_up_are_put_in_order(tmp_path: Path) -> None:
+    taxels = np.random.default_rng(0).normal(size=(75, 60))
+    mixed = taxels.reshape(6, 75, 10).transpose(1, 0, 2).reshape(75, 60)  # six patches of ten taxels
+    import_tables(load_mapping('icub20'), save(tmp_path, **{'oak/val_0_01': mixed}) / 'in', tmp_path / 'out')
+    [read], _ = SlideDataset.from_bags([tmp_path / 'out']).to_numpy('signal_static')
+    np.testing.assert_allclose(read, taxels, atol=1e-6)
+
+
+def test_an_order_of_axes_that_does_not_fit_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidParameter, match='each axis of reshape is needed once'):
+        one_channel(format={'reshape': [5, 2], 'axes': [0, 2]})
+    mapping = one_channel(format={'reshape': [5, 7], 'axes': [1, 0]})
+    with pytest.raises(InvalidData, match=r'an array of the shape \(5, 6\) has 30 values'):
+        import_tables(mapping, save(tmp_path, x=np.zeros((5, 6))) / 'in', tmp_path / 'out')
+
+
 def test_a_shipped_mapping_is_found_by_its_name(tmp_path: Path) -> None:
     slides = {
         f'material0{m}/val_{k % 2}_0{k}': np.full((75, 60), float(k), np.float32) for m in (1, 2) for k in range(3)

@@ -36,6 +36,19 @@ class FileFormat:
     skip_rows: int = param(0, 'Number of lines of a text file that are skipped at its top.', low=0, high=10_000)
     header: bool = param(True, 'Says whether a row with names of columns comes first; without, they count from 0.')
     transpose: bool = param(False, 'Says whether arrays are (n_channels, n_samples) and not (n_samples, n_channels).')
+    reshape: list[int] = param(  # noqa: RUF009 – it gives a field
+        [], 'Sets the shape in which the values of an array are read, for arrays that were stored with mixed up axes.'
+    )
+    axes: list[int] = param(  # noqa: RUF009 – it gives a field
+        [], 'Sets the order of the axes of `reshape` in which the values fill the shape of the array, all from 0.'
+    )
+
+    def __post_init__(self) -> None:
+        if sorted(self.axes) != list(range(len(self.reshape))):
+            raise InvalidParameter(
+                f'format: reshape is {self.reshape} and axes are {self.axes}; each axis of reshape is needed once, '
+                'such as reshape: [75, 6, 10] and axes: [1, 0, 2]'
+            )
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
-from texture_recordings.tables.mapping import TableMapping
+from texture_recordings.tables.mapping import FileFormat, TableMapping
 from texture_recordings.tables.name_template import NameTemplate
 from texture_recordings.tables.table import EXAMPLES, Columns, MalformedRow, Table, check_size
 
@@ -34,7 +35,7 @@ def tables_of(
     place
         File, for sentences.
     mapping
-        Says what is a table, and whether arrays are transposed.
+        Says what is a table, and how the axes of arrays are ordered.
 
     Yields
     ------
@@ -53,7 +54,7 @@ def tables_of(
         )
     for table, (fields, members) in sorted(groups.items()):
         within = f'{place}, {table}' if table else place
-        arrays = {column: _turned(load(name), transpose=mapping.format.transpose) for column, name in members.items()}
+        arrays = {column: _arranged(load(name), mapping.format, within) for column, name in members.items()}
         columns, constants = _columns(arrays, within)
         yield Table(within, tuple(columns), partial(table_columns, columns, within), {**constants, **fields})
 
@@ -73,8 +74,15 @@ def _groups(names: Sequence[str], template: str) -> dict[str, tuple[dict[str, st
     return groups
 
 
-def _turned(array: AnyArray, *, transpose: bool) -> AnyArray:
-    return np.swapaxes(array, -1, -2) if transpose and array.ndim > 1 else array
+def _arranged(array: AnyArray, form: FileFormat, place: str) -> AnyArray:
+    if form.reshape and array.ndim > 1:
+        if array.size != math.prod(form.reshape):
+            raise InvalidData(
+                f"'{place}': an array of the shape {array.shape} has {array.size} values and cannot be read as "
+                f'{form.reshape}; correct `reshape` under `format`'
+            )
+        array = array.reshape(form.reshape).transpose(form.axes).reshape(array.shape)
+    return np.swapaxes(array, -1, -2) if form.transpose and array.ndim > 1 else array
 
 
 def _columns(arrays: Mapping[str, AnyArray], place: str) -> tuple[dict[str, AnyArray], dict[str, str]]:
