@@ -42,7 +42,8 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         name='sensors-faults',
         measured='packets recovered unharmed, and false packets believed, of those sent',
         data=f'{n_packets} packets of random content from each emulated device; a packet is one frame on its line '
-        '(a millisecond of the TSF-85, 10 ms of the BioTac, 4 ms of the DAQ finger, 8 ms of the PVDF film)',
+        '(a millisecond of the TSF-85, 10 ms of the BioTac, 4 ms of the DAQ finger, 8 ms of the PVDF film, '
+        'one sample of the AnySkin or PapillArray)',
         split='none: nothing is trained',
         numbers={
             sensor: {
