@@ -1,8 +1,9 @@
+import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter, TextureError
 from texture_core.resources import folder
-from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.recipe import DecisionParams, Recipe, load_recipe
 from texture_estimation.roughness.recipe import RoughnessRecipe
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
@@ -62,3 +63,12 @@ def test_augmentation_is_a_section_of_training_that_only_a_network_takes():
     wrong = {**content, 'learner': 'mlp', 'training': {'augmentation': {'copy': 3}}}
     with pytest.raises(TextureError, match=r"recipe 'mine', training, augmentation: .*'copies'"):
         Recipe.from_mapping(wrong, 'mine')
+
+
+def test_distances_of_training_windows_lie_between_those_of_both_speeds():
+    training = DecisionParams(slowest_m_s=0.02, fastest_m_s=0.32)
+    np.testing.assert_allclose(training.distances_m(0.5), [0.01, 0.02, 0.04, 0.08, 0.16])
+    assert DecisionParams().distances_m(0.5) == ()
+    for wrong in ({'slowest_m_s': 0.1}, {'fastest_m_s': 0.1}, {'slowest_m_s': 0.2, 'fastest_m_s': 0.1}):
+        with pytest.raises(InvalidParameter, match='give both, the lower speed first, or neither'):
+            DecisionParams(**wrong)

@@ -61,3 +61,36 @@ def test_with_a_common_scale_what_hardly_varies_stays_small():
     assert deviations[1] / deviations[0] == pytest.approx(values[:, 1].std() / values[:, 0].std())
     assert np.mean(deviations**2) == pytest.approx(1.0)
     assert SvmRbf(common_scale=True)._fit_svc(np.ones((4, 2)), np.arange(4) % 2)[0].scale_[0] == 1.0
+
+
+def sheared(seed, shear, slides=8, windows=6):
+    """Return windows of two textures that differ along feature 0, sheared along 1 and 2, with labels and slides."""
+    rng = np.random.default_rng(seed)
+    codes = np.repeat([0, 1], slides * windows)
+    groups = np.repeat(np.arange(2 * slides), windows)
+    values = 0.2 * rng.normal(size=(len(codes), 3)) + np.outer(codes, [1.0, 0.5, 0.0])
+    return values + shear * np.array([0.0, 2.0, 1.0]), codes, groups
+
+
+def test_a_turn_that_only_the_start_of_slides_shows_is_taken_out_by_the_whitening():
+    values, codes, groups = sheared(0, shear=1.0)
+    turn = np.tile([0.0, 2.0, 1.0], (16, 1)) + 0.05 * np.random.default_rng(1).normal(size=(16, 3))
+    turn[3] = np.nan  # a slide without a touch before it
+    turned, truth, _ = sheared(2, shear=-1.0)
+
+    def accuracy(learner, differences):
+        predictor = learner.predictor(learner.fit(values, codes, groups, differences).parameters)
+        return (predictor(turned).argmax(axis=1) == truth).mean()
+
+    learner = SvmRbf(common_scale=True, whitening=0.01)
+    assert accuracy(learner, None) < 0.7
+    assert accuracy(learner, turn) > 0.95
+
+
+def test_whitened_windows_get_the_same_numbers_alone_as_together():
+    values, codes, groups = sheared(0, shear=0.0)
+    learner = SvmRbf(whitening=0.1)
+    predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
+    together = predictor(values)
+    for window, expected in zip(values[:10], together, strict=False):
+        np.testing.assert_allclose(predictor(window), expected, atol=1e-12)

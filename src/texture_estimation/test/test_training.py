@@ -13,6 +13,7 @@ from texture_features.augmentation.augmented_features import AugmentedFeatures, 
 from texture_features.labelled_features import LabelledFeatures
 
 RECIPE = load_recipe('default')
+RECIPE_OF_PAIRS = load_recipe('any-speed')
 
 
 def accuracy(model, examples):
@@ -193,3 +194,14 @@ def test_a_recipe_without_augmentation_ignores_copies(make_examples):
     recipe = dataclasses.replace(load_recipe('default'), augmentation=Augmentation())
     with_copies, without = train(recipe, augmented(examples, np.zeros(6))), train(recipe, examples)
     np.testing.assert_array_equal(with_copies.parameters['hidden'], without.parameters['hidden'])
+
+
+def test_windows_of_other_lengths_train_the_learner_and_decide_nothing_else(make_examples):
+    examples, shorter = make_examples(), make_examples(seed=1, labels=('cork', 'felt', 'wood', 'slate'), windows=3)
+    moved = dataclasses.replace(shorter, values=shorter.values + 10.0)
+    both = dataclasses.replace(examples, resized=moved)
+    alone, wider = train(RECIPE_OF_PAIRS, examples), train(RECIPE_OF_PAIRS, both)
+    assert accuracy(wider, moved) > 0.9 > accuracy(alone, moved)
+    assert wider.training['windows'] == alone.training['windows'] == len(examples.labels)
+    kept = dataclasses.replace(both.of_slides(sorted(set(examples.groups) - {'cork/0'})))
+    assert train(RECIPE_OF_PAIRS, kept).training['slides'] == 15  # those of the slide left out are left out, too

@@ -24,6 +24,7 @@ from texture_features.windowing.windows import WindowParams
 KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
 AUGMENTATION = 'augmentation'  # section within `training`
 AUGMENTABLE = ('mlp',)
+SPEEDS = 5  # from the slowest to the fastest, for windows of as many lengths
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,30 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=0.5,
     )
+    slowest_m_s: float = param(
+        0.0,
+        'Sets the lowest speed at which surfaces will be explored: further training windows show as little of a '
+        'surface as one shows at this speed; 0: none.',
+        unit='m/s',
+        low=0.0,
+        high=10.0,
+    )
+    fastest_m_s: float = param(
+        0.0,
+        'Sets the highest speed at which surfaces will be explored: further training windows show as much of a surface '
+        'as one shows at this speed; 0: none.',
+        unit='m/s',
+        low=0.0,
+        high=10.0,
+    )
+    touch_s: float = param(
+        0.0,
+        'Sets how much of the touch before the finger moves shows what friction does to the load, which the whitening '
+        'of the learner then takes out; 0: none.',
+        unit='s',
+        low=0.0,
+        high=10.0,
+    )
     speed_margin: float = param(
         0.15,
         'Sets how far the speed of an exploration may lie outside the speeds of the training, relative to them; '
@@ -119,6 +144,26 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=1e6,
     )
+
+    def __post_init__(self) -> None:
+        if self.slowest_m_s > self.fastest_m_s or (self.fastest_m_s > 0.0 and not self.slowest_m_s):
+            raise InvalidParameter(
+                f'training: slowest_m_s is {self.slowest_m_s:g} and fastest_m_s is {self.fastest_m_s:g}; '
+                'give both, the lower speed first, or neither'
+            )
+
+    def distances_m(self, window_s: float) -> tuple[float, ...]:
+        """Return how far the finger slides in a window at speeds from the slowest to the fastest, m; () without these.
+
+        Parameters
+        ----------
+        window_s
+            Length of a window, s.
+        """
+        if not self.slowest_m_s:
+            return ()
+        ratio = self.fastest_m_s / self.slowest_m_s
+        return tuple(self.slowest_m_s * window_s * ratio ** (step / (SPEEDS - 1)) for step in range(SPEEDS))
 
     @property
     def domain_margins(self) -> DomainMargins:

@@ -3,16 +3,24 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from texture_core.resources import folder
 from texture_estimation.classification.training import train
 from texture_estimation.recipe import load_recipe
+from texture_evaluation.cross_validation.cross_validate import predict_slides
 from texture_evaluation.evaluate import evaluate
+from texture_evaluation.metrics import window_accuracy
+from texture_evaluation.train import training_examples
 from texture_recordings.slide_dataset import SlideDataset
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
-OF_ONE_FINGER = [name for name in SHIPPED if '/' not in ''.join(load_recipe(name).feature_set.topics)]
+# How the load lies on the taxels: the simulated finger has it alike over all surfaces.
+OF_SHARES = {'taxels': 'signal_static', 'taxels-signal': 'signal'}
+OF_ONE_FINGER = [
+    name for name in SHIPPED if '/' not in ''.join(load_recipe(name).feature_set.topics) and name not in OF_SHARES
+]
 
 
 @pytest.mark.parametrize('name', OF_ONE_FINGER)
@@ -27,3 +35,32 @@ def test_each_recipe_learns_distinct_simulated_surfaces_and_recognises_them(name
     figures = evaluate(train(recipe, examples), [simulated], '5-6').as_json()
     assert figures['window_accuracy'] > 0.6
     assert figures['accuracy_at_s']['1.0'] > 0.6
+
+
+def slides_of_an_array(topic: str, seed: int, turned: float = 1.0) -> SlideDataset:
+    """Return eight slides over each of two surfaces, whose load lies on other taxels, pressed 1 to 8 times as hard."""
+    rng = np.random.default_rng(seed)
+    patterns = {'cork': np.array([5.0, 1.0, 0.0, 3.0]), 'felt': np.array([2.0, 4.0, 0.0, 3.0])}
+    labels = [surface for surface in patterns for _ in range(8)]
+    shear = turned * np.array([0.0, 0.0, 0.5, -0.5])
+    samples = [
+        (1 + number % 8) * (patterns[surface] + shear + 0.05 * rng.normal(size=(100, 4)))
+        for number, surface in enumerate(labels)
+    ]
+    return SlideDataset.from_arrays({topic: samples}, labels, {topic: 50.0})
+
+
+@pytest.mark.parametrize(('name', 'topic'), OF_SHARES.items())
+def test_recipes_of_shares_recognise_where_the_load_lies_however_hard_it_is_pressed(name: str, topic: str) -> None:
+    recipe = load_recipe(name)
+    model = train(recipe, training_examples(recipe, slides_of_an_array(topic, seed=0)))
+    results = predict_slides(model, slides_of_an_array(topic, seed=1).features(recipe.feature_set))
+    assert window_accuracy(list(results.values())) > 0.95
+
+
+def test_the_recipes_of_shares_differ_by_the_topic_alone() -> None:
+    slow, fast = (load_recipe(name).as_mapping() for name in OF_SHARES)
+    assert slow['inputs']['signal_static'] == fast['inputs']['signal']
+    assert {key: slow[key] for key in ('windows', 'learner', 'evidence', 'training')} == {
+        key: fast[key] for key in ('windows', 'learner', 'evidence', 'training')
+    }

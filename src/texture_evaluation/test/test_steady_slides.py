@@ -7,6 +7,10 @@ import pytest
 from texture_core.errors import InvalidData, UnknownName
 from texture_core.exploration import Phase
 from texture_core.signal import NANOSECONDS, lost_samples
+from texture_estimation.recipe import load_recipe
+from texture_evaluation.train import training_examples
+from texture_features.feature import WindowBatch
+from texture_features.features.log_shares import LogShares
 from texture_features.features.spatial_bands import SpatialBands
 from texture_recordings.bags import read_bag
 from texture_recordings.importers.catalogue import IMPORTS
@@ -102,6 +106,17 @@ def test_speeding_up_is_contact_and_no_slide(tmp_path: Path) -> None:
     for slide in SlideDataset.from_bags([canvas]).samples('signal_static'):
         assert slide.distance_m == pytest.approx(0.5, abs=2e-3)
         assert len(slide.before) / slide.rate_hz * slide.speed_m_s == pytest.approx(0.047, abs=2e-3)
+
+
+def test_the_touch_before_a_slide_is_described_for_the_training(tmp_path: Path) -> None:
+    (canvas,) = import_fabricslide(make_fabricslide(tmp_path / 'in'), tmp_path / 'out', materials=['Canvas'])
+    dataset, recipe = SlideDataset.from_bags([canvas]), load_recipe('taxels')
+    touches = training_examples(recipe, dataset).touches
+    assert set(touches) == set(dataset.names)
+    [first] = [slide for slide in dataset.samples('signal_static') if slide.slide.name == dataset.names[0]]
+    rows = round(recipe.training.touch_s * first.rate_hz)
+    expected = LogShares()(WindowBatch(first.before[:rows], first.rate_hz))[:, 0]
+    np.testing.assert_allclose(touches[dataset.names[0]], expected)
 
 
 def test_the_line_of_a_printed_grating_stands_at_one_over_its_pitch_at_every_speed(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from texture_recordings.slide_dataset import SlideDataset
 
 FAST_TOPIC = 'signal'
 CHANNELS = ('fast', 'all')
+HOPS = 4  # windows of the least distance overlap so often
 
 
 def train_from_bags(
@@ -71,7 +72,11 @@ def train_from_bags(
 def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures:
     """Return the windows of labelled slides as the training of a recipe needs them, with its augmentation."""
     windows = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
-    return dataset.features(windows, recipe.augmentation)
+    examples = dataset.features(windows, recipe.augmentation, recipe.training.touch_s)
+    distances_m = recipe.training.distances_m(recipe.feature_set.windows.length_s)
+    if not distances_m:
+        return examples
+    return replace(examples, resized=dataset.features_over_distances(windows, distances_m, distances_m[0] / HOPS))
 
 
 def with_channels(recipe: Recipe, channels: str) -> Recipe:

@@ -60,6 +60,8 @@ SCALING = {
     'signal_energy': SQUARED,
     'region_peaks': SAME,
     'correlation': SAME,
+    'log_shares': SAME,
+    'relative_changes': SAME,
     'power_autocorrelation': SAME,
     'ordinal_patterns': SAME,
     'speed': SAME,

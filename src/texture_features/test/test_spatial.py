@@ -131,3 +131,23 @@ def test_positions_of_taxels_are_estimated_to_a_tenth_of_a_millimetre():
 def test_the_any_speed_recipe_describes_a_window_live():
     features = FeatureSet.load('any-speed')
     assert features.topics == ('signal',)
+
+
+def test_shares_keep_the_sign_and_leave_the_noise_of_free_taxels_out():
+    shares = FEATURES['log_shares'](floor=0.01)
+    calm, noisy = (shares(WindowBatch(np.tile([60.0, -40.0, free], (20, 1)), RATE_HZ))[:, 0] for free in (0.1, -0.1))
+    np.testing.assert_allclose(calm - calm[2], [np.log(60 / 1.001), -np.log(40 / 1.001), 0.0], rtol=0.01)
+    np.testing.assert_allclose(calm, noisy, atol=0.01)
+
+
+@pytest.mark.parametrize('name', ['log_shares', 'relative_changes'])
+def test_features_of_shares_are_the_same_however_hard_it_is_pressed(name):
+    samples = np.random.default_rng(0).uniform(-10.0, 20.0, (50, 3))
+    soft, hard = (FEATURES[name]()(WindowBatch(x, RATE_HZ)) for x in (samples, 3.0 * samples))
+    np.testing.assert_allclose(soft, hard)
+
+
+def test_relative_changes_do_not_know_which_level_a_taxel_has():
+    samples = np.random.default_rng(0).normal(size=(50, 2))
+    one, other = (FEATURES['relative_changes']()(WindowBatch(samples + x, RATE_HZ)) for x in ([90, 10], [10, 90]))
+    np.testing.assert_allclose(one, other, rtol=1e-2)  # the same load in all

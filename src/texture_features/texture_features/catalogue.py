@@ -12,6 +12,7 @@ from texture_features.features.force import Force
 from texture_features.features.hjorth import Hjorth
 from texture_features.features.log_bands import LogBands
 from texture_features.features.log_difference_variance import LogDifferenceVariance
+from texture_features.features.log_shares import LogShares
 from texture_features.features.log_variance import LogVariance
 from texture_features.features.low_fft_bins import LowFftBins
 from texture_features.features.mean import ChannelMean
@@ -26,6 +27,7 @@ from texture_features.features.pacinian_power import PacinianPower
 from texture_features.features.peak_to_median_power import PeakToMedianPower
 from texture_features.features.power_autocorrelation import PowerAutocorrelation
 from texture_features.features.region_peaks import RegionPeaks
+from texture_features.features.relative_changes import RelativeChanges
 from texture_features.features.short_time_fourier import ShortTimeFourier
 from texture_features.features.signal_energy import SignalEnergy
 from texture_features.features.spatial_band_power import SpatialBandPower
@@ -69,6 +71,8 @@ FEATURES: Mapping[str, type[Feature]] = {
     'mean_spatial_bands': MeanSpatialBands,
     'mean_statistics': ChannelMeanStatistics,
     'centred_log_ratio': CentredLogRatio,
+    'log_shares': LogShares,  # Aitchison 1986, with signs
+    'relative_changes': RelativeChanges,
     'speed': Speed,
     'force': Force,
 }

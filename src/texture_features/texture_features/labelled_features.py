@@ -44,6 +44,10 @@ class LabelledFeatures:
         Motion, sensor, speed, force and directions of each slide, as far as its windows tell them.
     augmented
         Changed copies of the slides for training; copies of slides that are not among `groups` are ignored.
+    resized
+        Windows of other lengths, for training alone; those of slides that are not among `groups` are ignored.
+    touches
+        Features of the touch before the finger moved, (n_features,), by slide; slides not among `groups` are ignored.
 
     Raises
     ------
@@ -70,6 +74,8 @@ class LabelledFeatures:
     start_ns: NDArray[np.int64] | None = None
     conditions: Mapping[str, SlideConditions] = field(default_factory=dict)
     augmented: AugmentedFeatures | None = None
+    resized: LabelledFeatures | None = None
+    touches: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         shape = (len(self.labels), len(self.names))

@@ -17,8 +17,9 @@ from texture_core.errors import InvalidData, ModelMismatch
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_core.window import Window
 from texture_features.labelled_features import LabelledFeatures
-from texture_features.windowing.windows import WindowEvent, WindowParams, cut_recording
+from texture_features.windowing.windows import CutWindow, WindowEvent, WindowParams, cut_recording
 from texture_recordings.motion_of_states import motion_made
 from texture_recordings.parquet_export import write_parquet
 from texture_recordings.slide_samples import SlideSamples
@@ -300,7 +301,9 @@ class SlideDataset:
             vectors = (vector for vector in feature_set.extract_many(events) if not vector.last)
             yield slide, [replace(vector, exploration_id=slide.name) for vector in vectors]
 
-    def features(self, feature_set: FeatureSet, augmentation: Augmentation | None = None) -> LabelledFeatures:
+    def features(
+        self, feature_set: FeatureSet, augmentation: Augmentation | None = None, touch_s: float = 0.0
+    ) -> LabelledFeatures:
         """Return features `X`, labels `y` and slides `groups` of all windows, with their times.
 
         Parameters
@@ -309,6 +312,13 @@ class SlideDataset:
             Windows, inputs and features.
         augmentation
             Changes of copies of the slides, for training; with None or without copies there are none.
+        touch_s
+            How much of the touch before the finger moves is described, too, s; 0 for none.
+
+        Returns
+        -------
+        LabelledFeatures
+            Of all windows, slide by slide.
 
         Raises
         ------
@@ -322,7 +332,46 @@ class SlideDataset:
             raise no_window(self, feature_set)
         features = LabelledFeatures.from_vectors(vectors, {slide.name: slide.surface for slide in self.slides})
         motions = {slide.name: slide.motion for slide in self.slides if slide.motion}
-        return replace(features, motions=motions, augmented=self._augmented(feature_set, augmentation))
+        touches = self._touches(feature_set, touch_s) if touch_s else {}
+        return replace(features, motions=motions, augmented=self._augmented(feature_set, augmentation), touches=touches)
+
+    def features_over_distances(
+        self, feature_set: FeatureSet, distances_m: Sequence[float], hop_m: float
+    ) -> LabelledFeatures | None:
+        """Return features of windows that show so much of a surface, or the whole of a shorter slide.
+
+        Parameters
+        ----------
+        feature_set
+            Inputs and features; its windows have no effect.
+        distances_m
+            How far the finger slides in a window, m.
+        hop_m
+            Way between the starts of two windows, m.
+
+        Returns
+        -------
+        LabelledFeatures or None
+            Of the slides whose speed is known and that lost no samples; None if there are none.
+        """
+        events = [event for slide in self.slides for event in _windows_over(slide, feature_set, distances_m, hop_m)]
+        if not events:
+            return None
+        return LabelledFeatures.from_vectors(
+            feature_set.extract_many(events), {slide.name: slide.surface for slide in self.slides}
+        )
+
+    def _touches(self, feature_set: FeatureSet, touch_s: float) -> dict[str, Array]:
+        """Return the features of the touch before the finger moves, (n_features,), of slides that hold some of it."""
+        touches = {}
+        for slide in self.slides:
+            inputs = {topic: _touch(slide, topic, touch_s) for topic in feature_set.topics}
+            windows = {topic: window for topic, window in inputs.items() if window is not None}
+            if len(windows) == len(inputs):
+                made = slide.speed_m_s, slide.force_n
+                event = CutWindow(slide.start_ns, slide.name, touch_s, touch_s, windows, *made)
+                touches[slide.name] = feature_set.extract(event).values
+        return touches
 
     def _augmented(self, feature_set: FeatureSet, augmentation: Augmentation | None) -> AugmentedFeatures | None:
         """Return changed copies of the slides as features, for training; None without augmentation or copies."""
@@ -404,6 +453,44 @@ def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent
         )
     used = {topic: slide.signals[topic] for topic in feature_set.topics}
     return list(cut_recording(used, slide.states, feature_set.windows))
+
+
+def _windows_over(
+    slide: LabelledSlide, feature_set: FeatureSet, distances_m: Sequence[float], hop_m: float
+) -> Iterator[CutWindow]:
+    """Yield windows of a slide at a known speed without gaps, of each distance."""
+    if not slide.speed_m_s > 0.0:
+        return
+    try:
+        inputs = {topic: SlideSamples.of(slide, topic) for topic in feature_set.topics}
+    except InvalidData:
+        return
+    slid_s = min(len(samples.samples) / samples.rate_hz for samples in inputs.values())
+    windows = feature_set.windows
+    for length_s in sorted({min(distance_m / slide.speed_m_s, slid_s) for distance_m in distances_m}):
+        for start_s in np.arange(0.0, slid_s - length_s + 1e-9, hop_m / slide.speed_m_s).tolist():
+            cut = {topic: _stretch(samples, start_s, length_s) for topic, samples in inputs.items()}
+            if all(np.isfinite(window.samples).all() for window in cut.values()):
+                start_ns = slide.start_ns + round(start_s * NANOSECONDS)
+                yield CutWindow(
+                    start_ns, slide.name, windows.length_s, windows.hop_s, cut, slide.speed_m_s, slide.force_n
+                )
+
+
+def _stretch(slide: SlideSamples, start_s: float, length_s: float) -> Window:
+    first = round(start_s * slide.rate_hz)
+    samples = slide.samples[first : first + max(1, round(length_s * slide.rate_hz))]
+    return Window(samples, slide.rate_hz, slide.channels)
+
+
+def _touch(slide: LabelledSlide, topic: str, touch_s: float) -> Window | None:
+    """Return the first samples of the touch before the finger moves; None without any, or if samples were lost."""
+    try:
+        samples = SlideSamples.of(slide, topic)
+    except InvalidData:
+        return None
+    before = samples.before[: max(1, round(touch_s * samples.rate_hz))]
+    return Window(before, samples.rate_hz, samples.channels) if np.isfinite(before).all() and len(before) else None
 
 
 def _cut_by(slide: LabelledSlide, feature_set: FeatureSet, windows: WindowParams) -> list[WindowEvent]:

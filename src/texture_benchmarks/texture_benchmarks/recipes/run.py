@@ -126,7 +126,7 @@ OVER_TIME = (
     'jamali-naive-bayes-5',
 )
 # They describe what only an array of taxels measures.
-NEEDS_ARRAY = frozenset({'any-speed'})
+NEEDS_ARRAY = frozenset({'any-speed', 'taxels-signal'})
 # What is tried on one kind of data alone: windows overlap where the published figures are.
 PLACES: Mapping[str, str] = {
     **dict.fromkeys(NEEDS_ARRAY, ARRAY),

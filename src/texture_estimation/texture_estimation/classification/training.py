@@ -17,6 +17,7 @@ from texture_estimation.incremental.training_examples import TrainingExamples
 from texture_estimation.learners.augmented_examples import AugmentedExamples
 from texture_estimation.learners.learner import Codes, Fitted, of_examples
 from texture_estimation.learners.mlp import Mlp
+from texture_estimation.learners.svm_rbf import SvmRbf
 from texture_estimation.log_probabilities import is_tied, log_loss
 from texture_estimation.model import TextureModel
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
@@ -118,15 +119,46 @@ def _fit(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
     if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < MIN_SLIDES:
         return recipe.learner.fit(examples.values, codes, groups)
     times = _times(groups, examples, recipe.training.start_weight)
+    own = np.cumsum(times) - times
     rows = np.repeat(np.arange(len(codes)), times)
     augmented = _augmented_examples(recipe, examples, codes, groups)
     if augmented is not None and isinstance(recipe.learner, Mlp):
         fitted = recipe.learner.fit(examples.values[rows], codes[rows], groups[rows], augmented)
+    elif isinstance(recipe.learner, SvmRbf):
+        differences = _touch_differences(examples, groups)
+        fitted = recipe.learner.fit(*_with_resized(examples, codes, groups, rows), differences)
     else:
-        fitted = recipe.learner.fit(examples.values[rows], codes[rows], groups[rows])
+        fitted = recipe.learner.fit(*_with_resized(examples, codes, groups, rows))
     if fitted.held_out is None:
         return fitted
-    return replace(fitted, held_out=fitted.held_out[np.cumsum(times) - times])
+    return replace(fitted, held_out=fitted.held_out[own])
+
+
+def _with_resized(examples: LabelledFeatures, codes: Codes, groups: Codes, rows: Codes) -> tuple[Array, Codes, Codes]:
+    """Return features, labels and slides of these windows, and behind them those of the windows of other lengths."""
+    taken = examples.values[rows], codes[rows], groups[rows]
+    if examples.resized is None:
+        return taken
+    names, first = np.unique(examples.groups, return_index=True)
+    own = np.isin(examples.resized.groups, names)
+    slides = np.searchsorted(names, examples.resized.groups[own])
+    further = examples.resized.values[own], codes[first][slides], slides
+    return (
+        np.concatenate([taken[0], further[0]]),
+        np.concatenate([taken[1], further[1]]),
+        np.concatenate([taken[2], further[2]]),
+    )
+
+
+def _touch_differences(examples: LabelledFeatures, groups: Codes) -> Array | None:
+    """Return by number of the slide how it differs from its touch before the finger moved; NaN where there is none."""
+    if not examples.touches:
+        return None
+    means = slide_means(examples.values, groups)
+    unknown = np.full(means.shape[1], np.nan)
+    touches = [examples.touches.get(slide, unknown) for slide in np.unique(examples.groups).tolist()]
+    differences: Array = means - np.stack(touches)
+    return differences
 
 
 def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:

@@ -33,6 +33,8 @@ class SvmPredictor:
         Of the kernel exp(-gamma |x - s|²).
     coupling
         From decision values to probabilities.
+    projection : (n_features, n_features) or None
+        What features are multiplied with before the standardisation.
 
     Examples
     --------
@@ -57,6 +59,7 @@ class SvmPredictor:
     intercepts: Array
     gamma: float
     coupling: PairCoupling
+    projection: Array | None = None
 
     def __post_init__(self) -> None:
         n_labels = len(self.coefficients)
@@ -81,7 +84,8 @@ class SvmPredictor:
         (..., n_pairs)
             Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
         """
-        standard = (X - self.mean) / self.scale
+        projected = X if self.projection is None else X @ self.projection
+        standard = (projected - self.mean) / self.scale
         # |x - s|² = |x|² + |s|² - 2 x·s, one product with all support vectors
         squares = self.gamma * np.add.reduce(standard * standard, axis=-1, keepdims=True)
         exponents = self.vectors @ standard if standard.ndim == 1 else standard @ self.vectors.T
@@ -96,7 +100,7 @@ class SvmPredictor:
         return decisions
 
 
-def export(scaler: Any, svc: Any, coupling: PairCoupling) -> SvmPredictor:
+def export(scaler: Any, svc: Any, coupling: PairCoupling, projection: Array | None = None) -> SvmPredictor:
     """Return the exported predictor of a fitted StandardScaler and SVC(kernel='rbf').
 
     Parameters
@@ -107,6 +111,8 @@ def export(scaler: Any, svc: Any, coupling: PairCoupling) -> SvmPredictor:
         Fitted SVC with an RBF kernel, one against one.
     coupling
         From decision values to probabilities.
+    projection : (n_features, n_features) or None
+        What the features were multiplied with before they were standardised.
 
     Returns
     -------
@@ -136,4 +142,5 @@ def export(scaler: Any, svc: Any, coupling: PairCoupling) -> SvmPredictor:
         intercepts=sign * np.asarray(svc.intercept_),
         gamma=gamma,
         coupling=coupling,
+        projection=projection,
     )

@@ -14,6 +14,7 @@ from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.learners.pair_coupling import PairCoupling, fit_coupling, uncalibrated
 from texture_estimation.learners.svm_predictor import SvmPredictor, export
+from texture_estimation.learners.within_class_whitening import within_class_whitening
 
 CACHE_MB = 500
 
@@ -56,11 +57,38 @@ class SvmRbf:
         high=50,
     )
 
-    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
-        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
-        coupling, held_out, note = self._calibrate(X, y, groups)
-        scaler, svc = self._fit_svc(X, y)
+    whitening: float = param(
+        0.0,
+        'Sets the ridge of the whitening of what differs within a texture, relative to its mean variance: a smaller '
+        'one leaves less of the directions in which slides of one texture differ; 0: no whitening.',
+        low=0.0,
+        high=1e6,
+    )
+
+    def fit(self, X: Array, y: Codes, groups: Codes, differences: Array | None = None) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
+
+        Parameters
+        ----------
+        X : (n, n_features)
+            Features of windows; finite.
+        y : (n,)
+            Number of the label of each, from 0, without gaps.
+        groups : (n,)
+            Number of the slide of each.
+        differences : (n_groups, n_features) or None
+            For the number of each slide a difference that is none of textures, for the whitening; NaN if not known.
+
+        Returns
+        -------
+        Fitted
+            Parameters, log-probabilities when held out, and a note on the calibration.
+        """
+        coupling, held_out, note = self._calibrate(X, y, groups, differences)
+        projection = self._projection(X, y, groups, differences)
+        scaler, svc = self._fit_svc(_projected(X, projection), y)
         folds_of = {
+            **({} if projection is None else {'projection': projection}),
             'scaler': scaler,
             'svc': svc,
             'slopes': coupling.slopes,
@@ -75,9 +103,11 @@ class SvmRbf:
         coupling = PairCoupling(
             len(folds_of['svc'].n_support_), folds_of['slopes'], folds_of['offsets'], float(folds_of['temperature'])
         )
-        return export(folds_of['scaler'], folds_of['svc'], coupling)
+        return export(folds_of['scaler'], folds_of['svc'], coupling, folds_of.get('projection'))
 
-    def _calibrate(self, X: Array, y: Codes, groups: Codes) -> tuple[PairCoupling, Array | None, str]:
+    def _calibrate(
+        self, X: Array, y: Codes, groups: Codes, differences: Array | None
+    ) -> tuple[PairCoupling, Array | None, str]:
         n_labels = int(y.max()) + 1
         split = assign_folds(y, groups, self.folds)
         if split is None:
@@ -86,10 +116,14 @@ class SvmRbf:
         decisions = np.empty((len(y), n_labels * (n_labels - 1) // 2))
         for part in np.unique(folds_of):
             held = folds_of == part
-            svm = export(*self._fit_svc(X[~held], y[~held]), uncalibrated(n_labels))
-            decisions[held] = svm.decisions(X[held])
+            projection = self._projection(X[~held], y[~held], groups[~held], differences)
+            fitted = self._fit_svc(_projected(X[~held], projection), y[~held])
+            decisions[held] = export(*fitted, uncalibrated(n_labels), projection).decisions(X[held])
         coupling = fit_coupling(decisions, y, n_labels)
         return coupling, coupling(decisions), note
+
+    def _projection(self, X: Array, y: Codes, groups: Codes, differences: Array | None) -> Array | None:
+        return within_class_whitening(X, y, groups, self.whitening, differences) if self.whitening else None
 
     def _fit_svc(self, X: Array, y: Codes) -> tuple[Any, Any]:
         # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
@@ -102,3 +136,7 @@ class SvmRbf:
         gamma = self.gamma or 1.0 / (X.shape[1] * max(float(scaler.transform(X).var()), 1e-12))
         svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(scaler.transform(X), y)
         return scaler, svc
+
+
+def _projected(X: Array, projection: Array | None) -> Array:
+    return X if projection is None else X @ projection

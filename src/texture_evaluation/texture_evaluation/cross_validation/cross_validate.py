@@ -74,7 +74,8 @@ class FoldFeatures:
     def of(cls, recipe: Recipe, dataset: SlideDataset) -> FoldFeatures:
         """Return the features of a recipe; raise InvalidData if no slide has a window."""
         tested = dataset.features(recipe.feature_set)
-        if recipe.training_windows == recipe.feature_set.windows and not recipe.augmentation.copies:
+        further = recipe.augmentation.copies or recipe.training.touch_s or recipe.training.slowest_m_s
+        if recipe.training_windows == recipe.feature_set.windows and not further:
             return cls(tested, tested)
         return cls(training_examples(recipe, dataset), tested)
 
