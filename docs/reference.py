@@ -14,7 +14,7 @@ from texture_core.parameters import markdown_table
 
 INTERFACES = 'src/texture_msgs'
 CHARTS = 'docs/charts'
-EXPERIMENTS = ('ets-linear', 'ets-circular', 'ets-fine', 'jamali', 'kaboli', 'hu', 'roughness')
+EXPERIMENTS = ('ets-linear', 'ets-circular', 'ets-fine', 'friction', 'jamali', 'kaboli', 'hu', 'roughness')
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 
 

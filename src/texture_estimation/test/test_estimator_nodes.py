@@ -31,6 +31,7 @@ GRADE_RECIPE = {'inputs': {'signal': {'features': ['signal_energy', 'peak_to_med
 NODES = {
     'classifier': (Classifier, 'model', 'cloth_slide'),
     'classifier with trees': (Classifier, 'trees_model', 'cloth_slide'),
+    'classifier with tuned pairs': (Classifier, 'pairs_model', 'cloth_slide'),
     'roughness_estimator': (RoughnessEstimator, 'roughness_model', 'grade_2'),
 }
 
@@ -90,6 +91,17 @@ def trees_model(examples):
     learner = {'sklearn': {'estimator': 'sklearn.ensemble:ExtraTreesClassifier', 'n_estimators': 20}}
     recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': learner}
     return train(Recipe.from_mapping(recipe, 'trees'), examples)
+
+
+@pytest.fixture(scope='module')
+def pairs_model(examples):
+    """Return a model in which two pairs have features and learners of their own."""
+    pairs = [
+        {'pair': ['cork', 'felt'], 'inputs': ['signal'], 'learner': {'svm_pairs': {'kernel_scale': 2.0}}},
+        {'pair': ['felt', 'wood'], 'learner': {'ann_pairs': {'hidden': 4}}},
+    ]
+    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': {'tuned_pairs': {'pairs': pairs}}}
+    return train(Recipe.from_mapping(recipe, 'pairs'), examples)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from texture_benchmarks.papers import ets_circular, ets_fine, ets_linear, hu, jamali, kaboli, roughness
+from texture_benchmarks.papers import ets_circular, ets_fine, ets_linear, friction, hu, jamali, kaboli, roughness
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult, Run
 from texture_benchmarks.papers.report import run
 from texture_benchmarks.papers.seeds import over_seeds
@@ -16,6 +16,7 @@ PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fin
 
 EXPERIMENTS: Mapping[str, Run] = {
     **{protocol.name: partial(run, protocol) for protocol in PROTOCOLS},
+    'friction': friction.run,  # the further question of Roberge et al.
     'roughness': roughness.run,  # Rispal et al.: grades of textures never touched
 }
 

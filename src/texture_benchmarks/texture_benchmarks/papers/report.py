@@ -44,7 +44,7 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
             'seed': experiment.seed,
             'recipes': {m.recipe: digest_of(m.recipe) for task in protocol.tasks for m in task.methods},
             'difficulty': _difficulty(protocol, found),
-            'tasks': {task.name: {m.name: _figures(m, found[task.name, m.name]) for m in task.methods}
+            'tasks': {task.name: {m.name: figures_of(m, found[task.name, m.name]) for m in task.methods}
                       for task in protocol.tasks},
             'findings': [finding_as_json(finding) for finding in checked],
             'tuning': {f'{recipe}, {task}': one.figures() for (task, recipe), one in tuned.items()},
@@ -70,7 +70,20 @@ def _difficulty(protocol: Protocol, found: MethodResults) -> dict[str, Any]:
     }
 
 
-def _figures(method: Method, outcome: MethodResult) -> dict[str, Any]:
+def figures_of(method: Method, outcome: MethodResult) -> dict[str, Any]:
+    """Return the figures of one method as an experiment's JSON holds them.
+
+    Parameters
+    ----------
+    method
+        With the paper's figures.
+    outcome
+        What came out.
+
+    Returns
+    -------
+    dict
+    """
     paper = {name: getattr(method.paper, name) for name in ('learning', 'test', 'unclassified')}
     return {
         'paper': {name: value for name, value in paper.items() if value is not None},

@@ -13,6 +13,7 @@ from texture_benchmarks.papers.method_result import MethodResult
 from texture_benchmarks.papers.protocol import Mask, Method, MethodResults, Protocol, RecognitionTask
 from texture_benchmarks.papers.simulated_trials import Slides, gather
 from texture_benchmarks.papers.tuning import TunedRecipe, tune
+from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_estimation.learners.learner import Codes
 from texture_estimation.recipe import Recipe, load_recipe
@@ -204,7 +205,13 @@ def _with_parameters(feature: Any, parameters: Mapping[str, Any]) -> Any:
 
 
 def evaluate_method(
-    recipe: Recipe, slides: Slides, trained_on: Mask, views: Sequence[int] = (), *, singly: bool = False
+    recipe: Recipe,
+    slides: Slides,
+    trained_on: Mask,
+    views: Sequence[int] = (),
+    *,
+    singly: bool = False,
+    beside: Array | None = None,
 ) -> MethodResult:
     """Learn from the slides of each split and evaluate all.
 
@@ -220,6 +227,8 @@ def evaluate_method(
         Which views of the slides are used; () for all.
     singly
         See `Method`.
+    beside : (n_slides, n_values) or None
+        Values of each slide that its windows have beside the features.
 
     Returns
     -------
@@ -229,6 +238,8 @@ def evaluate_method(
     to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
     trained, owner = slides.extract(to_learn, views)
     asked, slide = slides.extract(recipe.feature_set, views)
+    if beside is not None:
+        trained, asked = np.hstack((trained, beside[owner])), np.hstack((asked, beside[slide]))
     windows = recipe.feature_set.windows
     decided = np.empty(trained_on.shape, dtype=np.intp)
     rows_of = _halves_of_windows(owner, len(trained_on)) if singly else trained_on[:, owner]
