@@ -8,7 +8,7 @@ import pytest
 from texture_benchmarks.papers import seeds
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
 from texture_benchmarks.papers.interval import Interval
-from texture_benchmarks.papers.recipe_digest import digest_of
+from texture_benchmarks.papers.recipe_digest import _decisive, digest_of
 from texture_benchmarks.papers.seeds import mean_over_seeds, over_seeds, verdict, with_seeds
 from texture_core.errors import InvalidParameter
 
@@ -88,6 +88,11 @@ def test_a_seed_that_was_run_with_other_recipes_is_run_again(tmp_path: Path, mon
 def test_a_definition_that_changes_has_another_digest_and_its_description_has_none() -> None:
     assert len({digest_of(name) for name in ('fast', 'default', 'kaboli-pa', 'kaboli-pa-ovr', 'roughness')}) == 5
     assert digest_of('fast') == digest_of('fast')
+
+
+def test_a_parameter_that_changes_nothing_leaves_the_digest_as_it_was() -> None:
+    assert _decisive({'evidence': {'soft_vote': {'late_weight': 1.0}}}) == {'evidence': {'soft_vote': {}}}
+    assert _decisive({'evidence': {'soft_vote': {'late_weight': 0.25}}}) != {'evidence': {'soft_vote': {}}}
 
 
 def test_one_seed_has_no_interval(tmp_path: Path) -> None:

@@ -29,7 +29,18 @@ SIDE_BY_SIDE = (
 )
 # These take half a minute or more for other things than recognition, or ten and more for it.
 LONG = frozenset(
-    {'recipes', 'optimise', 'optimise_large', 'scenes', 'load', 'motion', 'sensors', 'stick_slip', 'trust'}
+    {
+        'recipes',
+        'optimise',
+        'optimise_large',
+        'optimise_pairs',
+        'scenes',
+        'load',
+        'motion',
+        'sensors',
+        'stick_slip',
+        'trust',
+    }
 )
 # What many of them read is imported once.
 IMPORTED = ('biotac20', 'ntp21')

@@ -22,7 +22,14 @@ STEP_NS = 10_000_000  # of an exploration
 # How often an arm says where it is, and how old that is: Universal Robots, rails, hands.
 ARMS = {'every 2 ms': (2_000_000, 0), 'every 5 ms': (5_000_000, 0), 'every 10 ms, 15 ms late': (10_000_000, 15_000_000)}
 PAIRS = {
-    'ets-linear': ('ets-linear-svm', 'ets-linear-ann', 'ets-linear-svm-vote', 'ets-linear-ann-vote'),
+    'ets-linear': (
+        'ets-linear-svm',
+        'ets-linear-ann',
+        'ets-linear-svm-vote',
+        'ets-linear-ann-vote',
+        'ets-linear-svm-pairs',
+        'ets-linear-ann-pairs',
+    ),
     'ets-linear-headings': ('ets-linear-svm', 'ets-linear-ann'),
     'ets-circular': ('ets-circular-svm', 'ets-circular-ann'),
     'ets-ten-textures': ('ets-fine-svm', 'ets-fine-ann'),

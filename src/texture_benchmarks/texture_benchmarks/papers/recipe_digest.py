@@ -13,6 +13,8 @@ from texture_estimation.roughness.recipe import load_roughness_recipe
 
 # What of `training` decides the label after a whole slide. The rest says when a slide ends early, or what is outside.
 TRAINING = frozenset({'augmentation', 'false_rejection_rate', 'hop_s', 'start_weight'})
+# Values with which a parameter of the evidence rule changes nothing: stored digests are older than the parameter.
+NEUTRAL = {'late_weight': 1.0}
 
 
 def digest_of(recipe: str) -> str:
@@ -38,6 +40,13 @@ def _decisive(definition: Mapping[str, Any]) -> dict[str, Any]:
         decisive['inputs'] = {
             name: {key: value for key, value in part.items() if key != 'tare'}
             for name, part in decisive['inputs'].items()
+        }
+    if 'evidence' in decisive:
+        decisive['evidence'] = {
+            rule: {key: value for key, value in params.items() if NEUTRAL.get(key) != value}
+            if isinstance(params, Mapping)
+            else params
+            for rule, params in decisive['evidence'].items()
         }
     if 'training' in decisive:
         decisive['training'] = {name: value for name, value in decisive['training'].items() if name in TRAINING}
