@@ -39,6 +39,7 @@ class Robot:
         self.sent = []  # velocities with their times
         self.forces = []
         self.closed = False
+        self.switched, self.refused_switches = [], ()
         self.driven = RosControllersArm(
             Params(**given), clock=lambda: self.now_ns, open_topics=lambda _params: self, own_thread=False
         )
@@ -61,6 +62,11 @@ class Robot:
     def send_force(self, force_n):
         self.forces.append(force_n)
         self.arm.press(np.array(force_n))
+
+    def switch_controllers(self, activate, deactivate):
+        self.switched.append((*activate, '-', *deactivate))
+        if len(self.switched) in self.refused_switches:
+            raise DeviceError('the manager refused')
 
     def close(self):
         self.closed = True
@@ -412,3 +418,45 @@ def test_a_released_explorer_commands_rest_and_refuses_until_it_is_connected_aga
             ask()
     explorer.connect()
     assert explorer.fault() == ''
+
+
+MANAGED = {
+    'controller_manager': 'controller_manager',
+    'activate_controllers': 'twist',
+    'deactivate_controllers': 'joints',
+}
+TAKEN, GIVEN_BACK = ('twist', '-', 'joints'), ('joints', '-', 'twist')
+
+
+def test_controllers_are_switched_for_the_connection_and_back_once_the_arm_is_at_rest():
+    robot = Robot(**MANAGED)
+    robot.driven.check()
+    assert robot.switched == []  # a check takes no control
+    robot.driven.connect()
+    assert robot.switched == [TAKEN]
+    robot.driven.close()
+    assert robot.switched == [TAKEN, GIVEN_BACK]
+    assert robot.is_commanded_to_rest
+    robot.driven.close()
+    assert len(robot.switched) == 2
+
+
+def test_a_refused_switch_ends_the_connection_and_one_that_was_done_is_undone():
+    robot = Robot(connect_timeout_s=0.1, **MANAGED)
+    robot.refused_switches = (1,)
+    with pytest.raises(DeviceError, match='the manager refused'):
+        robot.driven.connect()
+    assert (robot.switched, robot.closed) == ([TAKEN], True)
+    robot.pose_comes = False
+    with pytest.raises(DeviceError, match='no pose comes'):
+        robot.driven.connect()
+    assert robot.switched[1:] == [TAKEN, GIVEN_BACK]
+
+
+def test_controllers_that_cannot_be_switched_back_are_a_warning():
+    robot = Robot(**MANAGED)
+    robot.driven.connect()
+    robot.refused_switches = (2,)
+    robot.driven.close()
+    assert robot.closed
+    assert robot.driven.warning() == 'the controllers were not switched back: the manager refused'

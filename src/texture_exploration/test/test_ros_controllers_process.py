@@ -10,6 +10,7 @@ import time
 import pytest
 from geometry_msgs.msg import PoseStamped
 
+from texture_core.errors import DeviceError
 from texture_core.exploration import ExplorationRequest, Phase
 from texture_core.node_process import NodeProcess
 from texture_core.ros.local_graph import LocalGraph
@@ -17,6 +18,7 @@ from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.ros_controllers_params import RosControllersParams
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams
+from texture_exploration.ros import controller_topics
 from texture_exploration.safety import SafetyLimits
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
@@ -93,3 +95,16 @@ def test_when_the_process_that_commands_is_killed_the_arm_comes_to_rest(graph, r
         record_property('stopped_s', moved[1] - killed_s)
         print(f'at rest {1e3 * (moved[1] - killed_s):.0f} ms after the death of who commanded')
         assert moved[1] - killed_s < 1.5
+
+
+def test_a_hand_over_without_the_messages_of_the_controller_manager_is_refused(graph, monkeypatch):
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(controller_topics.importlib, 'import_module', missing)
+    topics = controller_topics.RosTopics(RosControllersParams(controller_manager='controller_manager'))
+    try:
+        with pytest.raises(DeviceError, match='which needs controller_manager_msgs; install it'):
+            topics.switch_controllers(('twist_controller',), ())
+    finally:
+        topics.close()

@@ -101,6 +101,8 @@ class RosControllersArm:
         self._moved_ns = self._sent_ns = 0
         self._rise_from_m: float | None = None
         self._pressing = False  # a compliance controller was commanded a force
+        self._switched = False  # controllers were switched for this connection
+        self._hand_over_fault = ''
         self._lost = ''  # a fault that stays until the arm is recovered or connected again
         self._restart()
 
@@ -132,8 +134,10 @@ class RosControllersArm:
         self._restart()
         topics = self._open_topics(self._params)
         try:
+            self._take_over(topics)
             self._wait_for_controllers(topics)
         except DeviceError:
+            self._give_back(topics)
             topics.close()
             raise
         self._closing.clear()
@@ -153,6 +157,7 @@ class RosControllersArm:
         if topics is not None:
             self._stop_pressing(topics)
             topics.send_velocity(REST)
+            self._give_back(topics)
             topics.close()
 
     def state(self) -> ArmState:
@@ -269,6 +274,25 @@ class RosControllersArm:
         self._moved_ns = self._sent_ns = 0
         self._pressing = False
         self._lost = ''
+
+    def _take_over(self, topics: ControllerTopics) -> None:
+        if self._params.controller_manager:
+            topics.switch_controllers(self._params.activated, self._params.deactivated)
+            self._switched, self._hand_over_fault = True, ''
+
+    def _give_back(self, topics: ControllerTopics) -> None:
+        """Switch back what was switched; who let go cannot do more about it than to say so."""
+        if not self._switched:
+            return
+        self._switched = False
+        try:
+            topics.switch_controllers(self._params.deactivated, self._params.activated)
+        except DeviceError as error:
+            self._hand_over_fault = f'the controllers were not switched back: {error}'
+
+    def warning(self) -> str:
+        """Return in a sentence that the controllers were not switched back when the arm was let go, '' if they were."""
+        return self._hand_over_fault
 
     def _connected(self) -> ControllerTopics:
         if self._topics is None:

@@ -42,6 +42,19 @@ class RosControllersParams(ForceLoopParams, SurfacePoseParams, CommandLimits):
     twist_frame_id: str = param(
         '', "Sets the frame in which velocities are commanded, the base frame or that of the fingertip; '' is the base."
     )
+    controller_manager: str = param(
+        '',
+        'Sets the controller manager that is asked to switch controllers when the arm is connected and let go, such as '
+        "'controller_manager'; '' switches nothing.",
+    )
+    activate_controllers: str = param(
+        'twist_controller',
+        'Sets the controllers, separated by spaces, that are active only while the arm is connected.',
+    )
+    deactivate_controllers: str = param(
+        'scaled_joint_trajectory_controller',
+        'Sets the controllers, separated by spaces, that are inactive only while the arm is connected.',
+    )
     rate_hz: float = param(
         250.0,
         'Sets the rate of commands; a higher rate reacts faster and costs more computing time.',
@@ -125,6 +138,16 @@ class RosControllersParams(ForceLoopParams, SurfacePoseParams, CommandLimits):
         low=0.1,
         high=60.0,
     )
+
+    @property
+    def activated(self) -> tuple[str, ...]:
+        """Controllers that command the arm while it is connected."""
+        return tuple(self.activate_controllers.split())
+
+    @property
+    def deactivated(self) -> tuple[str, ...]:
+        """Controllers that command the arm otherwise."""
+        return tuple(self.deactivate_controllers.split())
 
     def __post_init__(self) -> None:
         if self.twist_frame_id not in ('', self.base_frame_id, self.tool_frame_id):

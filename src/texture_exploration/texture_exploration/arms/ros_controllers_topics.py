@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -47,6 +48,9 @@ class ControllerTopics(Protocol):
 
     def send_force(self, force_n: Vector) -> None:
         """Command the force of the tool on its surroundings in the base frame; no effect without such a topic."""
+
+    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
+        """Let the controller manager switch both sets or nothing; DeviceError, with the reason, if it does not."""
 
     def close(self) -> None:
         """Wait until what was sent has arrived, at most for a fraction of a second, and leave."""

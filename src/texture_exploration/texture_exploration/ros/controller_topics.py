@@ -6,16 +6,20 @@ is shut down. Names follow the namespace and the remappings of the process.
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Sequence
 from typing import Any
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from rclpy.context import Context
 from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
+from texture_core.errors import DeviceError
 from texture_core.ros.time import to_ns
 from texture_exploration.arms.protocol import Vector
 from texture_exploration.arms.ros_controllers_params import RosControllersParams
@@ -102,6 +106,50 @@ class RosTopics:
         force = message.wrench.force
         force.x, force.y, force.z = force_n
         self._wrenches.publish(message)
+
+    def switch_controllers(self, activate: Sequence[str], deactivate: Sequence[str]) -> None:
+        """Let the controller manager switch both sets or nothing.
+
+        Parameters
+        ----------
+        activate, deactivate
+            Names of controllers.
+
+        Raises
+        ------
+        DeviceError
+            If controller_manager_msgs is not installed, or the manager does not answer, or refuses.
+        """
+        manager = self._params.controller_manager
+        try:
+            kind = importlib.import_module('controller_manager_msgs.srv').SwitchController
+        except ImportError as error:
+            raise DeviceError(
+                f"parameter 'controller_manager' is '{manager}', which needs controller_manager_msgs; install it "
+                "(ros-jazzy-controller-manager-msgs), or set it to '' and switch the controllers by hand"
+            ) from error
+        request = kind.Request(activate_controllers=[*activate], deactivate_controllers=[*deactivate])
+        request.strictness = kind.Request.STRICT
+        answer = self._ask(kind, f'{manager}/switch_controller', request)
+        if answer is None or not answer.ok:
+            did = 'does not answer' if answer is None else f'refused: {getattr(answer, "message", "") or "see its log"}'
+            raise DeviceError(
+                f"'{manager}' was asked to activate {' '.join(activate)} instead of {' '.join(deactivate)}, and {did}"
+            )
+
+    def _ask(self, kind: Any, name: str, request: Any) -> Any:
+        """Return the answer of a service, None if none comes in time; nobody spins this node meanwhile."""
+        client = self._node.create_client(kind, name)
+        executor = SingleThreadedExecutor(context=self._context)
+        try:
+            if not client.wait_for_service(self._params.connect_timeout_s):
+                return None
+            future = client.call_async(request)
+            rclpy.spin_until_future_complete(self._node, future, executor, self._params.connect_timeout_s)
+            return future.result() if future.done() else None
+        finally:
+            executor.shutdown()
+            self._node.destroy_client(client)
 
     def close(self) -> None:
         """Wait until what was sent has arrived, and leave."""
