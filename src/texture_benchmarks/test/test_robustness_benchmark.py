@@ -17,8 +17,8 @@ from texture_benchmarks.robustness.scenes import CONDITIONS, SCENE, TouchConditi
 from texture_benchmarks.robustness.trial import TOPIC, TrainedModels, degraded
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
+from texture_estimation.channels import with_channels
 from texture_estimation.recipe import load_recipe
-from texture_evaluation.train import with_channels
 from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 from texture_simulation.scene import load_scene

@@ -19,8 +19,7 @@ from texture_bringup.ros.operator import Operator  # noqa: E402
 from texture_core import resources  # noqa: E402
 from texture_core.errors import InvalidParameter, LaunchFailed  # noqa: E402
 from texture_core.exploration import ExplorationRequest  # noqa: E402
-from texture_evaluation.train import train_from_bags  # noqa: E402
-from texture_evaluation.train_grades import train_grades_from_bags  # noqa: E402
+from texture_evaluation.train import train_from_bags, train_grades_from_bags  # noqa: E402
 from texture_launch.child import ChildLauncher  # noqa: E402
 from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 

@@ -22,6 +22,13 @@ def add_channels(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_dask(parser: argparse.ArgumentParser) -> None:
+    """Add `--dask`."""
+    parser.add_argument(
+        '--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead, or local:WORKERS'
+    )
+
+
 def add_seed(parser: argparse.ArgumentParser) -> None:
     """Add `--seed`."""
     parser.add_argument('--seed', type=int, default=0, help='seed of whatever is random')

@@ -1,4 +1,7 @@
-"""Read YAML and JSON as plain values, whoever wrote them: nothing is run, and little text never becomes much data."""
+"""Read YAML and JSON as plain values, whoever wrote them: nothing is run, and little text never becomes much data.
+
+Figures are written as JSON here, too.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ import yaml
 
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidParameter
-from texture_core.files import MB, FileRefused, read_text
+from texture_core.files import MB, FileRefused, read_text, writing
 
 MAX_CHARACTERS = 100_000  # of YAML, which take 3 s at worst; the longest settings in use have a tenth
 MAX_VALUES = 200_000  # with every alias written out
@@ -25,6 +28,12 @@ JSON_STRING = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*"', re.DOTALL)
 PARSE_ERRORS = (
     yaml.YAMLError, OSError, ValueError, LookupError, AttributeError, TypeError, OverflowError, RecursionError,
 )  # fmt: skip
+
+
+def write_json(content: Any, path: str | Path) -> None:
+    """Write figures as JSON; InvalidParameter if the file cannot be written."""
+    with writing(path):
+        Path(path).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
 
 
 def load_yaml(path: Path, what: str) -> Any:

@@ -8,7 +8,7 @@ import pytest
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
 from texture_core.signal import TactileSignal
 from texture_estimation.model import TextureModel, load_model
-from texture_evaluation.evaluate import evaluate, evaluate_bags
+from texture_evaluation.evaluate import evaluate
 from texture_evaluation.train import train_from_bags
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import read_bag
@@ -61,7 +61,7 @@ def test_a_model_is_saved_with_the_data_it_was_trained_on(simulated: Path, tmp_p
     assert load_model(tmp_path / 'mine').name == 'mine'
     card = json.loads((tmp_path / 'mine.json').read_text())
     assert card['data'] == {'bags': ['glass', 'leather', 'ridge_2mm_deep'], 'slides': '1-3'}
-    assert evaluate_bags(tmp_path / 'mine.skops', [simulated], '4').as_json()['window_accuracy'] > 0.9
+    assert evaluate(load_model(tmp_path / 'mine.skops'), [simulated], '4').as_json()['window_accuracy'] > 0.9
 
 
 def test_fast_channels_leave_the_slow_input_out(simulated: Path) -> None:
@@ -98,4 +98,4 @@ def test_a_wrong_recipe_model_or_choice_of_channels_is_refused(simulated: Path, 
     with pytest.raises(InvalidParameter, match="'fast' or 'all'"):
         train_from_bags('default', [simulated], channels='slow')
     with pytest.raises(ModelMismatch, match='cannot be read'):
-        evaluate_bags(tmp_path / 'none', [simulated])
+        load_model(tmp_path / 'none')

@@ -49,13 +49,6 @@ def test_a_decision_is_early_when_it_is_certain_of_a_known_surface() -> None:
     assert metrics.early_decision([never_sure]) == {'accuracy': 0.0, 'mean_s': pytest.approx(0.8)}
 
 
-def test_slides_end_at_a_confidence_or_go_on_to_their_end() -> None:
-    growing = [slide('a', 'baa', confidences=(0.5, 0.7, 0.9)), slide('b', 'abb', confidences=(0.6, 0.6, 0.6))]
-    seconds, shares = metrics.decided_at(growing, (0.5, 0.7, 0.99))
-    np.testing.assert_allclose(seconds, [0.5, 0.65, 0.7])
-    np.testing.assert_array_equal(shares, [0.0, 1.0, 1.0])
-
-
 def test_unknown_surfaces_count_as_accepted_if_the_last_estimate_takes_them_for_known() -> None:
     assert metrics.unknown_accepted([slide('x', 'a'), slide('y', 'a', known=False)]) == 0.5
     assert metrics.unknown_accepted([]) is None

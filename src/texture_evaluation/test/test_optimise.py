@@ -7,11 +7,11 @@ import pytest
 from texture_core.errors import InvalidParameter, TextureError
 from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
+from texture_estimation.search import recipe_files
 from texture_estimation.search.genetic_search import SearchParams
-from texture_evaluation import found_recipes
+from texture_estimation.search.recipe_files import checkpoint_of
 from texture_evaluation.evaluate import evaluate
-from texture_evaluation.found_recipes import Wanted, checkpoint_of
-from texture_evaluation.optimise import optimise_from_bags
+from texture_evaluation.optimise import Wanted, optimise_from_bags
 from texture_evaluation.train import train_from_bags
 
 SMALL = SearchParams(population=5, generations=2, halves=3)
@@ -84,7 +84,7 @@ def test_pairs_that_cannot_be_joined_are_written_alone_and_it_is_said_why(
     def refuse(*_: object) -> None:
         raise InvalidParameter("the pairs differ in 'windows'")
 
-    monkeypatch.setattr(found_recipes, 'joined_recipe', refuse)
+    monkeypatch.setattr(recipe_files, 'joined_recipe', refuse)
     wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
     written = optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
     assert not (tmp_path / 'best.yaml').exists()

@@ -101,12 +101,5 @@ def draw_confusion(axes: Any, labels: Sequence[str], table: AnyArray) -> None:
     size = 8 if len(labels) <= 12 else 6
     for row, column in np.argwhere(percent >= 0.5):
         value = percent[row, column]
-        axes.text(
-            column,
-            row,
-            f'{value:.0f}',
-            ha='center',
-            va='center',
-            fontsize=size,
-            color='white' if value > 60 else 'black',
-        )
+        colour = 'white' if value > 60 else 'black'
+        axes.text(column, row, f'{value:.0f}', ha='center', va='center', fontsize=size, color=colour)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -15,10 +14,10 @@ from texture_core.arrays import AnyArray, Array
 from texture_core.errors import ModelMismatch
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
-from texture_core.files import writing
+from texture_core.plain_data import write_json
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.fingerprint import fingerprint_difference
-from texture_estimation.model import TextureModel, load_model
+from texture_estimation.model import TextureModel
 from texture_evaluation import metrics
 from texture_evaluation.metrics import SlideResult
 from texture_features.windowing.windows import WindowEvent
@@ -77,38 +76,8 @@ class EvaluationReport:
         }
 
     def write(self, path: str | Path) -> None:
-        """Write the figures as JSON.
-
-        Raises
-        ------
-        InvalidParameter
-            If the file cannot be written.
-        """
-        with writing(path):
-            Path(path).write_text(json.dumps(self.as_json(), indent=1) + '\n', encoding='utf-8')
-
-
-def evaluate_bags(
-    model: str | Path, bags: Iterable[str | Path], slides: str = '', namespace: str | None = None
-) -> EvaluationReport:
-    """Load a model and `evaluate` it.
-
-    Parameters
-    ----------
-    model
-        Path of the model.
-    bags
-        Bags, or folders of bags.
-    slides
-        Which slides of each surface, such as '31-40'; '' for all.
-    namespace
-        Namespace of the finger, if bags hold several.
-
-    Returns
-    -------
-    EvaluationReport
-    """
-    return evaluate(load_model(model), bags, slides, namespace)
+        """Write the figures as JSON; InvalidParameter if the file cannot be written."""
+        write_json(self.as_json(), path)
 
 
 def evaluate(
@@ -123,8 +92,7 @@ def evaluate(
     bags
         Bags, or folders of bags.
     slides
-        Which slides of each surface, such as '31-40'; '' for all. Surfaces the model was not in the training set are
-        unknown ones.
+        Which slides of each surface, such as '31-40'; '' for all. Surfaces without training are unknown ones.
     namespace
         Of the finger, if bags hold several.
 

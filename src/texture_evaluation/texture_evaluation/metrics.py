@@ -72,8 +72,7 @@ def window_accuracy(results: Sequence[SlideResult]) -> float:
 def accuracy_at(results: Sequence[SlideResult], seconds: float) -> float | None:
     """Return the share of slides that are recognised after so much sliding; None if no slide is long enough."""
     decided = [(result.surface, result.after(seconds)) for result in results]
-    right = [estimate.label == surface for surface, estimate in decided if estimate is not None]
-    return float(np.mean(right)) if right else None
+    return _share([estimate.label == surface for surface, estimate in decided if estimate is not None])
 
 
 def accuracy_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
@@ -91,15 +90,10 @@ def unclassified_windows(results: Sequence[SlideResult]) -> float:
     return float(np.mean([not label for result in results for label in result.window_labels]))
 
 
-def unclassified_at(results: Sequence[SlideResult], seconds: float) -> float | None:
-    """Return the share of slides without a label after so much sliding; None if no slide is long enough."""
-    estimates = [estimate for result in results if (estimate := result.after(seconds)) is not None]
-    return float(np.mean([not estimate.label for estimate in estimates])) if estimates else None
-
-
 def unclassified_at_times(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
-    """Return `unclassified_at` the usual times, keyed as `accuracy_at_times`."""
-    return {f'{seconds:.1f}': unclassified_at(results, seconds) for seconds in TIMES_S}
+    """Return the share of slides without a label after the usual times, keyed as `accuracy_at_times`."""
+    ends = {f'{seconds:.1f}': [result.after(seconds) for result in results] for seconds in TIMES_S}
+    return {key: _share([not end.label for end in reached if end is not None]) for key, reached in ends.items()}
 
 
 def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
@@ -109,31 +103,6 @@ def early_decision(results: Sequence[SlideResult]) -> Mapping[str, float]:
         'accuracy': float(np.mean([estimate.label == surface for surface, estimate in decisions])),
         'mean_s': float(np.mean([estimate.evidence_s for _, estimate in decisions])),
     }
-
-
-def decided_at(results: Sequence[SlideResult], confidences: Sequence[float]) -> tuple[Array, Array]:
-    """Return mean time (s) and share right of slides that end at a confidence or go on to their end, (n,) each.
-
-    Parameters
-    ----------
-    results
-        Slides with their estimates.
-    confidences : (n,)
-        Confidence at which a slide ends, 0 to 1.
-
-    Returns
-    -------
-    (n,)
-        Mean time, s.
-    (n,)
-        Share of slides that are right, 0 to 1.
-    """
-    times, shares = [], []
-    for confidence in confidences:
-        ends = [next((e for e in r.estimates if e.confidence >= confidence), r.estimates[-1]) for r in results]
-        times.append(float(np.mean([end.evidence_s for end in ends])))
-        shares.append(float(np.mean([end.label == result.surface for end, result in zip(ends, results, strict=True)])))
-    return np.array(times), np.array(shares)
 
 
 def calibration_error(results: Sequence[SlideResult]) -> float:
@@ -164,12 +133,12 @@ def candidates(results: Sequence[SlideResult]) -> Mapping[str, float | None]:
 
 def falsely_rejected(results: Sequence[SlideResult]) -> float | None:
     """Return the share of slides over known surfaces that were taken for unknown at the end; None without any."""
-    return float(np.mean([not result.end.known for result in results])) if results else None
+    return _share([not result.end.known for result in results])
 
 
 def unknown_accepted(results: Sequence[SlideResult]) -> float | None:
     """Return the fraction of slides over unknown surfaces that were accepted as known; None without any."""
-    return float(np.mean([result.end.known for result in results])) if results else None
+    return _share([result.end.known for result in results])
 
 
 def wrong_known(results: Sequence[SlideResult]) -> Mapping[str, float | None]:

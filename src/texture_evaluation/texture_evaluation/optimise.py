@@ -2,58 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_estimation.channels import with_channels
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.genetic_search import Generation, SearchParams
 from texture_estimation.search.labelled_windows import Cut, LabelledWindows
-from texture_estimation.search.optimise import optimise
-from texture_estimation.search.pairs import optimise_pairs
-from texture_estimation.search.parallel import ParallelMap, dask_map, threaded_map
+from texture_estimation.search.optimise import SearchResult, optimise
+from texture_estimation.search.pairs import PairSearchResult, optimise_pairs
+from texture_estimation.search.parallel import ParallelMap, threaded_map
+from texture_estimation.search.recipe_files import Written, checkpoint_of, write_recipes, written_checkpoints
 from texture_estimation.search.recipe_space import RecipeSpace
 from texture_estimation.search.roughness_task import RoughnessTask
 from texture_estimation.search.search_slides import SearchSlides
-from texture_evaluation.found_recipes import Wanted, Written, checkpoint_of, write_found, write_pairs
-from texture_evaluation.train import with_channels
+from texture_estimation.search.shipped_spaces import shipped_space
+from texture_evaluation.optimise_charts import convergence_chart, search_front_chart
 from texture_features.feature_set import FeatureSet
 from texture_features.windowing.windows import CutWindow, WindowParams
 from texture_recordings.slide_dataset import SlideDataset
 
-# The search space of a recipe, or else of its learner.
-OF_RECIPES: Mapping[str, str] = {
-    'ets-linear-ann': 'ets-ann',
-    'ets-linear-ann-vote': 'ets-ann',
-    'ets-linear-svm': 'ets-svm',
-    'ets-linear-svm-vote': 'ets-svm',
-    'ets-circular-ann': 'ets-circular-ann',
-    'ets-circular-svm': 'ets-circular-svm',
-    'ets-fine-ann': 'ets-fine-ann',
-    'ets-fine-svm': 'ets-fine-svm',
-    'ets-roughness-ann1': 'ets-roughness-ann1',
-    'ets-roughness-ann5': 'ets-roughness-ann5',
-    'ets-roughness-svm5': 'ets-roughness-svm5',
-}
-# All pairs of one model share the length of the windows, so it is not searched for each of them.
-OF_PAIRS: Mapping[str, str] = {
-    'ets-circular-ann': 'ets-circular-pairs-ann',
-    'ets-circular-svm': 'ets-circular-pairs-svm',
-}
-OF_LEARNERS: Mapping[str, str] = {
-    'ann_pairs': 'ann-pairs',
-    'svm_pairs': 'svm-pairs',
-    'svm_rbf': 'svm-rbf',
-    'mlp': 'mlp',
-}
 Tell = Callable[[str, Generation], None]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is tuned, and on which slides.
+
+    Parameters
+    ----------
+    recipe
+        Name of a shipped recipe, or path of any; of a roughness recipe if there are `grades`.
+    bags
+        Bags, or folders of bags.
+    search
+        Name or path of the search space; '' for that of the recipe or its learner.
+    slides
+        Which slides of each surface, such as '1-30'; '' for all.
+    channels
+        'fast' leaves all inputs of the recipe but `signal` out.
+    grades
+        CSV file with the grade of every surface, or the name of a shipped table; '' to distinguish surfaces.
+    per_pair
+        Tune the variables of each pair of surfaces by themselves; one recipe joins them.
+    """
+
+    recipe: str
+    bags: tuple[str, ...]
+    search: str = ''
+    slides: str = ''
+    channels: str = 'all'
+    grades: str = ''
+    per_pair: bool = False
+
+    def __post_init__(self) -> None:
+        if self.grades and self.per_pair:
+            raise InvalidParameter('grades are not told pair by pair; leave --per-pair or --grades out')
 
 
 def cut_of(dataset: SlideDataset, feature_set: FeatureSet) -> Cut:
@@ -122,30 +134,32 @@ def optimise_from_bags(
     dataset = SlideDataset.from_bags(wanted.bags, wanted.slides, topics=feature_set.topics)
     search_slides = SearchSlides(cut_of(dataset, feature_set), params.halves, params.seed)
     checkpoint = checkpoint_of(target)
-    if resume and not _checkpoints(checkpoint):
+    if resume and not written_checkpoints(target):
         raise InvalidData(f"there is no checkpoint '{checkpoint}' to go on from; leave '--resume' out to start again")
     options: dict[str, Any] = {'checkpoint': checkpoint, 'resume': checkpoint if resume else None}
+    found: SearchResult[Any] | PairSearchResult
     with over() as parallel_map:
+        options['parallel_map'] = parallel_map
         if wanted.per_pair:
-            pairs = optimise_pairs(
-                space,
-                search_slides,
-                params,
-                parallel_map=parallel_map,
-                tell=lambda pair, said: tell(' – '.join(pair), said),
-                **options,
+            found = optimise_pairs(
+                space, search_slides, params, tell=lambda pair, said: tell(' – '.join(pair), said), **options
             )
-            return write_pairs(pairs, space.base, wanted, params, target)
-        task: Any = RoughnessTask(read_grades(wanted.grades)) if wanted.grades else ClassificationTask()
-        found = optimise(
-            space, search_slides, params, task, parallel_map=parallel_map, tell=lambda said: tell('', said), **options
-        )
-    return write_found(found, wanted, params, target)
+        else:
+            task: Any = RoughnessTask(read_grades(wanted.grades)) if wanted.grades else ClassificationTask()
+            found = optimise(space, search_slides, params, task, tell=lambda said: tell('', said), **options)
+    written = write_recipes(found, space.base, wanted.recipe, params, target)
+    chart = _draw(found, wanted.recipe, params, target.with_suffix('.png'))
+    return Written((*written.files, chart), written.lines)
 
 
-def parallel_map_for(jobs: int, dask: str) -> Callable[[], AbstractContextManager[ParallelMap]]:
-    """Return what spreads over so many cores (-1: all), or over a Dask cluster if its address is given."""
-    return (lambda: dask_map(dask)) if dask else (lambda: threaded_map(jobs))
+def _draw(found: SearchResult[Any] | PairSearchResult, recipe: str, params: SearchParams, chart: Path) -> Path:
+    if isinstance(found, PairSearchResult):
+        histories = {' – '.join(pair): one.found.history for pair, one in found.by_pair.items()}
+        return convergence_chart(histories, f'{recipe}: a search for each pair', chart)
+    if params.objective == 'front':
+        points = [(one.searched.cost, one.fitness) for one in found.finalists]
+        return search_front_chart({recipe: points}, f'{recipe}: accuracy and computing', chart)
+    return convergence_chart({recipe: found.found.history}, f'{recipe}: the search', chart)
 
 
 def _space(wanted: Wanted) -> RecipeSpace[Any]:
@@ -156,16 +170,4 @@ def _space(wanted: Wanted) -> RecipeSpace[Any]:
     else:
         recipe = with_channels(load_recipe(wanted.recipe), wanted.channels)
         learner = recipe.learner_name
-    of_pairs = OF_PAIRS.get(recipe.name) if wanted.per_pair else None
-    search = wanted.search or of_pairs or OF_RECIPES.get(recipe.name) or OF_LEARNERS.get(learner)
-    if not search:
-        raise InvalidParameter(
-            f"recipe '{recipe.name}' has no search space of its own, nor has '{learner}'; "
-            'say with --search FILE what is to be varied'
-        )
-    return RecipeSpace.load(search, recipe)
-
-
-def _checkpoints(path: Path) -> list[Path]:
-    """Return the checkpoint, or those of the pairs."""
-    return [path] if path.is_file() else sorted(path.parent.glob(f'{path.stem}-*-vs-*{path.suffix}'))
+    return RecipeSpace.load(wanted.search or shipped_space(recipe.name, learner, per_pair=wanted.per_pair), recipe)

@@ -26,7 +26,6 @@ def convergence_chart(searches: Mapping[str, Sequence[Generation]], title: str, 
     Returns
     -------
     Path
-        Of the file.
     """
     with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()
@@ -60,7 +59,6 @@ def search_front_chart(fronts: Mapping[str, Sequence[tuple[float, float]]], titl
     Returns
     -------
     Path
-        Of the file.
     """
     with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()

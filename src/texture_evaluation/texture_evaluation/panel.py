@@ -60,13 +60,12 @@ class PanelReport:
             'one_against_rest_error': self.error,
             'one_against_rest_r': self.correlation,
         }
+        rows = zip(ratings.textures, ratings.means, ratings.deviations, ratings.votes, strict=True)
         return {
             'raters': len(ratings.raters),
             'textures': {
                 name: {'mean': float(mean), 'std': _or_none(float(std)), 'votes': votes.tolist()}
-                for name, mean, std, votes in zip(
-                    ratings.textures, ratings.means, ratings.deviations, ratings.votes, strict=True
-                )
+                for name, mean, std, votes in rows
             },
             **{name: _or_none(value) for name, value in figures.items()},
             'protocol_violations': list(self.violations),
@@ -74,13 +73,7 @@ class PanelReport:
         }
 
     def write(self, folder: Path) -> tuple[Path, Path]:
-        """Write panel.json, and grades.csv that training takes; return their paths.
-
-        Raises
-        ------
-        InvalidParameter
-            If a file cannot be written.
-        """
+        """Write panel.json, and grades.csv that training takes; InvalidParameter if one cannot be written."""
         ratings = self.ratings
         with writing(folder, 'folder'):
             folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Train a model from labelled bags."""
+"""Train a model from labelled bags: one that recognises surfaces, or one that grades them as people did."""
 
 from __future__ import annotations
 
@@ -6,18 +6,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from texture_core.errors import InvalidParameter
 from texture_core.files import writing
+from texture_estimation.channels import with_channels
 from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.model import RoughnessModel
+from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.training import train_grades
 from texture_features.labelled_features import LabelledFeatures
 from texture_recordings.bags import find_bags
 from texture_recordings.slide_dataset import SlideDataset
 
-FAST_TOPIC = 'signal'
-CHANNELS = ('fast', 'all')
 HOPS = 4  # windows of the least distance overlap so often
 
 
@@ -28,7 +29,6 @@ def train_from_bags(
     out: str | Path | None = None,
     *,
     channels: str = 'all',
-    name: str = '',
     namespace: str | None = None,
 ) -> TextureModel:
     """Return a model trained on the labelled slides of bags, and save it.
@@ -45,8 +45,6 @@ def train_from_bags(
         Path of the model, with or without .skops; not saved if None.
     channels
         'fast' leaves all inputs of the recipe but `signal` out.
-    name
-        Of the model; that of the file, or else of the recipe, if ''.
     namespace
         Of the finger, if bags hold several.
 
@@ -62,10 +60,53 @@ def train_from_bags(
     plan = with_channels(load_recipe(recipe), channels)
     dataset = SlideDataset.from_bags(bags, slides, namespace, plan.feature_set.topics)
     examples = training_examples(plan, dataset)
-    default = Path(out).name.removesuffix('.skops') if out else plan.name
-    model = train(plan, examples, name or default)
+    model = train(plan, examples, _name(out, plan.name))
     if out is not None:
-        save_model(model, out, bags, slides)
+        _save(model, out, bags, slides)
+    return model
+
+
+def train_grades_from_bags(
+    recipe: str,
+    bags: Sequence[str | Path],
+    grades: str | Path,
+    slides: str = '',
+    out: str | Path | None = None,
+    *,
+    namespace: str | None = None,
+) -> RoughnessModel:
+    """Return a roughness model trained on the labelled slides of bags, and save it.
+
+    Parameters
+    ----------
+    recipe
+        Name of a shipped roughness recipe, or path of any.
+    bags
+        Bags, or folders of bags.
+    grades
+        CSV file with the grade of every surface in the bags, or the name of a shipped table.
+    slides
+        Which slides of each surface, such as '1-30'; '' for all.
+    out
+        Path of the model, with or without .skops; not saved if None.
+    namespace
+        Of the finger, if bags hold several.
+
+    Returns
+    -------
+    RoughnessModel
+
+    Raises
+    ------
+    TextureError
+        With one sentence, if recipe, bags, grades, slides or place are wrong.
+    """
+    plan, table = load_roughness_recipe(recipe), read_grades(grades)
+    windows = replace(plan.feature_set, windows=plan.training_windows)
+    examples = SlideDataset.from_bags(bags, slides, namespace, windows.topics).features(windows)
+    model = train_grades(plan, examples, table, _name(out, plan.name))
+    if out is not None:
+        _save(model, out, bags, slides, grades=str(grades))
     return model
 
 
@@ -79,48 +120,15 @@ def training_examples(recipe: Recipe, dataset: SlideDataset) -> LabelledFeatures
     return replace(examples, resized=dataset.features_over_distances(windows, distances_m, distances_m[0] / HOPS))
 
 
-def with_channels(recipe: Recipe, channels: str) -> Recipe:
-    """Return the recipe as it is for 'all' channels, with the input `signal` alone for 'fast'.
-
-    Raises
-    ------
-    InvalidParameter
-        If `channels` is neither, or the recipe has no vibration.
-    """
-    if channels not in CHANNELS:
-        raise InvalidParameter(f"channels are '{channels}'; 'fast' or 'all' is needed")
-    if channels == 'all':
-        return recipe
-    inputs = tuple(item for item in recipe.feature_set.inputs if item.topics == (FAST_TOPIC,))
-    if not inputs:
-        raise InvalidParameter(f"recipe '{recipe.name}' has no input '{FAST_TOPIC}'; use it with all channels")
-    feature_set = replace(recipe.feature_set, inputs=inputs, _layouts={})
-    return replace(recipe, feature_set=feature_set)
+def _name(out: str | Path | None, recipe: str) -> str:
+    """Return the name of a model: that of its file, or else of its recipe."""
+    return Path(out).name.removesuffix('.skops') if out else recipe
 
 
-def save_model(
+def _save(
     model: TextureModel | RoughnessModel, out: str | Path, bags: Sequence[str | Path], slides: str, **more: str
 ) -> None:
-    """Save a model with the names of the bags it was trained on.
-
-    Parameters
-    ----------
-    model
-        What was trained.
-    out
-        Path of the model, with or without .skops.
-    bags
-        Bags, or folders of bags.
-    slides
-        Which slides of each surface; '' for all.
-    **more
-        Further facts about the data.
-
-    Raises
-    ------
-    InvalidParameter
-        If the file cannot be written.
-    """
+    """Save a model with the names of the bags it was trained on, and further facts about the data."""
     data = {'bags': [path.name for path in find_bags(bags)], 'slides': slides or 'all', **more}
     with writing(out):
         model.save(out, {'data': data})

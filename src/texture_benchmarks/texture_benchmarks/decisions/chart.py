@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from texture_benchmarks.charts import line_chart
+from texture_benchmarks.decision_times import decided_at
 from texture_benchmarks.decisions.trial import (
     TESTED,
     TRAINED,
@@ -15,7 +16,7 @@ from texture_benchmarks.decisions.trial import (
     Trial,
 )
 from texture_core.arrays import Array
-from texture_evaluation.metrics import SlideResult, decided_at
+from texture_evaluation.metrics import SlideResult
 
 CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.999)
 

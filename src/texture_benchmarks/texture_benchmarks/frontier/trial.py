@@ -6,17 +6,18 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
+from texture_benchmarks.decision_times import decided_at
 from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.recipes.run import RATE_HZ
 from texture_benchmarks.recipes.trial import comparable, every, figures_of, latency_us
 from texture_core.arrays import Array
+from texture_estimation.channels import with_channels
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.search.parallel import single_blas_thread
 from texture_evaluation import metrics
 from texture_evaluation.cross_validation.cross_validate import cross_validate
 from texture_evaluation.cross_validation.splits import Split
-from texture_evaluation.train import with_channels
 from texture_recordings.slide_dataset import SlideDataset
 
 OVERLAPPING_S = 0.1  # windows of LENGTH_S begin so far apart on the robot
@@ -54,7 +55,7 @@ Points = Mapping[str, Mapping[float, _Point]]  # by recipe and length (s) of its
 def _try(dataset: SlideDataset, split: Split, job: FrontierJob) -> _Point:
     result = cross_validate(job.recipe(), dataset, split.splitter)
     results = result.pooled
-    early = metrics.decided_at(results, CONFIDENCES)
+    early = decided_at(results, CONFIDENCES)
     rule = metrics.early_decision(results)
     return _Point(result.folds[-1].model, figures_of(result), metrics.curve(results), early, rule)
 

@@ -20,7 +20,7 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.fitness import decided_by_slide
 from texture_estimation.search.recipe_space import RecipeSpace
-from texture_evaluation.optimise import OF_RECIPES
+from texture_estimation.search.shipped_spaces import OF_RECIPES
 from texture_features.feature_set import InputFeatures
 from texture_features.windowing.time_stretch import Stretched
 from texture_simulation.scene import Scene

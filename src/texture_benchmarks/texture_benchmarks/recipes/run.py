@@ -41,12 +41,12 @@ from texture_benchmarks.recipes.trial import (
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.resources import folder
+from texture_estimation.channels import with_channels
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
 from texture_evaluation.cross_validation.cross_validate import FoldFeatures, cross_validate, split_slides
 from texture_evaluation.cross_validation.splits import Split
-from texture_evaluation.train import with_channels
 from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
 from texture_recordings.slide_dataset import SlideDataset

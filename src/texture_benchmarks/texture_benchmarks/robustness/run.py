@@ -36,8 +36,8 @@ from texture_benchmarks.robustness.scenes import (
 )
 from texture_benchmarks.robustness.trial import TOPIC, Count, TrainedModels, degraded
 from texture_core.resources import folder
+from texture_estimation.channels import with_channels
 from texture_estimation.recipe import Recipe, load_recipe
-from texture_evaluation.train import with_channels
 from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from texture_bringup.demo.slide_overview_chart import SlideOverview, picture
 from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
 from texture_evaluation.evaluate import EvaluationReport
-from texture_evaluation.slide_overview_chart import SlideOverview, picture
 from texture_recordings.bags import read_bag
 
 

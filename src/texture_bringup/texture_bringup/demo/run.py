@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -16,9 +15,11 @@ from texture_bringup.demo.results import Row, is_refused, latencies_s, table, un
 from texture_bringup.demo.rig import DemoRig
 from texture_core.errors import InvalidData
 from texture_core.estimates import TextureEstimate
+from texture_core.plain_data import write_json
+from texture_estimation.model import load_model
 from texture_evaluation.commands import train as training
 from texture_evaluation.commands.evaluate import percent
-from texture_evaluation.evaluate import EvaluationReport, evaluate_bags
+from texture_evaluation.evaluate import EvaluationReport, evaluate
 from texture_evaluation.train import train_from_bags
 
 SOURCE = 'simulated Robotiq TSF-85'
@@ -169,9 +170,9 @@ def _report(
     right = sum(row.right for row in rows)
     progress.line(f'{right} of {len(rows)} slides over simulated surfaces recognised')
     progress.line('latency: from the last sample of a window to its estimate at another process')
-    report = evaluate_bags(places.model, [places.recognition_bag])
+    report = evaluate(load_model(places.model), [places.recognition_bag])
     figures = {**report.as_json(), 'untrained_speed': untrained_figures(untrained, plan.untrained_speed_m_s)}
-    places.figures.write_text(json.dumps(figures, indent=1) + '\n', encoding='utf-8')
+    write_json(figures, places.figures)
     windows = percent(report.as_json()['window_accuracy'])
     progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
     note = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Protocol, TypeVar
 
 from joblib import Parallel, delayed, parallel_config  # type: ignore[import-untyped]
@@ -111,3 +111,8 @@ def single_blas_thread() -> Iterator[None]:
     """Keep linear algebra from starting threads of its own: the cores are busy already."""
     with threadpool_limits(limits=1, user_api='blas'):
         yield
+
+
+def parallel_map_for(jobs: int, dask: str) -> Callable[[], AbstractContextManager[ParallelMap]]:
+    """Return what spreads over so many cores (-1: all), or over a Dask cluster if its address is given."""
+    return (lambda: dask_map(dask)) if dask else (lambda: threaded_map(jobs))

@@ -7,18 +7,19 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
-from texture_core.command_options import add_channels, add_seed, add_slides
+from texture_core.command_options import add_channels, add_dask, add_seed, add_slides
 from texture_core.errors import InvalidParameter, ModelMismatch
+from texture_core.plain_data import write_json
 from texture_core.resources import folder
+from texture_estimation.channels import FAST_TOPIC, with_channels
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search.parallel import dask_backend
 from texture_evaluation.cross_validation.comparison import PairedComparison, compare_all
 from texture_evaluation.cross_validation.comparison_chart import comparison_chart
-from texture_evaluation.cross_validation.cross_validate import CrossValidation, cross_validate, write_json
+from texture_evaluation.cross_validation.cross_validate import CrossValidation, cross_validate
 from texture_evaluation.cross_validation.splits import parse_split
 from texture_evaluation.evaluate import EvaluationReport, evaluate
-from texture_evaluation.train import FAST_TOPIC, with_channels
 from texture_recordings.slide_dataset import SlideDataset
 
 
@@ -37,9 +38,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         'or random:20',
     )
     parser.add_argument('--jobs', type=int, default=1, metavar='N', help='folds computed at once; -1: one per core')
-    parser.add_argument(
-        '--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead, or local:WORKERS'
-    )
+    add_dask(parser)
     add_slides(parser)
     add_channels(parser)
     add_seed(parser)
@@ -51,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
         return run_cross_validation(options)
     model = load_model(options.model)
     if options.channels == 'fast':
-        refuse_slow_channels(model)
+        _refuse_slow_channels(model)
     report = evaluate(model, options.bags, options.slides)
     for line in summary(report):
         print(line)
@@ -76,11 +75,20 @@ def run_cross_validation(options: argparse.Namespace) -> int:
     for one in compared:
         print(sentence(one))
     if options.json:
-        write_all(results, compared, options.json)
+        _write_figures(results, compared, options.json)
     if options.chart:
         title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
         print(comparison_chart(results, title, options.chart))
     return 0
+
+
+def _write_figures(results: Sequence[CrossValidation], compared: Sequence[PairedComparison], path: str) -> None:
+    """Write the figures of one recipe, or of several with their comparisons with the first, as JSON."""
+    if len(results) == 1:
+        results[0].write(path)
+    else:
+        recipes, comparisons = [result.as_json() for result in results], [one.as_json() for one in compared]
+        write_json({'recipes': recipes, 'comparisons': comparisons}, path)
 
 
 def recipes_and_bags(given: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -121,31 +129,6 @@ def sentence(one: PairedComparison) -> str:
     )
 
 
-def write_all(results: Sequence[CrossValidation], compared: Sequence[PairedComparison], path: str) -> None:
-    """Write the figures of one recipe, or of several with their comparisons, as JSON.
-
-    Parameters
-    ----------
-    results
-        One for each recipe.
-    compared
-        Comparisons with the first recipe.
-    path
-        File to write.
-
-    Raises
-    ------
-    InvalidParameter
-        If the file cannot be written.
-    """
-    if len(results) == 1:
-        results[0].write(path)
-        return
-    write_json(
-        {'recipes': [result.as_json() for result in results], 'comparisons': [one.as_json() for one in compared]}, path
-    )
-
-
 def table(result: CrossValidation, split: str) -> list[str]:
     """Return a row for each fold and one for all, in lines for people."""
     figures = result.as_json()
@@ -167,14 +150,7 @@ def table(result: CrossValidation, split: str) -> list[str]:
     return lines
 
 
-def refuse_slow_channels(model: TextureModel) -> None:
-    """Raise ModelMismatch if a model needs more than the vibration.
-
-    Raises
-    ------
-    ModelMismatch
-        If it does.
-    """
+def _refuse_slow_channels(model: TextureModel) -> None:
     slow = [topic for topic in model.recipe.feature_set.topics if topic != FAST_TOPIC]
     if slow:
         raise ModelMismatch(
@@ -186,11 +162,8 @@ def refuse_slow_channels(model: TextureModel) -> None:
 def summary(report: EvaluationReport) -> list[str]:
     """Return the figures in lines for people."""
     figures = report.as_json()
-    at = [
-        f'{percent(share)} after {seconds} s'
-        for seconds, share in figures['accuracy_at_s'].items()
-        if share is not None
-    ]
+    shares = figures['accuracy_at_s'].items()
+    at = [f'{percent(share)} after {seconds} s' for seconds, share in shares if share is not None]
     early, latency = figures['early'], figures['latency_us']
     lines = [
         f'slides: {len(report.known)} over surfaces the model knows, {len(report.unknown)} over others',

@@ -7,11 +7,12 @@ import sys
 import time
 from dataclasses import dataclass, field
 
-from texture_core.command_options import add_channels, add_seed, add_slides
+from texture_core.command_options import add_channels, add_dask, add_seed, add_slides
 from texture_core.parameters import from_mapping
 from texture_estimation.search.genetic_search import OBJECTIVES, Generation, SearchParams
-from texture_evaluation.found_recipes import Wanted, checkpoint_of
-from texture_evaluation.optimise import optimise_from_bags, parallel_map_for
+from texture_estimation.search.parallel import parallel_map_for
+from texture_estimation.search.recipe_files import checkpoint_of
+from texture_evaluation.optimise import Wanted, optimise_from_bags
 
 BAR = 20  # letters
 
@@ -33,9 +34,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('--halves', type=int, default=usual.halves, metavar='N', help='random splits evaluated on')
     parser.add_argument('--all-halves', action='store_true', help='evaluate each individual on all, however bad it is')
     parser.add_argument('--jobs', type=int, default=-1, metavar='N', help='cores to use; -1: all')
-    parser.add_argument(
-        '--dask', default='', metavar='ADDRESS', help='scheduler of a Dask cluster to use instead, or local:WORKERS'
-    )
+    add_dask(parser)
     parser.add_argument('--resume', action='store_true', help='go on from the checkpoint beside FILE')
     add_slides(parser)
     add_channels(parser)
@@ -44,15 +43,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Search, write the recipe, and say how good it is."""
-    wanted = Wanted(
-        recipe=options.recipe,
-        bags=tuple(options.bags),
-        search=options.search,
-        slides=options.slides,
-        channels=options.channels or 'all',
-        grades=options.grades,
-        per_pair=options.per_pair,
-    )
+    given = {name: getattr(options, name) for name in ('recipe', 'search', 'slides', 'grades', 'per_pair')}
+    wanted = Wanted(bags=tuple(options.bags), channels=options.channels or 'all', **given)
     chosen = {name: getattr(options, name) for name in ('population', 'generations', 'halves', 'seed', 'objective')}
     params = from_mapping(SearchParams, {**chosen, 'race': not options.all_halves}, 'texture optimise')
     progress = Progress()

@@ -30,7 +30,6 @@ def comparison_chart(results: Sequence[CrossValidation], title: str, path: str |
     Returns
     -------
     Path
-        That file.
     """
     with chart(path, (10.0, 2.4 + 0.5 * len(results)), title) as figure:
         shares, times = figure.subplots(1, 2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,13 +14,13 @@ from numpy.typing import NDArray
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData
-from texture_core.files import writing
+from texture_core.plain_data import write_json
 from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_evaluation import metrics
-from texture_evaluation.cross_validation.splits import Splitter, groups_name
+from texture_evaluation.cross_validation.splits import Splitter
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import training_examples
 from texture_features.labelled_features import LabelledFeatures
@@ -128,20 +127,8 @@ class CrossValidation:
         }
 
     def write(self, path: str | Path) -> None:
-        """Write the figures as JSON.
-
-        Raises
-        ------
-        InvalidParameter
-            If the file cannot be written.
-        """
+        """Write the figures as JSON; InvalidParameter if the file cannot be written."""
         write_json(self.as_json(), path)
-
-
-def write_json(content: Mapping[str, Any], path: str | Path) -> None:
-    """Write figures as JSON; InvalidParameter if the file cannot be written."""
-    with writing(path):
-        Path(path).write_text(json.dumps(content, indent=1) + '\n', encoding='utf-8')
 
 
 def figures(results: Sequence[SlideResult]) -> dict[str, Any]:
@@ -333,7 +320,9 @@ def _groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
 
 def _fold_name(number: int, groups: AnyArray, test_rows: NDArray[np.intp]) -> str:
     left_out = np.unique(groups[test_rows])
-    return groups_name(left_out[0]) if len(left_out) == 1 and len(test_rows) > 1 else str(number)
+    if len(left_out) != 1 or len(test_rows) < 2:
+        return str(number)
+    return f'{left_out[0]:g}' if np.issubdtype(left_out.dtype, np.number) else str(left_out[0])
 
 
 def _fold(

@@ -111,14 +111,3 @@ ALLOWED = (
     f'write stratified:FOLDS, leave-one-out:CONDITION ({", ".join(CONDITIONS)}), '
     'chronological:TRAINING_FRACTION or random:SPLITS'
 )
-
-
-def groups_name(value: AnyArray) -> str:
-    """Return the name of a fold that leaves a value out.
-
-    Parameters
-    ----------
-    value
-        A single value, as an array without axes.
-    """
-    return f'{value:g}' if np.issubdtype(np.asarray(value).dtype, np.number) else str(value)

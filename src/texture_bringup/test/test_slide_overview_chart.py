@@ -3,8 +3,8 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 
+from texture_bringup.demo.slide_overview_chart import SlideOverview, picture
 from texture_core.estimates import TextureEstimate
-from texture_evaluation.slide_overview_chart import SlideOverview, picture
 
 LABELS = ('cork', 'felt', 'linen')
 TABLE = np.array([[9, 1, 0], [2, 8, 0], [0, 0, 0]])
