@@ -35,6 +35,10 @@ IN_HAND = ['in_hand_sliding', '--speed', '0.02', '--duration', '2']
 MOTIONS = ((LINEAR, SURFACE), (CIRCULAR, ''), (IN_HAND, ''))
 REPORTED = (UrArmParams, SafetyLimits, SignalWatchParams)  # parameters in the example of a file
 ROBOTS = {'ur': 73, 'rails': 74, 'hand': 75, 'ros_controllers': 95}  # and the domain of its nodes
+PATIENCE = {  # of the arm itself; the explorer would warn of a parameter that its arm has not
+    'ur': {'silence_s': 1.5, 'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
+    'ros_controllers': {'deadman_s': 1.5, 'connect_timeout_s': 30.0},
+}
 FORCES = {'ros_controllers': ['--force', '5']}  # that its preset allows; the default of the motion otherwise
 
 
@@ -53,15 +57,7 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
     for name, value in {'ROS_DOMAIN_ID': str(ROBOTS[robot]), 'ROS_LOG_DIR': str(tmp_path)}.items():
         monkeypatch.setenv(name, value)
     # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
-    patient = {
-        'state_timeout_s': 1.5,
-        'estimate_timeout_s': 10.0,
-        'silence_s': 1.5,
-        'signal_timeout_s': 3.0,
-        'watchdog_hz': 1.0,
-        'deadman_s': 1.5,
-        'connect_timeout_s': 30.0,
-    }
+    patient = {'state_timeout_s': 1.5, 'estimate_timeout_s': 10.0, 'signal_timeout_s': 3.0, **PATIENCE.get(robot, {})}
     (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
     place = {'ur': {'ip': '127.0.0.110'}, 'ros_controllers': {}}.get(robot, {'robot': tmp_path / robot})
     given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'surface': SURFACE, 'model': model, **place}
@@ -71,6 +67,7 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
             operator.wait_for_explorer(DEADLINE_S)
             operator.wait_for_signal(DEADLINE_S)
             operator.wait_for_listeners(('exploration', 'features'), 1, launcher.check)  # who estimates
+        assert 'this has no effect' not in launcher.log.read_text()  # whatever a launch file gives is a parameter
         for motion, label in MOTIONS:
             code = command.main(['explore', *motion, *FORCES.get(robot, [])])
             reported = capsys.readouterr().out
