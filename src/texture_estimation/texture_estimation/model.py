@@ -286,7 +286,7 @@ def load_model(path: str | Path) -> TextureModel:
     card, content = model_files.read(target)
     if 'regressor' in card.get('recipe', {}):
         raise ModelMismatch(f"model '{target}' estimates roughness; load it in the roughness_estimator")
-    try:
+    with model_files.usable(target):
         recipe = Recipe.from_mapping(card['recipe'], str(card['recipe_name']))
         parameters = model_files.load_parameters(content, TRUSTED, estimators=recipe.learner_name == 'sklearn')
         examples, novelty_detector, gaussians = (
@@ -309,10 +309,6 @@ def load_model(path: str | Path) -> TextureModel:
             domain=Domain.from_card(card.get('domain', {})),
         )
         model.validate()
-    except model_files.BROKEN as error:
-        raise ModelMismatch(
-            f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
-        ) from error
     added_slides = read_added_slides(target, model.feature_set, model.names)
     if not added_slides:
         return model

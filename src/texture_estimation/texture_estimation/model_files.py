@@ -9,6 +9,7 @@ import os
 import struct
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -36,6 +37,17 @@ BROKEN = (
     TextureError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RuntimeError,
     ImportError, EOFError, SyntaxError, struct.error, zipfile.BadZipFile,
 )  # fmt: skip
+
+
+@contextmanager
+def usable(target: Path) -> Iterator[None]:
+    """Raise ModelMismatch with one sentence if what a `with` block makes of the files cannot be used."""
+    try:
+        yield
+    except BROKEN as error:
+        raise ModelMismatch(
+            f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
+        ) from error
 
 
 def stem(path: str | Path) -> Path:

@@ -201,29 +201,6 @@ def more_spread(claim: str, first: MethodResult, second: MethodResult, alike: Se
     return Finding(claim, f'{reported} of the slides', more, more.above())
 
 
-def no_lower(claim: str, first: MethodResult, second: MethodResult, margin: float = 0.05) -> Finding:
-    """Check that slides of one kind are recognised at most a margin less often than those of another kind.
-
-    Parameters
-    ----------
-    claim
-        Sentence of the paper.
-    first, second
-        Results on different slides.
-    margin
-        Largest difference that counts as none, 0 to 1.
-
-    Returns
-    -------
-    Finding
-        Whether it holds here, with an interval.
-    """
-    gain = apart(first.right(), second.right())
-    gain = Interval(gain.value + margin, gain.low + margin, gain.high + margin)
-    here = f'{percent(first.test)} against {percent(second.test)}, {100 * margin:g} points granted'
-    return Finding(claim, here, gain, gain.above())
-
-
 def percent(part: Interval) -> str:
     """Return a share with its interval."""
     return f'{100 * part.value:.1f} % ({100 * part.low:.1f} to {100 * part.high:.1f})'

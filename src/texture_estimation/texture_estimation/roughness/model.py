@@ -191,7 +191,7 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
     card, content = model_files.read(target)
     if 'regressor' not in card.get('recipe', {}):
         raise ModelMismatch(f"model '{target}' classifies textures; load it in the classifier")
-    try:
+    with model_files.usable(target):
         model = RoughnessModel(
             name=str(card['name']),
             names=tuple(map(str, card['features'])),
@@ -204,10 +204,6 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
             training=dict(card['training']),
         )
         grade, std = model.grade(np.zeros(len(model.names)))
-    except model_files.BROKEN as error:
-        raise ModelMismatch(
-            f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
-        ) from error
     if np.shape(grade) or np.shape(std):
         raise ModelMismatch(f"model '{target}' answers with more than one grade; train it again")
     return model

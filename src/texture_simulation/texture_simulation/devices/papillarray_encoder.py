@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from texture_core.arrays import Array
 
 PILLARS, QUANTITIES = 9, 6
-OFFSET = '<H'
 OFFSET_BYTES = 2
 MARK_BYTES = 4
 HUB, EACH_PILLAR, WHOLE = 1, 3, 4

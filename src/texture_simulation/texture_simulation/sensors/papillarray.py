@@ -33,7 +33,6 @@ N_PER_COUNT = 1e-5
 LIMITS = (-2_000_000, 2_000_000)  # ±20 N
 COUNTS_PER_EFFECT = 100.0  # one count of the effects is 1 mN
 CHANNELS = tables.pillar_channels(len(PLACES_M))
-UNITS = tuple(tables.PILLAR_QUANTITIES.values()) * len(PLACES_M)
 
 
 class PapillArrayModel:
