@@ -42,9 +42,8 @@ class SlideResult:
     @property
     def decisions(self) -> Sequence[TextureEstimate]:
         """The estimates with which a decision is made: all, or those of complete votes; of none is one, the last."""
-        return (self.estimates[self.voters - 1 :: self.voters] if self.voters else self.estimates) or self.estimates[
-            -1:
-        ]
+        found = self.estimates[self.voters - 1 :: self.voters] if self.voters else self.estimates
+        return found or self.estimates[-1:]
 
     @property
     def end(self) -> TextureEstimate:

@@ -31,7 +31,7 @@ def train_from_bags(
     channels: str = 'all',
     namespace: str | None = None,
 ) -> TextureModel:
-    """Return a model trained on the labelled slides of bags, and save it.
+    """Return a model trained on the labelled slides of bags, and save it; a TextureError says what is wrong.
 
     Parameters
     ----------
@@ -51,11 +51,6 @@ def train_from_bags(
     Returns
     -------
     TextureModel
-
-    Raises
-    ------
-    TextureError
-        With one sentence, if recipe, bags, slides or place are wrong.
     """
     plan = with_channels(load_recipe(recipe), channels)
     dataset = SlideDataset.from_bags(bags, slides, namespace, plan.feature_set.topics)
@@ -75,7 +70,7 @@ def train_grades_from_bags(
     *,
     namespace: str | None = None,
 ) -> RoughnessModel:
-    """Return a roughness model trained on the labelled slides of bags, and save it.
+    """Return a roughness model trained on labelled slides, and save it; a TextureError says what is wrong.
 
     Parameters
     ----------
@@ -95,11 +90,6 @@ def train_grades_from_bags(
     Returns
     -------
     RoughnessModel
-
-    Raises
-    ------
-    TextureError
-        With one sentence, if recipe, bags, grades, slides or place are wrong.
     """
     plan, table = load_roughness_recipe(recipe), read_grades(grades)
     windows = replace(plan.feature_set, windows=plan.training_windows)
