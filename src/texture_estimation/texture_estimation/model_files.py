@@ -41,7 +41,13 @@ BROKEN = (
 
 @contextmanager
 def usable(target: Path) -> Iterator[None]:
-    """Raise ModelMismatch with one sentence if what a `with` block makes of the files cannot be used."""
+    """Say in one sentence, within a `with` block, that what it makes of the files of a model cannot be used.
+
+    Raises
+    ------
+    ModelMismatch
+        If the block raises what damaged or foreign files cause.
+    """
     try:
         yield
     except BROKEN as error:
