@@ -21,6 +21,16 @@ START_NS = NANOSECONDS
 STEP_NS = 10_000_000  # of an exploration
 # How often an arm says where it is, and how old that is: Universal Robots, rails, hands.
 ARMS = {'every 2 ms': (2_000_000, 0), 'every 5 ms': (5_000_000, 0), 'every 10 ms, 15 ms late': (10_000_000, 15_000_000)}
+KABOLI = (
+    'kaboli-svm',
+    'kaboli-pa',
+    'kaboli-pa-ovr',
+    'kaboli-em',
+    'kaboli-svm-rbf',
+    'kaboli-svm-two-fingers',
+    'kaboli-pa-two-fingers',
+    'kaboli-em-two-fingers',
+)
 PAIRS = {
     'ets-linear': (
         'ets-linear-svm',
@@ -49,17 +59,10 @@ PAIRS = {
         'jamali-wavelets',
         'jamali-symbols',
     ),
-    'kaboli': (
-        'kaboli-svm',
-        'kaboli-pa',
-        'kaboli-pa-ovr',
-        'kaboli-em',
-        'kaboli-svm-rbf',
-        'kaboli-svm-two-fingers',
-        'kaboli-pa-two-fingers',
-        'kaboli-em-two-fingers',
-    ),
+    'kaboli': KABOLI,
+    'kaboli-random': KABOLI,
     'hu': ('hu-pca-svm', 'hu-log-pca-svm'),
+    'hu-cross': ('hu-pca-svm-xy', 'hu-pca-svm', 'hu-log-pca-svm'),
 }
 
 
@@ -92,17 +95,18 @@ def states_of(request, arm_step_ns, late_ns):
     return states
 
 
-def windows_of(states, windows, rate_hz):
-    """Return the windows of a stream that runs all the time."""
+def windows_of(states, feature_set, rate_hz):
+    """Return the windows of a stream that runs all the time; axes along which it is slid are kept."""
     n_samples = math.ceil((states[-1].stamp_ns - START_NS) / NANOSECONDS * rate_hz) + 1
     signal = TactileSignal(START_NS, 's', ('fast',), (), rate_hz, 0, np.zeros((n_samples, 1), dtype=np.float32))
-    events = cut_recording({'signal': [signal]}, states, windows)
+    inputs = {'@'.join(('signal', *name.split('@')[1:])): None for name in feature_set.window_names}
+    events = cut_recording({'signal': [signal]}, states, feature_set.windows, tuple(inputs))
     return [event for event in events if isinstance(event, CutWindow)]
 
 
-def recipe_windows(name):
+def features_of(name):
     load = load_roughness_recipe if name.startswith('ets-roughness') else load_recipe
-    return load(name).feature_set.windows
+    return load(name).feature_set
 
 
 @pytest.mark.parametrize(('step_ns', 'late_ns'), ARMS.values(), ids=ARMS)
@@ -111,7 +115,7 @@ def test_every_motion_of_a_preset_gives_the_recipes_of_its_paper_a_window(name, 
     for request in load_preset(name).requests:
         states = states_of(request, step_ns, late_ns)
         for recipe in PAIRS[name]:
-            assert windows_of(states, recipe_windows(recipe), 1000.0), f'{recipe} has no window of {request}'
+            assert windows_of(states, features_of(recipe), 1000.0), f'{recipe} has no window of {request}'
 
 
 def test_every_shipped_preset_and_every_recipe_of_a_paper_is_asserted_above():

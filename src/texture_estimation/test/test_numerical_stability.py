@@ -133,8 +133,8 @@ def windows_of(recipe, factor=1.0, seed=0, slides=3, constant=False):
             surfaces[f'{surface}/{slide}'] = surface
             for place in range(4):
                 windows = {}
-                for topic in recipe.feature_set.topics:
-                    rate_hz = RATES_HZ[topic.rpartition('/')[2]]
+                for topic in recipe.feature_set.window_names:
+                    rate_hz = RATES_HZ[topic.partition('@')[0].rpartition('/')[2]]
                     noise = rng.normal(size=(round(length_s * rate_hz), 2))
                     measured = 10.0**number * lfilter([1.0], [1.0, -0.45 * number], noise, axis=0)
                     samples = (factor * (np.full_like(noise, 0.1) if constant else measured)).astype(np.float32)

@@ -18,8 +18,11 @@ from texture_recordings.slide_dataset import SlideDataset
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
 # How the load lies on the taxels: the simulated finger has it alike over all surfaces.
 OF_SHARES = {'taxels': 'signal_static', 'taxels-signal': 'signal'}
+# The simulated slides are of one finger and along one axis.
 OF_ONE_FINGER = [
-    name for name in SHIPPED if '/' not in ''.join(load_recipe(name).feature_set.topics) and name not in OF_SHARES
+    name
+    for name in SHIPPED
+    if not {'/', '@'} & set(''.join(load_recipe(name).feature_set.window_names)) and name not in OF_SHARES
 ]
 
 

@@ -81,7 +81,7 @@ def cut_of(dataset: SlideDataset, feature_set: FeatureSet) -> Cut:
             for event in events
             if isinstance(event, CutWindow)
         )
-        return LabelledWindows.from_events(named, feature_set.topics)
+        return LabelledWindows.from_events(named, feature_set.window_names)
 
     return cut
 

@@ -26,6 +26,7 @@ from texture_features.features.force import Force
 from texture_features.features.speed import Speed
 from texture_features.recipe_entry import choose
 from texture_features.recipe_file import read_recipe
+from texture_features.windowing.axes import check_axes, split_axis
 from texture_features.windowing.time_stretch import Stretched
 from texture_features.windowing.windows import CutWindow, SlideEnd, WindowEvent, WindowParams
 
@@ -46,13 +47,14 @@ class InputFeatures:
 
     One input may be described several times, with other features or parameters: what follows a '#' in its name
     distinguishes the descriptions ('signal', 'signal#2').
+    An input with an axis, 'signal@x', is a topic while the finger slides along that axis.
 
     Examples
     --------
     >>> item = InputFeatures('signal+signal_static', (('speed', Speed()),))
-    >>> item.topics, item.as_mapping()
+    >>> item.window_names, item.as_mapping()
     (('signal', 'signal_static'), {'features': [{'speed': {}}]})
-    >>> InputFeatures('signal#2', (('speed', Speed()),)).topics
+    >>> InputFeatures('signal#2', (('speed', Speed()),)).window_names
     ('signal',)
     """
 
@@ -61,9 +63,14 @@ class InputFeatures:
     tare: str = ''
 
     @cached_property
+    def window_names(self) -> tuple[str, ...]:
+        """Names of the windows that are described: topics, with their axis where there is one."""
+        return tuple(self.topic.partition(AGAIN)[0].split(JOINT))
+
+    @cached_property
     def topics(self) -> tuple[str, ...]:
         """What is subscribed to."""
-        return tuple(self.topic.partition(AGAIN)[0].split(JOINT))
+        return tuple(dict.fromkeys(map(_topic_of, self.window_names)))
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the section of a recipe."""
@@ -147,7 +154,9 @@ class FeatureSet:
                 f'{where}: inputs is {safe_repr(inputs)}; name one or more, '
                 "such as 'inputs: {signal: {features: [hjorth]}}'"
             )
-        return cls(windows, tuple(_input(str(topic), section, where) for topic, section in inputs.items()))
+        feature_set = cls(windows, tuple(_input(str(topic), section, where) for topic, section in inputs.items()))
+        check_axes(feature_set.window_names)
+        return feature_set
 
     def as_mapping(self) -> dict[str, Any]:
         """Return the feature set as a recipe writes it, every parameter spelt out."""
@@ -157,9 +166,14 @@ class FeatureSet:
         }
 
     @cached_property
+    def window_names(self) -> tuple[str, ...]:
+        """Names of the windows that the inputs describe, in order, each once: 'signal', or 'signal@x' of one axis."""
+        return tuple(dict.fromkeys(chain.from_iterable(item.window_names for item in self.inputs)))
+
+    @cached_property
     def topics(self) -> tuple[str, ...]:
-        """What the inputs need, in order, each once."""
-        return tuple(dict.fromkeys(chain.from_iterable(item.topics for item in self.inputs)))
+        """What is subscribed to, in order, each once."""
+        return tuple(dict.fromkeys(map(_topic_of, self.window_names)))
 
     def tare_faults(self, sensors: Mapping[str, str]) -> list[str]:
         """Return sentences on streams that are tared and should not be, or the other way round.
@@ -192,7 +206,7 @@ class FeatureSet:
                 last=True,
                 skipped=event.skipped,
             )
-        inputs = [event.windows[topic] for topic in self.topics]
+        inputs = [event.windows[name] for name in self.window_names]
         speed, force = np.array(event.speed_m_s), np.array(event.force_n)
         values = self._values(
             [WindowBatch(item.samples, item.rate_hz, speed, force, channels=item.channels) for item in inputs]
@@ -227,22 +241,23 @@ class FeatureSet:
         if isinstance(event, SlideEnd):
             return ()
         return tuple(
-            (item.rate_hz, item.channels, item.samples.shape) for item in map(event.windows.__getitem__, self.topics)
+            (item.rate_hz, item.channels, item.samples.shape)
+            for item in map(event.windows.__getitem__, self.window_names)
         )
 
     def _extract_alike(self, events: Sequence[CutWindow]) -> list[FeatureVector]:
         speed = np.array([event.speed_m_s for event in events])
         force = np.array([event.force_n for event in events])
-        inputs = [events[0].windows[topic] for topic in self.topics]
+        inputs = [events[0].windows[name] for name in self.window_names]
         stacked = [
             WindowBatch(
-                np.stack([event.windows[topic].samples for event in events]),
+                np.stack([event.windows[name].samples for event in events]),
                 item.rate_hz,
                 speed,
                 force,
                 channels=item.channels,
             )
-            for topic, item in zip(self.topics, inputs, strict=True)
+            for name, item in zip(self.window_names, inputs, strict=True)
         ]
         values = self._values(stacked)
         layout = _layout(inputs)
@@ -251,11 +266,11 @@ class FeatureSet:
     def _values(self, inputs: Sequence[WindowBatch]) -> Array:
         """Return the values of windows, (..., n_values)."""
         flat = (*inputs[0].samples.shape[:-2], -1)
-        by_topic = dict(zip(self.topics, inputs, strict=True))
+        by_name = dict(zip(self.window_names, inputs, strict=True))
         blocks = [
             feature(windows).reshape(flat)
             for item in self.inputs
-            for windows in [_joined([by_topic[topic] for topic in item.topics])]
+            for windows in [_joined([by_name[name] for name in item.window_names])]
             for _, feature in item.features
         ]
         return np.concatenate(blocks, axis=-1)
@@ -275,13 +290,13 @@ class FeatureSet:
             skipped=event.skipped,
             motion=event.motion,
             direction_rad=event.direction_rad,
-            sensor=event.windows[self.topics[0]].sensor,
+            sensor=event.windows[self.window_names[0]].sensor,
         )
 
     def _names_and_fingerprint(self, layout: InputLayout) -> tuple[tuple[str, ...], str]:
         if layout not in self._layouts:
-            channels = dict(zip(self.topics, (channels for _, channels in layout), strict=True))
-            names = chain.from_iterable(_names(item, channels[item.topics[0]]) for item in self.inputs)
+            channels = dict(zip(self.window_names, (channels for _, channels in layout), strict=True))
+            names = chain.from_iterable(_names(item, channels[item.window_names[0]]) for item in self.inputs)
             self._layouts[layout] = (tuple(names), self._fingerprint(layout))
         return self._layouts[layout]
 
@@ -290,7 +305,8 @@ class FeatureSet:
         meaning = {'inputs': inputs, 'windows': self.windows.length_s}
         digest = hashlib.sha256(json.dumps(meaning, sort_keys=True).encode()).hexdigest()[:8]
         met = [
-            f'{topic}={rate:.6g}Hz*{len(channels)}' for topic, (rate, channels) in zip(self.topics, layout, strict=True)
+            f'{name}={rate:.6g}Hz*{len(channels)}'
+            for name, (rate, channels) in zip(self.window_names, layout, strict=True)
         ]
         return ' '.join([digest, *met])
 
@@ -329,6 +345,10 @@ def _prepared(feature: Feature, options: InputOptions) -> Feature:
 
 def _joined(windows: Sequence[WindowBatch]) -> WindowBatch:
     return windows[0] if len(windows) == 1 else dataclasses.replace(windows[0], joined=tuple(windows[1:]))
+
+
+def _topic_of(name: str) -> str:
+    return split_axis(name)[0]
 
 
 def _names(item: InputFeatures, channels: tuple[str, ...]) -> Iterable[str]:

@@ -452,7 +452,7 @@ def cut_slide(slide: LabelledSlide, feature_set: FeatureSet) -> list[WindowEvent
             f'the windows need {", ".join(feature_set.topics)}: use another recipe or record the missing topic'
         )
     used = {topic: slide.signals[topic] for topic in feature_set.topics}
-    return list(cut_recording(used, slide.states, feature_set.windows))
+    return list(cut_recording(used, slide.states, feature_set.windows, feature_set.window_names))
 
 
 def _windows_over(

@@ -26,9 +26,9 @@ from texture_simulation.simulated_slide import SimulatedSlide
 TASK = 'five linens'
 SLIDE_S = 3.0
 WHOLE = WindowParams(length_s=SLIDE_S, hop_s=SLIDE_S)
-BOTH, X_ONLY, Y_ONLY = 'hu-pca-svm', 'hu-pca-svm, x alone', 'hu-pca-svm, y alone'
-LOG, POWER, CENTRED = 'hu-pca-svm, logarithm', 'hu-pca-svm, power', 'hu-pca-svm, mean of the features subtracted'
-TWO = {'blocks': 2}
+BOTH, ONE = 'hu-pca-svm-xy', 'hu-pca-svm'
+X_ONLY, Y_ONLY = f'{ONE}, x alone', f'{ONE}, y alone'
+LOG, POWER, CENTRED = f'{BOTH}, logarithm', f'{BOTH}, power', f'{BOTH}, mean of the features subtracted'
 ALONG_X_AND_Y = (View(), View(turned_rad=math.pi / 2))
 
 
@@ -54,16 +54,12 @@ PROTOCOL = Protocol(
             TASK,
             (Visits('25.5 mm/s, 1.5 N', 60, SimulatedSlide(0.0255, 1.5, SLIDE_S), ALONG_X_AND_Y),),
             (
-                Method(BOTH, Figures(test=0.92), WHOLE, TWO),
-                Method(BOTH, windows=WHOLE, label=X_ONLY, views=(0,), splits=FEW),
-                Method(BOTH, windows=WHOLE, label=Y_ONLY, views=(1,), splits=FEW),
-                Method(
-                    BOTH, windows=WHOLE, learner=TWO, features={'spectrum': {'scale': 'power'}}, label=POWER, splits=FEW
-                ),
-                Method(
-                    BOTH, windows=WHOLE, learner=TWO, features={'spectrum': {'scale': 'log'}}, label=LOG, splits=FEW
-                ),
-                Method(BOTH, windows=WHOLE, learner={**TWO, 'centre': 'features'}, label=CENTRED, splits=FEW),
+                Method(BOTH, Figures(test=0.92), WHOLE),
+                Method(ONE, windows=WHOLE, label=X_ONLY, views=(0,), splits=FEW),
+                Method(ONE, windows=WHOLE, label=Y_ONLY, views=(1,), splits=FEW),
+                Method(BOTH, windows=WHOLE, features={'spectrum': {'scale': 'power'}}, label=POWER, splits=FEW),
+                Method(BOTH, windows=WHOLE, features={'spectrum': {'scale': 'log'}}, label=LOG, splits=FEW),
+                Method(BOTH, windows=WHOLE, learner={'centre': 'features'}, label=CENTRED, splits=FEW),
                 replace(OURS, splits=2),
             ),
         ),

@@ -18,6 +18,7 @@ from texture_estimation.learners.learner import Codes
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
 from texture_features.feature_set import FeatureSet
+from texture_features.windowing.axes import SEPARATOR, axis_along
 from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
@@ -39,19 +40,34 @@ class Slides:
         How it was touched.
     views
         What each consists of.
+    axes
+        Axis along which the slides of each view go: 'x', 'y', or '' for neither.
     """
 
     surfaces: tuple[str, ...]
     codes: Codes
     conditions: NDArray[np.str_]
     views: tuple[SlideArrays, ...]
+    axes: tuple[str, ...] = ()
 
     @cached_property
     def _caches(self) -> tuple[FeatureCache, ...]:
         return tuple(FeatureCache(view) for view in self.views)
 
+    @cached_property
+    def _along_axes(self) -> FeatureCache:
+        """Features of inputs with an axis, 'signal@x': the streams of the view along it."""
+        streams = {
+            f'{topic}{SEPARATOR}{axis}': stream
+            for axis, view in zip(self.axes, self.views, strict=True)
+            for topic, stream in view.streams.items()
+        }
+        return FeatureCache(replace(self.views[0], streams=streams, _known={}))
+
     def extract(self, feature_set: FeatureSet, views: Sequence[int] = ()) -> tuple[Array, Codes]:
         """Return the features of all windows, of some or all views, (n, n_features), and their slides, (n,).
+
+        A feature set whose inputs have an axis joins the views itself.
 
         Parameters
         ----------
@@ -67,7 +83,8 @@ class Slides:
         (n,)
             Number of the slide of each.
         """
-        chosen = [self._caches[number] for number in views or range(len(self.views))]
+        joins = feature_set.window_names != feature_set.topics
+        chosen = [self._along_axes] if joins else [self._caches[n] for n in views or range(len(self.views))]
         values = np.concatenate([cache.values(feature_set) for cache in chosen], axis=1)
         return values, self.views[0](feature_set.windows).slides
 
@@ -114,7 +131,8 @@ def gather(scene: Scene, task: RecognitionTask, seed: int, *, slow: bool) -> Sli
             for topic in parts[0]
         }
         views.append(SlideArrays(streams, np.asarray(surfaces)[codes], speed, force))
-    return Slides(surfaces, codes, conditions, tuple(views))
+    axes = tuple(axis_along(float(task.visits[0].sliding.direction_rad) + v.turned_rad) for v in task.visits[0].views)
+    return Slides(surfaces, codes, conditions, tuple(views), axes)
 
 
 def _measured(

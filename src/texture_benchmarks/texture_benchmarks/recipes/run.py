@@ -278,7 +278,7 @@ def _shipped(options: BenchmarkOptions) -> Sequence[str]:
 
 def of_one_finger(recipes: Iterable[str]) -> list[str]:
     """Return the recipes, in the order of their names, without those of several fingers: no recorded data has these."""
-    return sorted(name for name in recipes if all('/' not in topic for topic in load_recipe(name).feature_set.topics))
+    return sorted(name for name in recipes if not {'/', '@'} & set(''.join(load_recipe(name).feature_set.window_names)))
 
 
 def _numbers(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> dict[str, Any]:

@@ -120,10 +120,10 @@ class FeatureCache:
         return np.concatenate(blocks, axis=1)
 
     def _windows(self, params: WindowParams, item: InputFeatures) -> list[WindowBatch]:
-        key = (params, JOINT.join(item.topics), None)
+        key = (params, JOINT.join(item.window_names), None)
         if key not in self._chunks:
             inputs = self._cut(params).inputs
-            first, *others = (inputs[topic] for topic in item.topics)
+            first, *others = (inputs[topic] for topic in item.window_names)
             self._chunks[key] = [
                 replace(_some(first, rows), joined=tuple(_some(other, rows) for other in others))
                 for rows in (slice(start, start + CHUNK) for start in range(0, len(first.samples), CHUNK))
@@ -131,7 +131,7 @@ class FeatureCache:
         return self._chunks[key]
 
     def _key(self, params: WindowParams, item: InputFeatures, feature: Feature) -> Key:
-        return params, JOINT.join(item.topics), self._source(feature)
+        return params, JOINT.join(item.window_names), self._source(feature)
 
     def _source(self, feature: Feature) -> Any:
         """Return the feature from whose values those of `feature` are taken."""

@@ -167,7 +167,7 @@ class Augmenter:
     def _augmented(self, longer: Sequence[CutWindow], like: CutWindow, rng: np.random.Generator) -> tuple[Array, str]:
         widest = math.log1p(self._augmentation.speed_range)
         speed = math.exp(rng.uniform(-widest, widest)) if rng.random() < PROBABILITY else 1.0
-        batches = _at_speed(_batches(longer, self._features.topics), like, speed)
+        batches = _at_speed(_batches(longer, self._features.window_names), like, speed)
         noisy = rng.random() < PROBABILITY
         if noisy:
             strength = self._augmentation.noise_range * rng.random() ** 2
@@ -182,9 +182,11 @@ class Augmenter:
             longer = self._longer(cut, max(strength, 1.0))
             if not longer:
                 return None
-            batches = _at_speed(_batches(longer, self._features.topics), windows[0], strength)
+            batches = _at_speed(_batches(longer, self._features.window_names), windows[0], strength)
             return self._extract(batches, longer, windows[0], strength)
-        batches = _changed(_batches(windows, self._features.topics), lambda batch: disturbance(batch, strength, rng))
+        batches = _changed(
+            _batches(windows, self._features.window_names), lambda batch: disturbance(batch, strength, rng)
+        )
         return self._extract(batches, windows, windows[0], 1.0)
 
     def _extract(self, batches: Batches, windows: Sequence[CutWindow], like: CutWindow, speed: float) -> Array:
@@ -204,7 +206,7 @@ class Augmenter:
         return np.stack([vector.values for vector in self._features.extract_many(events)])
 
     def _gain_response(self, window: CutWindow) -> Array:
-        topic = self._features.topics[0]
+        topic = self._features.window_names[0]
         own = window.windows[topic]
         louder = {**window.windows, topic: dataclasses.replace(own, samples=GAIN_STEP * own.samples)}
         both = self._features.extract_many([window, dataclasses.replace(window, windows=louder)])

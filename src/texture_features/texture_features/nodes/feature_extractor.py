@@ -40,7 +40,7 @@ class FeatureExtractor(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__('feature_extractor', **kwargs)
         self._feature_set = FeatureSet.load(declare(self, ExtractorParams).recipe)
-        self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.topics)
+        self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.window_names)
         self._invalid = 0
         self._reported = 0
         self._sent = 0

@@ -18,6 +18,7 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_core.window import Window
+from texture_features.windowing.axes import AxisJoiner, split_axis
 from texture_features.windowing.sample_buffer import BufferedStream, SampleBuffer
 from texture_features.windowing.slide_coverage import CoveredSpan, SlideCoverage
 
@@ -118,7 +119,8 @@ class WindowCutter:
     params
         Length and hop of the windows.
     inputs
-        Topics of which every window needs all samples; batches of other topics are ignored.
+        Topics of which every window needs all samples; batches of other topics are ignored. With an axis, as in
+        'signal@x' and 'signal@y', windows along both axes of one exploration are joined (`windowing/axes.py`).
     keep_s
         How long samples are kept at least, s.
 
@@ -144,7 +146,9 @@ class WindowCutter:
 
     def __init__(self, params: WindowParams, inputs: Sequence[str], keep_s: float = 10.0) -> None:
         self._params = params
-        self._inputs = {topic: _Input(BufferedStream(keep_s)) for topic in inputs}
+        self._inputs = {topic: _Input(BufferedStream(keep_s)) for topic in dict.fromkeys(map(_topic_of, inputs))}
+        self._joiner: AxisJoiner[CutWindow] = AxisJoiner(inputs)
+        self._unpaired = 0
         self._slides: deque[SlideCoverage] = deque()
         self._ready = False
         self._windows = 0
@@ -222,11 +226,12 @@ class WindowCutter:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Running totals: windows cut and skipped, lost samples, restarted streams, states out of order."""
+        """Running totals: windows cut, skipped, without a partner; lost samples, restarts, states out of order."""
         streams = [source.stream for source in self._inputs.values()]
         return {
             'windows': self._windows,
             'skipped': self._skipped,
+            'unpaired': self._unpaired,
             'lost_samples': sum(stream.lost_samples for stream in streams),
             'restarts': sum(stream.restarts for stream in streams),
             'old_states': self._old_states,
@@ -244,8 +249,12 @@ class WindowCutter:
                 self._skip(slide, self._lost)
                 continue
             slide.advance()
-            self._windows += 1
-            events.append(self._window_event(slide, span, found))
+            event: CutWindow | None = self._window_event(slide, span, found)
+            if self._joiner.joins and event is not None:
+                event = self._joiner.add(event)
+            if event is not None:
+                self._windows += 1
+                events.append(event)
         return slide.ended
 
     def _find(self, slide: SlideCoverage, span: CoveredSpan) -> dict[str, Window] | _Missing:
@@ -306,6 +315,7 @@ class WindowCutter:
 
     def _end_slide(self) -> SlideEnd:
         slide = self._slides.popleft()
+        self._unpaired += self._joiner.end()
         for source in self._inputs.values():
             source.anchors.clear()
         return SlideEnd(slide.covered_ns, slide.exploration_id, self._params.hop_s, slide.surface, slide.skipped)
@@ -323,9 +333,12 @@ class WindowCutter:
 
 
 def cut_recording(
-    signals: Mapping[str, Iterable[TactileSignal]], states: Iterable[ExplorationState], params: WindowParams
+    signals: Mapping[str, Iterable[TactileSignal]],
+    states: Iterable[ExplorationState],
+    params: WindowParams,
+    inputs: Sequence[str] = (),
 ) -> Iterator[WindowEvent]:
-    """Yield the windows of a recording, every topic of `signals` being an input.
+    """Yield the windows of a recording.
 
     Parameters
     ----------
@@ -335,13 +348,15 @@ def cut_recording(
         The exploration states, in their order.
     params
         Length and hop of the windows.
+    inputs
+        What each window holds, as for `WindowCutter`; () for every topic of `signals`.
 
     Yields
     ------
     CutWindow or SlideEnd
         In the order of time; the end of each slide comes after its windows.
     """
-    cutter = WindowCutter(params, tuple(signals))
+    cutter = WindowCutter(params, inputs or tuple(signals))
     tracks = [_calls(cutter.add_state, states)]
     tracks += [_calls(partial(cutter.add_signal, topic), batches) for topic, batches in signals.items()]
     for _, add, item in heapq.merge(*tracks, key=itemgetter(0)):
@@ -359,6 +374,10 @@ def _finite_window(buffer: SampleBuffer, first: int, count: int, span: CoveredSp
 
 def _calls(add: Callable[[Any], None], items: Iterable[Any]) -> Iterator[tuple[int, Callable[[Any], None], Any]]:
     return ((item.stamp_ns, add, item) for item in items)
+
+
+def _topic_of(name: str) -> str:
+    return split_axis(name)[0]
 
 
 def _to_ns(seconds: float) -> int:
