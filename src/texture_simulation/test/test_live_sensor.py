@@ -20,8 +20,9 @@ from texture_drivers.daq.sensor import daq
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
 from texture_simulation.emulator import Emulator, EmulatorParams
-from texture_simulation.live_catalogue import live_biotac, live_daq
+from texture_simulation.live_catalogue import live_biotac, live_biotac_hand, live_daq
 from texture_simulation.scene import load_scene
+from texture_simulation.trajectory import straight
 
 pytestmark = pytest.mark.realtime
 
@@ -136,3 +137,19 @@ def test_a_stalled_biotac_leaves_frames_out(tmp_path: Path) -> None:
     live.advance(0)
     live.advance(10 * NANOSECONDS)
     assert (live.done, live.skipped) == (1000, 975)
+
+
+def test_two_fingers_of_a_board_sense_other_places_of_one_surface_and_its_third_place_nothing(tmp_path: Path) -> None:
+    scene = load_scene('twelve_textures')
+    live = live_biotac_hand(scene, scene.surface('ridge_2mm_deep'), tmp_path / 'biotac', np.random.default_rng(0))
+    slide = straight((0.0, 0.0, FORCE_N), (0.1, 0.0, FORCE_N), 4400)
+    counts = live.model.advance(slide).astype(float)  # type: ignore[attr-defined]
+    assert counts.shape == (100, 44, 3)
+    assert (counts[..., 2] == 0).all()
+    pac = counts[50:, 1::2].reshape(-1, 3)  # every second slot
+    rough = pac.std(axis=0)
+    assert rough[0] == pytest.approx(rough[1], rel=0.3)
+    assert np.abs(pac[:, 0] - pac[:, 1]).max() > rough[0]
+    live.model.touch.surface = scene.surface('glass')
+    smooth = live.model.advance(slide).astype(float)[50:, 1::2].reshape(-1, 3).std(axis=0)  # type: ignore[attr-defined]
+    assert (smooth[:2] < 0.3 * rough[:2]).all()

@@ -20,7 +20,7 @@ from texture_simulation.devices.pvdf import EmulatedPvdf
 from texture_simulation.devices.tsf85 import EmulatedTsf85
 from texture_simulation.live_sensor import LiveSensor
 from texture_simulation.scene import Scene
-from texture_simulation.sensors import anyskin, biotac, daq, papillarray, pvdf, tsf85, tsf85_pair
+from texture_simulation.sensors import anyskin, biotac, biotac_hand, daq, papillarray, pvdf, tsf85, tsf85_pair
 from texture_simulation.surfaces.surface import Surface
 
 
@@ -146,6 +146,23 @@ def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.G
     )
 
 
+def live_biotac_hand(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
+    """Return a board with BioTacs on two fingers."""
+    layout = LAYOUTS['biotac']
+    model, device = (
+        biotac_hand.BioTacHand(scene, surface, rng, layout),
+        EmulatedBioTac(link, rng, biotac_hand.SERIALS),
+    )
+    return LiveSensor(
+        model,
+        device,
+        lambda path: device.advance(model.advance(path)),
+        device.skip,
+        rate_hz=layout.frame_rate_hz,
+        points=model.points_per_frame,
+    )
+
+
 def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
     """Return the finger of paper 3."""
     model, device = daq.DaqModel(scene, surface, rng), EmulatedDaq(link, rng)
@@ -204,6 +221,7 @@ LIVE_SENSORS: Mapping[str, MakeLiveSensor] = {
     'tsf85_pair': live_tsf85_pair,
     'tsf85_3x4': partial(live_tsf85, layout='tsf85_3x4'),
     'biotac': live_biotac,
+    'biotac_hand': live_biotac_hand,
     'daq': live_daq,
     'pvdf': live_pvdf,
     'anyskin': live_anyskin,
