@@ -21,7 +21,7 @@ README = (PACKAGE / 'README.md').read_text(encoding='utf-8')
 FILES = sorted(folder('texture_simulation', 'config/scenes').glob('*.yaml'))
 SENSOR_OF = {
     'ets_linear': 'tsf85_3x4', 'ets_circular': 'tsf85_3x4', 'ets_fine': 'tsf85_3x4', 'roughness': 'tsf85',
-    'jamali': 'daq', 'kaboli': 'biotac', 'hu': 'pvdf',
+    'jamali': 'daq', 'kaboli': 'biotac', 'kaboli_shapes': 'biotac', 'hu': 'pvdf',
 }  # fmt: skip
 
 

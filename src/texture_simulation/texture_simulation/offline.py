@@ -135,7 +135,7 @@ def simulate_exploration(
     path = trajectory_along(
         travelled_m, pressed_n, SimulatedSlide(speed_m_s, force_n, slide_s, direction_rad, radius_m)
     )
-    streams = kind.make(scene, scene.surface(surface), rng, finger=finger).streams(path)
+    streams = kind.make(scene.of_finger(finger), scene.surface(surface), rng, finger=finger).streams(path)
     timeline = _ExplorationTimeline(
         exploration_id, surface, speed_m_s, force_n, slide_s, start_ns, direction_rad, radius_m
     )

@@ -16,10 +16,12 @@ from texture_simulation.contact import Contact
 from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.frictions import FRICTIONS
 from texture_simulation.surfaces.catalogue import KINDS
+from texture_simulation.surfaces.curvature import FLAT, Curved
 from texture_simulation.surfaces.surface import Surface
 
 DEFAULT_SENSOR = 'tsf85'
-TERMS: Mapping[str, type] = {**KINDS, **FRICTIONS}
+SHAPES: Mapping[str, type] = {'curved': Curved}
+TERMS: Mapping[str, type] = {**KINDS, **FRICTIONS, **SHAPES}
 SECTIONS = ('about', 'sensor', 'contact', 'effects', 'surfaces')
 
 
@@ -55,6 +57,24 @@ class Scene:
     def effects_of(self, stage: Any) -> list[Any]:
         """Return the effects that act at a stage (`effects/protocols.py`), in the order of the catalogue."""
         return [self.effects[name] for name in EFFECTS if name in self.effects and _acts_at(EFFECTS[name], stage)]
+
+    def of_finger(self, finger: int) -> Scene:
+        """Return the scene as one individual of the sensor senses it: with a skin and a noise of its own."""
+        spread = self.effects.get('finger_spread')
+        if spread is None:
+            return self
+        _, thicker, noisier = spread.factors(finger)
+        effects = dict(self.effects)
+        if 'skin' in effects:
+            effects['skin'] = replace(effects['skin'], resonance_hz=effects['skin'].resonance_hz / thicker)
+        if 'noise' in effects:
+            noise = effects['noise']
+            effects['noise'] = replace(
+                noise, fast_count=noise.fast_count * noisier, slow_count=noise.slow_count * noisier
+            )
+        mean = self.contact
+        contact = replace(mean, blur_m=mean.blur_m * thicker, stiffness_n_m=mean.stiffness_n_m / thicker)
+        return replace(self, contact=contact, effects=effects)
 
     def without(self, effect: str) -> Scene:
         """Return the same scene with one of its effects off."""
@@ -122,8 +142,11 @@ def _surface(name: str, terms: Any, where: str) -> Surface:
     frictions = [term for term in made if type(term) in FRICTIONS.values()]
     if len(frictions) > 1:
         raise InvalidParameter(f'{place} has {len(frictions)} kinds of friction; name one of {", ".join(FRICTIONS)}')
-    relief = tuple(term for term in made if term not in frictions)
-    return Surface(name, relief, *frictions)
+    shapes = [term for term in made if type(term) in SHAPES.values()]
+    if len(shapes) > 1:
+        raise InvalidParameter(f'{place} has {len(shapes)} shapes; an object has one')
+    relief = tuple(term for term in made if term not in (*frictions, *shapes))
+    return Surface(name, relief, next(iter(frictions), None), next(iter(shapes), FLAT))
 
 
 def _term(term: dict[str, Any], place: str) -> Any:

@@ -11,6 +11,10 @@ from texture_simulation.scene import Scene
 from texture_simulation.surfaces.surface import Surface
 from texture_simulation.trajectory import Trajectory, before_first
 
+MAX_TILT_RAD = (
+    0.5  # a fingertip that slides over a curved object tilts to it by so much at most; then the hand turns it
+)
+START_TILT_RAD = 0.15  # assumption: how far the grip turns a finger to a curved object, at most, in either direction
 SAMPLE_SIZE_M = 0.1  # where on the sample a slide begins is drawn from so much
 # A point of a fast path stands for the stretch up to the next: the texture is blurred by at least so much of the step.
 # Half of the sampling rate is then measured to 17 %, what would be folded down to nearly 0 Hz to 0.1 %.
@@ -79,6 +83,9 @@ class SkinContact:
     def relocate(self) -> None:
         """Let the sample lie otherwise from now on: no two touches meet the same place."""
         self._x_m, self._y_m = self._rng.uniform(0.0, SAMPLE_SIZE_M, (2, *self._batch_shape, 1))
+        curved = np.isfinite(self._surface.shape.radius_m)
+        shape = (2, *self._batch_shape, 1)
+        self._tilt_rad = self._rng.uniform(-START_TILT_RAD, START_TILT_RAD, shape) if curved else np.zeros(shape)
         self._before = None
         self._drag = self._make_drag()
 
@@ -158,6 +165,37 @@ class SkinContact:
         height = self._surface.height_m(x_m, y_m, np.full((1,), blur_m))
         return np.asarray(gain[..., None, :] * height)
 
+    def centre_m(self, placed: Trajectory) -> tuple[Array | float, Array | float]:
+        """Return where on the fingertip the load is, x and y, (..., n) each; 0 on a plane.
+
+        Over a curved object the place wanders as the finger slides on: the normal of the object turns by the way over
+        the sum of both radii, as the finger keeps its direction.
+
+        Parameters
+        ----------
+        placed
+            Points of the trajectory on the sample, n of them.
+
+        Returns
+        -------
+        (..., n), or a number
+            x, m.
+        (..., n), or a number
+            y, m.
+        """
+        radius_m, tip_m = self._surface.shape.radius_m, self._contact.tip_radius_m
+        if np.isinf(radius_m):
+            return 0.0, 0.0
+        ways = placed.x_m - self._x_m, placed.y_m - self._y_m
+        tilts = [start + way / (radius_m + tip_m) for start, way in zip(self._tilt_rad, ways, strict=True)]
+        x_m, y_m = (tip_m * np.clip(tilt, -MAX_TILT_RAD, MAX_TILT_RAD) for tilt in tilts)
+        return x_m, y_m
+
+    @property
+    def patch_share(self) -> float:
+        """How much smaller than on a plane the contact is, at most 1."""
+        return self._contact.on(self._surface.shape.radius_m)
+
     def _make_drag(self) -> Drag | None:
         """Return what senses the friction from here on, if there is any."""
         friction = self._surface.friction
@@ -165,8 +203,9 @@ class SkinContact:
 
     def _blur_and_stiffness(self, force_n: Array) -> tuple[Array, Array]:
         """Return blur and stiffness at forces."""
-        blur_m: Array = self._contact.blur_m * np.ones_like(force_n)
-        stiffness: Array = self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
+        share = self.patch_share
+        blur_m: Array = share * self._contact.blur_m * np.ones_like(force_n)
+        stiffness: Array = share * self._contact.stiffness_n_m * (force_n > 0).astype(np.float64)
         for effect in self._growths:
             blur_m, stiffness = blur_m * effect.blur_growth(force_n), stiffness * effect.gain_growth(force_n)
         return blur_m, stiffness

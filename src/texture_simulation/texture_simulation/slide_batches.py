@@ -86,7 +86,9 @@ def simulate_slide_streams(
     n_points = kind.step_points * math.ceil(sliding.duration_s * kind.path_rate_hz / kind.step_points - 1e-6)
     made: dict[str, list[Samples]] = {}
     for speed_m_s, force_n, part in _parts(scene, count, sliding, rng, n_points * len(kind.fast.channels)):
-        model = kind.make(scene, touched, rng, finger=finger, batch_shape=(len(speed_m_s),), settled=True)
+        model = kind.make(
+            scene.of_finger(finger), touched, rng, finger=finger, batch_shape=(len(speed_m_s),), settled=True
+        )
         path = part.steady_path(speed_m_s, force_n, n_points, kind.path_rate_hz)
         for topic, samples in model.streams(path, slow=slow).items():
             made.setdefault(topic, []).append(samples[:, : lengths[topic]])

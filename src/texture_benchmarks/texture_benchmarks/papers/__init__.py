@@ -6,13 +6,23 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from texture_benchmarks.papers import ets_circular, ets_fine, ets_linear, friction, hu, jamali, kaboli, roughness
+from texture_benchmarks.papers import (
+    ets_circular,
+    ets_fine,
+    ets_linear,
+    friction,
+    hu,
+    jamali,
+    kaboli,
+    kaboli_shapes,
+    roughness,
+)
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult, Run
 from texture_benchmarks.papers.report import run
 from texture_benchmarks.papers.seeds import over_seeds
 from texture_core.catalogue import find
 
-PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fine, jamali, kaboli, hu))
+PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fine, jamali, kaboli, kaboli_shapes, hu))
 
 EXPERIMENTS: Mapping[str, Run] = {
     **{protocol.name: partial(run, protocol) for protocol in PROTOCOLS},

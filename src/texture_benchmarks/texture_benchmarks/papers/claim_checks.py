@@ -78,6 +78,32 @@ def lower_in(claim: str, outcome: MethodResult, condition: str) -> Finding:
     return Finding(claim, reported, loss, loss.above())
 
 
+def kept_in(claim: str, outcome: MethodResult, changed: str, reference: str, margin: float = 0.05) -> Finding:
+    """Check that slides of one condition are recognised at most a margin less often than those of another.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    changed, reference
+        Names of the conditions.
+    margin
+        Largest loss that counts as none, 0 to 1.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    here, before = (outcome.right(outcome.conditions == name) for name in (changed, reference))
+    gain = apart(here, before)
+    kept = Interval(gain.value + margin, gain.low + margin, gain.high + margin)
+    reported = f'{percent(share(here))} against {percent(share(before))}, {100 * margin:g} points granted'
+    return Finding(claim, reported, kept, kept.above())
+
+
 def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
     """Check that the share of test slides recognised is not below a figure: the interval reaches it.
 

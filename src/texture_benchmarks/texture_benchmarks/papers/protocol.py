@@ -49,12 +49,18 @@ class Visits:
         How the finger goes.
     views
         What a trial consists of.
+    radius_m
+        Radius of curvature of all objects, instead of their own; 0 for their own.
+    random
+        Relative spread of speed and force from trial to trial; above 0, the direction is a random one, too.
     """
 
     condition: str
     count: int
     sliding: SimulatedSlide
     views: tuple[View, ...] = (View(),)
+    radius_m: float = 0.0
+    random: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from texture_benchmarks.papers.claim_checks import percent
 from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
+from texture_benchmarks.papers.interval import share
 from texture_benchmarks.papers.method_result import MethodResult
 from texture_benchmarks.papers.paper_charts import accuracy_chart, confusions_chart
 from texture_benchmarks.papers.protocol import Finding, Method, MethodResults, Protocol, RecognitionTask, Table
@@ -90,10 +91,21 @@ def figures_of(method: Method, outcome: MethodResult) -> dict[str, Any]:
         'learning': None if outcome.learning is None else round(outcome.learning, 4),
         'test': outcome.test.as_json(),
         'unclassified': round(outcome.unclassified, 4),
+        **_by_condition(outcome),
         'note': outcome.note,
         'train_s': round(outcome.train_s, 3),
         'surfaces': list(outcome.surfaces),
         'confusion_last_unclassified': np.round(outcome.confusion, 3).tolist(),
+    }
+
+
+def _by_condition(outcome: MethodResult) -> dict[str, Any]:
+    """Return the share recognised under each condition in which slides were tested, if there are several."""
+    names = dict.fromkeys(outcome.conditions[outcome.tested].tolist())
+    if len(names) < 2:
+        return {}
+    return {
+        'conditions': {name: {'test': share(outcome.right(outcome.conditions == name)).as_json()} for name in names}
     }
 
 

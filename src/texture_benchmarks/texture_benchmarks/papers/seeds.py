@@ -102,6 +102,9 @@ def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) ->
         for method, figures in methods.items():
             found = [run['tasks'][task][method]['test'][0] for run in runs if method in run['tasks'][task]]
             _add(figures, found)
+            for name, part in figures.get('conditions', {}).items():
+                same = [run['tasks'][task].get(method, {}).get('conditions', {}).get(name) for run in runs]
+                _add(part, [one['test'][0] for one in same if one])
     for regressor, parts in numbers.get('regressors', {}).items():
         for part, figures in parts.items():
             found = [

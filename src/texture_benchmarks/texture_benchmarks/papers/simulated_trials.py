@@ -22,6 +22,8 @@ from texture_features.windowing.axes import SEPARATOR, axis_along
 from texture_simulation.offline import simulate_slide_streams
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.surfaces.curvature import Curved
 
 ROUNDING = 1e-6
 
@@ -144,8 +146,28 @@ def _measured(
     slowest_hz = min(stream.rate_hz for stream in kind.streams[: None if slow else 1])
     duration_s = math.ceil(visits.sliding.duration_s * slowest_hz - ROUNDING) / slowest_hz
     place = list(scene.surfaces).index(surface)
-    rng = np.random.default_rng([seed, place, zlib.crc32(visits.condition.encode()), number])
-    sliding = replace(
-        visits.sliding, duration_s=duration_s, direction_rad=visits.sliding.direction_rad + view.turned_rad
+    own = [seed, place, zlib.crc32(visits.condition.encode())]
+    rng = np.random.default_rng([*own, number])
+    sliding = replace(_sliding(visits, np.random.default_rng(own)), duration_s=duration_s)
+    sliding = replace(sliding, direction_rad=sliding.direction_rad + view.turned_rad)
+    touched = _shaped(scene, surface, visits.radius_m)
+    return simulate_slide_streams(touched, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)
+
+
+def _sliding(visits: Visits, rng: np.random.Generator) -> SimulatedSlide:
+    """Return how the fingers of each trial go: all views of a trial alike."""
+    if not visits.random:
+        return visits.sliding
+    speed, force = (1.0 + visits.random * rng.uniform(-1.0, 1.0, (2, visits.count))) * np.array(
+        [[visits.sliding.speed_m_s], [visits.sliding.force_n]]
     )
-    return simulate_slide_streams(scene, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)
+    heading = rng.uniform(0.0, 2.0 * math.pi, visits.count)
+    return replace(visits.sliding, speed_m_s=speed, force_n=force, direction_rad=heading)
+
+
+def _shaped(scene: Scene, surface: str, radius_m: float) -> Scene:
+    """Return the scene with one object curved in another way; as it is for a radius of 0."""
+    if not radius_m:
+        return scene
+    curved = replace(scene.surface(surface), shape=Curved(radius_m))
+    return replace(scene, surfaces={**scene.surfaces, surface: curved})

@@ -149,8 +149,11 @@ class BioTacModel:
     def _electrodes(self, at: Trajectory) -> Array:
         """Return the electrodes at each frame, (..., n_electrodes, n_frames) counts: low where the load is."""
         force_n = at.force_n[..., None, :]
-        radius_m = CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))
-        nearness = np.maximum(0.0, 1 - (self._x_m**2 + self._y_m**2) / radius_m**2)
+        radius_m = self.touch.patch_share * CONTACT_RADIUS_M * np.cbrt(np.maximum(force_n, 1e-9))
+        x_m, y_m = (
+            np.asarray(centre)[..., None, :] if np.ndim(centre) else centre for centre in self.touch.centre_m(at)
+        )
+        nearness = np.maximum(0.0, 1 - ((self._x_m - x_m) ** 2 + (self._y_m - y_m) ** 2) / radius_m**2)
         texture_n = self.touch.static_variation_n(at, ELECTRODE_BLUR_M, (self._x_m, self._y_m))
         # Squeezing stiffens: the fluid over an electrode thins out, and never vanishes.
         load = np.maximum(ELECTRODE_COUNTS_PER_N * nearness * (force_n + texture_n), 0.0)

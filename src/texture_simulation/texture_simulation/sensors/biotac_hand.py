@@ -20,7 +20,9 @@ class BioTacHand:
 
     def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator, layout: BioTacLayout) -> None:
         self._models = [
-            BioTacModel(scene, surface, rng, layout, finger=place) for place, serial in enumerate(SERIALS) if serial
+            BioTacModel(scene.of_finger(place), surface, rng, layout, finger=place)
+            for place, serial in enumerate(SERIALS)
+            if serial
         ]
         self.touch = TwoContacts([model.touch for model in self._models])
 

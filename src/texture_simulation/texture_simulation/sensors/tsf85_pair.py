@@ -41,7 +41,9 @@ class Tsf85Pair:
     """Two fingers of a TSF-85 that move as one, each an individual that touches a place of its own."""
 
     def __init__(self, scene: Scene, surface: Surface, rng: np.random.Generator) -> None:
-        self._models = [Tsf85Model(scene, surface, rng, LAYOUTS['tsf85'], finger=finger) for finger in (0, 1)]
+        self._models = [
+            Tsf85Model(scene.of_finger(finger), surface, rng, LAYOUTS['tsf85'], finger=finger) for finger in (0, 1)
+        ]
         self.touch = TwoContacts([model.touch for model in self._models])
 
     def advance(self, path: Trajectory) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:

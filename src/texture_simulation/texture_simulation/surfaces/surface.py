@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from texture_core.arrays import Array
+from texture_simulation.surfaces.curvature import FLAT, Curved
 
 MIN_BLUR_M, MAX_BLUR_M = 5e-5, 2e-3
 
@@ -40,11 +41,12 @@ class Term(Protocol):
 
 @dataclass(frozen=True)
 class Surface:
-    """A named sum of terms, and the friction on it (`frictions.py`); without one, the skin glides."""
+    """A named sum of terms, the friction on it (`frictions.py`; without one, the skin glides), and its curvature."""
 
     name: str
     terms: tuple[Term, ...]
     friction: Any = None
+    shape: Curved = FLAT
 
     def height_m(self, x_m: Array, y_m: Array, blur_m: Array) -> Array:
         """Return the blurred height at positions."""
