@@ -14,7 +14,17 @@ from texture_core.parameters import markdown_table
 
 INTERFACES = 'src/texture_msgs'
 CHARTS = 'docs/charts'
-EXPERIMENTS = ('ets-linear', 'ets-circular', 'ets-fine', 'friction', 'jamali', 'kaboli', 'hu', 'roughness')
+EXPERIMENTS = (
+    'ets-linear',
+    'ets-circular',
+    'ets-fine',
+    'friction',
+    'jamali',
+    'kaboli',
+    'kaboli-shapes',
+    'hu',
+    'roughness',
+)
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 
 
@@ -107,6 +117,9 @@ def experiment(name: str, root: Path) -> str:
                 percent(figures.get('over_seeds')),
             ]
             rows.append(f'| {task} | {method} | {" | ".join(cells)} |')
+            for condition, part in figures.get('conditions', {}).items():
+                shares = f'{percent(part["test"])} | – | {percent(part.get("over_seeds"))}'
+                rows.append(f'| {task} | {method}: {condition} | – | – | {shares} |')
     table = '\n'.join(rows) if numbers.get('tasks') else ''
     anchor = difficulty(numbers.get('difficulty') or {})
     unit = 100.0 if numbers.get('tasks') else 1.0  # points of a share, or grades

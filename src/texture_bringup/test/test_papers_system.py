@@ -41,7 +41,7 @@ class Paper:
 
 PAPERS = {
     'Roberge et al., textures': Paper('tsf85_3x4', 'ets-linear', 'ets-linear-svm'),
-    'Jamali & Sammut 2010': Paper('daq', 'jamali', 'jamali-naive-bayes-5'),
+    'Jamali & Sammut 2010': Paper('daq', 'jamali', 'jamali-naive-bayes-5', slides=1),
     'Kaboli et al. 2015': Paper('biotac_hand', 'kaboli', 'kaboli-svm-two-fingers'),
     'Hu et al. 2014': Paper('pvdf', 'hu-cross', 'hu-pca-svm-xy', slides=1),
 }

@@ -76,4 +76,5 @@ PROTOCOL = Protocol(
     ),
     findings=findings,
     quick_count=12,
+    by_condition=True,
 )

@@ -218,6 +218,8 @@ class Protocol:
         What the scene's noise was set by.
     findings
         Checks what the paper found.
+    by_condition
+        Whether the share recognised is also reported for each condition of the test.
     quick_count
         Trials over each surface, instead of those of each of the visits, for tests.
     """
@@ -231,6 +233,7 @@ class Protocol:
     anchor: Anchor
     findings: Callable[[MethodResults], Sequence[Finding]]
     quick_count: int = 8
+    by_condition: bool = False
 
 
 def halves(count: int) -> Splitter:

@@ -45,8 +45,13 @@ def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
             'seed': experiment.seed,
             'recipes': {m.recipe: digest_of(m.recipe) for task in protocol.tasks for m in task.methods},
             'difficulty': _difficulty(protocol, found),
-            'tasks': {task.name: {m.name: figures_of(m, found[task.name, m.name]) for m in task.methods}
-                      for task in protocol.tasks},
+            'tasks': {
+                task.name: {
+                    m.name: figures_of(m, found[task.name, m.name], by_condition=protocol.by_condition)
+                    for m in task.methods
+                }
+                for task in protocol.tasks
+            },
             'findings': [finding_as_json(finding) for finding in checked],
             'tuning': {f'{recipe}, {task}': one.figures() for (task, recipe), one in tuned.items()},
         },
@@ -71,7 +76,7 @@ def _difficulty(protocol: Protocol, found: MethodResults) -> dict[str, Any]:
     }
 
 
-def figures_of(method: Method, outcome: MethodResult) -> dict[str, Any]:
+def figures_of(method: Method, outcome: MethodResult, *, by_condition: bool = False) -> dict[str, Any]:
     """Return the figures of one method as an experiment's JSON holds them.
 
     Parameters
@@ -80,6 +85,8 @@ def figures_of(method: Method, outcome: MethodResult) -> dict[str, Any]:
         With the paper's figures.
     outcome
         What came out.
+    by_condition
+        Whether the share recognised is given for each condition of the test, too.
 
     Returns
     -------
@@ -91,7 +98,7 @@ def figures_of(method: Method, outcome: MethodResult) -> dict[str, Any]:
         'learning': None if outcome.learning is None else round(outcome.learning, 4),
         'test': outcome.test.as_json(),
         'unclassified': round(outcome.unclassified, 4),
-        **_by_condition(outcome),
+        **(_by_condition(outcome) if by_condition else {}),
         'note': outcome.note,
         'train_s': round(outcome.train_s, 3),
         'surfaces': list(outcome.surfaces),
@@ -100,10 +107,8 @@ def figures_of(method: Method, outcome: MethodResult) -> dict[str, Any]:
 
 
 def _by_condition(outcome: MethodResult) -> dict[str, Any]:
-    """Return the share recognised under each condition in which slides were tested, if there are several."""
+    """Return the share recognised under each condition in which slides were tested."""
     names = dict.fromkeys(outcome.conditions[outcome.tested].tolist())
-    if len(names) < 2:
-        return {}
     return {
         'conditions': {name: {'test': share(outcome.right(outcome.conditions == name)).as_json()} for name in names}
     }
