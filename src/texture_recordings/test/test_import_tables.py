@@ -224,6 +224,12 @@ def test_slides_of_equal_length_are_cut_by_time_and_the_rest_is_left(tmp_path: P
     assert lengths(save(tmp_path, x=np.arange(700.0)), mapping) == [125, 125, 125]
 
 
+def test_values_at_which_the_finger_slides_may_be_patterns(tmp_path: Path) -> None:
+    phases = np.repeat(['idle', 'pass_1', 'return', 'pass_2', '[x]'], [30, 110, 40, 120, 30])
+    mapping = one_channel(slides={'by': 'column', 'column': 'k', 'values': ['pass_*', '[x]']})
+    assert lengths(save(tmp_path, x=np.arange(330.0), k=phases), mapping) == [110, 120, 30]
+
+
 def test_a_pause_or_a_time_that_begins_again_ends_a_slide(tmp_path: Path) -> None:
     time_s = np.concatenate([np.arange(100) / 100, 3.0 + np.arange(150) / 100, np.arange(120) / 100])
     mapping = mapping_from({

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import fnmatch
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -63,11 +64,8 @@ def _by_column(rows: SlideRows, borders: SlideBorders) -> list[slice]:
     if rows.keys is None:
         return _by_file(rows, borders)  # a field of the file's name: it holds for the whole file
     edges = [0, *(np.flatnonzero(rows.keys[1:] != rows.keys[:-1]) + 1).tolist(), len(rows.keys)]
-    wanted = set(borders.values)
     chosen = [
-        slice(first, last)
-        for first, last in pairwise(edges)
-        if (rows.keys[first] in wanted if wanted else rows.keys[first] != '')
+        slice(first, last) for first, last in pairwise(edges) if _slides_at(str(rows.keys[first]), borders.values)
     ]
     if not chosen:
         raise InvalidData(
@@ -75,6 +73,11 @@ def _by_column(rows: SlideRows, borders: SlideBorders) -> list[slice]:
             f'{", ".join(borders.values) or "but empty"}; it has {", ".join(np.unique(rows.keys)[:5].tolist())}'
         )
     return chosen
+
+
+def _slides_at(value: str, wanted: Sequence[str]) -> bool:
+    """Return whether the finger slides at a value of the column: one of those wanted, or any that is not empty."""
+    return any(fnmatch.fnmatchcase(value, one) or value == one for one in wanted) if wanted else value != ''
 
 
 def _by_pause(rows: SlideRows, borders: SlideBorders) -> list[slice]:

@@ -116,7 +116,8 @@ class SlideBorders:
     )
     column: str = param('', "Names the column whose value changes between slides, for 'column'.")
     values: list[str] = param(  # noqa: RUF009 – it gives a field
-        [], 'Values of the column at which the finger slides; [] takes all but empty ones.'
+        [],
+        "Values of the column at which the finger slides, or patterns of them ('pass *'); [] takes all but empty ones.",
     )
     pause_s: float = param(0.5, "Sets the shortest pause between slides, for 'pause'.", unit='s', low=0.0)
     length_s: float = param(5.0, "Sets the length of a slide, for 'time'.", unit='s', low=0.05)
