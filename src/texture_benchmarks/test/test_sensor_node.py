@@ -14,8 +14,11 @@ from std_srvs.srv import Trigger
 from texture_msgs import msg
 
 from texture_benchmarks.load.rig import CASES, Rig, biotac
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.ros.conversions import to_msg
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
+from texture_drivers import channel_watch
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.devices.biotac import EmulatedBioTac
 
@@ -83,6 +86,39 @@ def test_a_tare_is_asked_for_and_the_baseline_is_published_and_subtracted(graph:
     assert len(baselines[-1].samples) == 54
     assert np.abs(baselines[-1].samples).max() == 0.0  # the hub has set its own bias first
     assert np.abs(signal[-1].samples).max() == 0.0
+
+
+def test_drift_saturation_and_a_dead_channel_are_named_on_diagnostics(
+    graph: LocalGraph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One channel stands at the end of its range, one never changes, and one leaves its level while nothing touches."""
+    rng, drift = np.random.default_rng(0), [0]
+
+    def feed(device: Any, first: int, ticks: int) -> None:
+        counts = np.round(20.0 * rng.normal(size=(ticks, 8))).astype(np.int16)
+        counts[:, 0] += drift[0]
+        counts[:, 3], counts[:, 7] = 2**15 - 1, 500
+        device.sample(counts)
+
+    monkeypatch.setattr(channel_watch, 'DEAD_S', 2.0)
+    case = replace(CASES['daq'], feed=feed)
+    signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
+    reports = graph.listen(DiagnosticArray, '/diagnostics')
+    baselines = graph.listen(msg.TactileSignal, 'signal_baseline', STATE_QOS)
+    states = graph.peer.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
+
+    def reported(*sentences: str) -> None:
+        graph.until(lambda: all(one in (reports[-1].status[0].message if reports else '') for one in sentences))
+
+    with Rig('daq', tmp_path / 'daq', case=case) as rig:
+        node = graph.add(SensorNode, sensor='daq', device=str(rig.link), config=case.config, tare_s=0.2)
+        graph.until(lambda: states.get_subscription_count() and signal)
+        states.publish(to_msg(ExplorationState(1, 'a', 'linear_slide', Phase.DONE)))
+        reported('c3 is saturated', 'c7', 'is dead: it does not change')
+        assert node._on_tare(Trigger.Request(), Trigger.Response()).success
+        graph.until(lambda: baselines)
+        drift[0] = 2000
+        reported('c0 has drifted off its baseline; tare again without load')
 
 
 def test_a_tare_without_a_sensor_is_refused(graph: LocalGraph, tmp_path: Path) -> None:

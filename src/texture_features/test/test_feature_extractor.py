@@ -164,3 +164,13 @@ def test_two_fingers_are_joined_by_their_stamps_into_the_16_numbers_of_kaboli():
         expected = next(one_finger.extract(event) for event in events if event.start_ns == received.start_ns)
         own = [value for name, value in zip(received.names, received.values, strict=True) if name.startswith(finger)]
         np.testing.assert_allclose(own, expected.values)
+
+
+def test_a_recipe_that_sees_the_level_warns_of_a_sensor_that_is_not_tared_and_stops_when_it_is():
+    """Shares of the load are none while the level without contact is in them."""
+    with LocalGraph(69) as graph:
+        bench = Bench(graph, recipe='taxels', topics=('signal_static',))
+        for sensor, expected in (('skin', "expects 'signal_static' tared"), ('skin (tared)', 'extracting')):
+            samples = np.zeros((10, 4), dtype=np.float32)
+            bench.play([TactileSignal(NANOSECONDS, sensor, tuple('abcd'), (), 100.0, 0, samples)])
+            bench.until(lambda: bench.reports and expected in bench.reports[-1].status[0].message)  # noqa: B023
