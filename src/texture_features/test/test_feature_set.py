@@ -52,6 +52,15 @@ def test_many_windows_get_the_very_numbers_of_one():
         assert (vector.feature_set, vector.names, vector.last) == (alone.feature_set, alone.names, alone.last)
 
 
+def test_the_levels_of_slow_channels_do_not_change_what_vibration_and_taxels_measures():
+    window = cut()
+    slow = window.windows['signal_static']
+    moved = dataclasses.replace(slow, samples=slow.samples + np.array([300.0, -50.0]))
+    drifted = dataclasses.replace(window, windows={**window.windows, 'signal_static': moved})
+    features = FeatureSet.load('vibration-and-taxels')
+    np.testing.assert_allclose(features.extract(drifted).values, features.extract(window).values, rtol=1e-6)
+
+
 def test_the_end_of_a_slide_is_an_empty_last_vector():
     vector = FeatureSet.from_mapping(RECIPE).extract(SlideEnd(7, 'e1', 0.25, skipped=3))
     assert (vector.last, vector.names, vector.skipped, vector.window_s) == (True, (), 3, 0.0)
