@@ -39,7 +39,8 @@ PATIENCE = {  # of the arm itself; the explorer would warn of a parameter that i
     'ur': {'silence_s': 1.5, 'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
     'ros_controllers': {'deadman_s': 1.5, 'connect_timeout_s': 30.0},
 }
-FORCES = {'ros_controllers': ['--force', '5']}  # that its preset allows; the default of the motion otherwise
+# Not the default of 1 N for arms whose approach is the slower the less force is wanted, as they may not be heard yet.
+FORCES = dict.fromkeys(('ur', 'ros_controllers'), ['--force', '5'])
 
 
 @pytest.fixture(scope='module')
