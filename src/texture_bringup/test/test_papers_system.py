@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = [pytest.mark.realtime, pytest.mark.ros]
+pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo.isolation import free_port  # noqa: E402

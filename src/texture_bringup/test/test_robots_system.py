@@ -40,7 +40,7 @@ PATIENCE = {  # of the arm itself; the explorer would warn of a parameter that i
     'ros_controllers': {'deadman_s': 1.5, 'connect_timeout_s': 30.0},
 }
 # Not the default of 1 N for arms whose approach is the slower the less force is wanted, as they may not be heard yet.
-FORCES = dict.fromkeys(('ur', 'ros_controllers'), ['--force', '5'])
+FORCES = {robot: ['--force', '5'] for robot in ('ur', 'ros_controllers')}
 
 
 @pytest.fixture(scope='module')
