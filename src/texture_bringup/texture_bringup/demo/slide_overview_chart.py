@@ -62,7 +62,7 @@ def picture(overview: SlideOverview, path: str | Path) -> Path:
         _spectrum(spectrum, overview)
         _evidence(evidence, overview)
         draw_confusion(table, overview.labels, overview.table)
-        table.set_title('4. All test slides: what each single window was taken for')
+        table.set_title('4. Single windows of all test slides')
         if overview.note:
             figure.supxlabel(overview.note, fontsize='medium')
     return Path(path)
