@@ -71,12 +71,11 @@ def test_random_strokes_stay_within_the_stroke_and_are_at_least_half_as_long():
 
 
 def test_a_finger_rubs_at_random_places_and_turns_elsewhere_each_time(table):
-    assert table.explore(ExplorationRequest('in_hand_random', duration_s=5.0)).success
+    assert table.explore(ExplorationRequest('in_hand_random', duration_s=10.0)).success
     along = [place[0] for place in table.places]
     assert min(along) > -0.0005 and max(along) < 0.0205
     places = turning_places(table)
-    assert len(places) >= 3
-    assert len({round(place, 4) for place in places}) == len(places)
+    assert len({round(place, 4) for place in places}) > 4  # without chance it turns at two; chance may repeat one
 
 
 def test_a_random_stroke_may_be_half_as_long_so_the_shortest_that_turns_is_twice_that():
