@@ -242,7 +242,7 @@ def run_later(options: BenchmarkOptions) -> BenchmarkResult:
     later = replace(setting, splits=[split for split in setting.splits if split.name == LATER])
     numbers = _numbers({VIBRATION: later}, _shipped(options), options)
     for recipe, figures in numbers[VIBRATION][LATER].items():
-        if recipe != MINIROCKET:
+        if recipe not in (MINIROCKET, *VARIANTS):
             figures['definition'] = digest_of(recipe)  # of what was measured
     return later_result(numbers, options)
 
