@@ -13,6 +13,7 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_estimation.classification.evidence_rules import EvidenceRule, deciding_rows, running_means
 from texture_estimation.classification.novelty_training import SlideTrace, fit_novelty
+from texture_estimation.group_means import group_means
 from texture_estimation.incremental.training_examples import TrainingExamples
 from texture_estimation.learners.augmented_examples import AugmentedExamples
 from texture_estimation.learners.learner import Codes, Fitted, of_examples
@@ -154,7 +155,7 @@ def _touch_differences(examples: LabelledFeatures, groups: Codes) -> Array | Non
     """Return by number of the slide how it differs from its touch before the finger moved; NaN where there is none."""
     if not examples.touches:
         return None
-    means = slide_means(examples.values, groups)
+    means = group_means(examples.values, groups)
     unknown = np.full(means.shape[1], np.nan)
     touches = [examples.touches.get(slide, unknown) for slide in np.unique(examples.groups).tolist()]
     differences: Array = means - np.stack(touches)
@@ -184,7 +185,7 @@ def _augmented_examples(
     own = np.isin(copies.groups, names)
     copied = np.searchsorted(names, copies.groups[own])
     runs = np.unique(np.stack([copied, copies.copies[own]]), axis=1, return_inverse=True)[1].reshape(-1)
-    means = slide_means(examples.values, groups)
+    means = group_means(examples.values, groups)
     classes = codes[first]
     centres = np.stack([means[classes == code].mean(axis=0) for code in range(int(codes.max()) + 1)])
     return AugmentedExamples(
@@ -197,27 +198,6 @@ def _augmented_examples(
         slides=np.arange(len(names)),
         augmentation=recipe.augmentation,
     )
-
-
-def slide_means(values: Array, groups: Codes) -> Array:
-    """Return the mean of the windows of each slide, (n_slides, n_features); slides are numbered from 0.
-
-    Parameters
-    ----------
-    values : (n, n_features)
-        Features of windows.
-    groups : (n,)
-        Number of the slide of each window.
-
-    Returns
-    -------
-    (n_slides, n_features)
-        In the units of the features.
-    """
-    means = np.zeros((int(groups.max()) + 1, values.shape[1]))
-    np.add.at(means, groups, values)
-    means /= np.bincount(groups)[:, None]
-    return means
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,7 +328,7 @@ def _fit_prediction_sets(
 def _fit_next_touch_model(examples: LabelledFeatures) -> NextTouchModel | None:
     """Return what textures look like under each motion, from the mean features of slides."""
     slides, first, groups = np.unique(examples.groups, return_index=True, return_inverse=True)
-    means = slide_means(examples.values, groups)
+    means = group_means(examples.values, groups)
     made = [examples.motions.get(slide) for slide in slides.tolist()]
     return NextTouchModel.of_slides(means, examples.labels[first].tolist(), made)
 

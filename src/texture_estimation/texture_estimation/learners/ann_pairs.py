@@ -116,7 +116,7 @@ class PairNetworksPredictor:
         n_pairs = len(self.out_bias)
         weights = self.hidden.reshape(-1, len(self.mean)) / self.scale
         object.__setattr__(self, '_weights', weights.T.copy())
-        object.__setattr__(self, '_votes', PairVotes(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0)))
+        object.__setattr__(self, '_votes', PairVotes.of_pairs(n_pairs))
 
     def __call__(self, X: Array) -> Array:
         """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""

@@ -22,8 +22,8 @@ FittedPair = tuple[int, Codes, Mapping[str, Any]]
 
 
 @dataclass(frozen=True, eq=False)
-class PairMachines:
-    """RBF machines, each with features of its own; smaller ones are filled up with what adds nothing.
+class PairInputs:
+    """What each of several learners sees: features of its own; one with fewer is filled up with what adds nothing.
 
     Parameters
     ----------
@@ -33,6 +33,42 @@ class PairMachines:
         Features that each sees; 0 where it has fewer.
     mean, inverse_scale : (n, n_inputs)
         Of the standardisation; an inverse scale of 0 takes a feature out.
+
+    Examples
+    --------
+    >>> inputs = PairInputs(np.array([0]), np.array([[1]]), np.array([[2.0]]), np.array([[0.5]]))
+    >>> inputs.standardised(np.array([9.0, 4.0])).tolist()  # (4 - 2) / 2, of the second feature alone
+    [[1.0]]
+    """
+
+    pairs: Codes
+    columns: Codes
+    mean: Array
+    inverse_scale: Array
+
+    def standardised(self, X: Array) -> Array:
+        """Return what each learner sees, (..., n, n_inputs) of (..., n_features).
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n, n_inputs)
+        """
+        seen: Array = (X[..., self.columns] - self.mean) * self.inverse_scale
+        return seen
+
+
+@dataclass(frozen=True, eq=False)
+class PairMachines(PairInputs):
+    """RBF machines, each with features of its own; smaller ones are filled up with what adds nothing.
+
+    Parameters
+    ----------
+    pairs, columns, mean, inverse_scale
+        As of `PairInputs`.
     vectors : (n, n_vectors, n_inputs)
         Standardised support vectors times 2 gamma.
     squares, coefficients : (n, n_vectors)
@@ -47,10 +83,6 @@ class PairMachines:
     [1.0, 0.368]
     """
 
-    pairs: Codes
-    columns: Codes
-    mean: Array
-    inverse_scale: Array
     vectors: Array
     squares: Array
     coefficients: Array
@@ -68,7 +100,7 @@ class PairMachines:
         -------
         (..., n)
         """
-        standard = (X[..., self.columns] - self.mean) * self.inverse_scale
+        standard = self.standardised(X)
         squares = self.gamma * np.add.reduce(standard * standard, axis=-1)
         exponents = _products(self.vectors, standard)
         exponents -= self.squares
@@ -80,17 +112,13 @@ class PairMachines:
 
 
 @dataclass(frozen=True, eq=False)
-class PairNetworks:
+class PairNetworks(PairInputs):
     """Networks with a sigmoid hidden layer, each with features and neurons of its own; smaller ones are filled up.
 
     Parameters
     ----------
-    pairs : (n,)
-        Number of the pair that each decides.
-    columns : (n, n_inputs)
-        Features that each sees; 0 where it has fewer.
-    mean, inverse_scale : (n, n_inputs)
-        Of the standardisation; an inverse scale of 0 takes a feature out.
+    pairs, columns, mean, inverse_scale
+        As of `PairInputs`.
     hidden : (n, n_hidden, n_inputs)
     hidden_bias, out : (n, n_hidden)
         0 where a network has fewer neurons.
@@ -104,10 +132,6 @@ class PairNetworks:
     [[-0.5]]
     """
 
-    pairs: Codes
-    columns: Codes
-    mean: Array
-    inverse_scale: Array
     hidden: Array
     hidden_bias: Array
     out: Array
@@ -124,7 +148,7 @@ class PairNetworks:
         -------
         (..., n)
         """
-        standard = (X[..., self.columns] - self.mean) * self.inverse_scale
+        standard = self.standardised(X)
         active = _products(self.hidden, standard)
         active += self.hidden_bias
         np.tanh(active, out=active)

@@ -31,6 +31,17 @@ class PairVotes:
 
     n_labels: int
 
+    @classmethod
+    def of_pairs(cls, n_pairs: int) -> PairVotes:
+        """Return what counts the votes of so many pairs, which are those of all labels.
+
+        Examples
+        --------
+        >>> PairVotes.of_pairs(6).n_labels
+        4
+        """
+        return cls(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0))
+
     def __post_init__(self) -> None:
         pairs = np.array(list(combinations(range(self.n_labels), 2)))
         first = np.eye(self.n_labels)[pairs[:, 0]]

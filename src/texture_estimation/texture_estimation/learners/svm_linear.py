@@ -108,7 +108,7 @@ class LinearPairsPredictor:
     def __post_init__(self) -> None:
         object.__setattr__(self, '_weights', (self.weights / self.scale).T.copy())
         n_pairs = len(self.intercepts)
-        object.__setattr__(self, '_votes', PairVotes(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0)))
+        object.__setattr__(self, '_votes', PairVotes.of_pairs(n_pairs))
 
     def __call__(self, X: Array) -> Array:
         """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""

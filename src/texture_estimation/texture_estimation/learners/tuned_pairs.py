@@ -238,8 +238,7 @@ class TunedPairs:
     def predictor(parameters: Mapping[str, Any]) -> TunedPairsPredictor:
         """Return the predictor made from the stored parameters."""
         n_pairs = int(parameters['n_pairs'])
-        votes = PairVotes(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0))
-        return TunedPairsPredictor.of(parameters, n_pairs, votes)
+        return TunedPairsPredictor.of(parameters, n_pairs, PairVotes.of_pairs(n_pairs))
 
     def _columns(self, pair: TunedPair) -> Codes:
         """Return the numbers of the features that a pair sees."""

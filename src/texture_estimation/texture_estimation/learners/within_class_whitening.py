@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from texture_core.arrays import Array
+from texture_estimation.group_means import group_means
 from texture_estimation.learners.learner import Codes
 
 
@@ -44,9 +45,9 @@ def within_class_whitening(X: Array, y: Codes, groups: Codes, ridge: float, diff
     [[0.71, 0.0], [0.0, 10.0]]
     """
     slides, first, rows = np.unique(groups, return_index=True, return_inverse=True)
-    means = _means(X, rows, len(slides))
+    means = group_means(X, rows)
     _, labels = np.unique(y[first], return_inverse=True)
-    centres = _means(means, labels, int(labels.max()) + 1)
+    centres = group_means(means, labels)
     covariance = _mean_square(means - centres[labels])
     if differences is not None:
         own = differences[slides]
@@ -57,13 +58,6 @@ def within_class_whitening(X: Array, y: Codes, groups: Codes, ridge: float, diff
     strengths, directions = np.linalg.eigh(covariance / mean_power)
     whitening: Array = (directions / np.sqrt(np.maximum(strengths, 0.0) + ridge)) @ directions.T
     return whitening
-
-
-def _means(values: Array, rows: Codes, count: int) -> Array:
-    sums = np.zeros((count, values.shape[1]))
-    np.add.at(sums, rows, values)
-    means: Array = sums / np.bincount(rows, minlength=count)[:, None]
-    return means
 
 
 def _mean_square(deviations: Array) -> Array:

@@ -17,6 +17,7 @@ from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
 from texture_core.features import FeatureVector
 from texture_core.slide_motion import SlideMotion, group_similar
 from texture_estimation.fingerprint import fingerprint_difference
+from texture_estimation.group_means import group_means
 from texture_estimation.log_probabilities import log_loss, log_softmax
 
 SMALLEST = 1e-6  # variance of a feature within textures, in that of all slides: equal to the last bit is luck
@@ -435,9 +436,7 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> _Fit:
     from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and who classifies does not need it
 
     counts = np.bincount(cells)
-    means = np.zeros((len(counts), values.shape[1]))
-    np.add.at(means, cells, values)
-    means /= counts[:, None]
+    means = group_means(values, cells)
     off, freedom = values - means[cells], len(values) - len(counts)
     scale = _scale(values, off, freedom)
     # The shrinkage takes the number of slides for that of free deviations; means have used up some of them.
