@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path as FilePath
 from typing import Protocol
@@ -22,6 +22,7 @@ from texture_simulation.live_sensor import LiveSensor
 from texture_simulation.scene import Scene
 from texture_simulation.sensors import anyskin, biotac, biotac_hand, daq, papillarray, pvdf, tsf85, tsf85_pair
 from texture_simulation.surfaces.surface import Surface
+from texture_simulation.trajectory import Trajectory
 
 
 class MakeLiveSensor(Protocol):
@@ -134,33 +135,23 @@ def live_tsf85_pair(
 
 def live_biotac(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
     """Return a BioTac alone on its board."""
-    layout = LAYOUTS['biotac']
-    model, device = biotac.BioTacModel(scene, surface, rng, layout), EmulatedBioTac(link, rng)
-    return LiveSensor(
-        model,
-        device,
-        lambda path: device.advance(model.advance(path)[:, :, None]),
-        device.skip,
-        rate_hz=layout.frame_rate_hz,
-        points=model.points_per_frame,
-    )
+    model, device = biotac.BioTacModel(scene, surface, rng, LAYOUTS['biotac']), EmulatedBioTac(link, rng)
+    return _on_board(model, device, lambda path: device.advance(model.advance(path)[:, :, None]))
 
 
 def live_biotac_hand(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:
     """Return a board with BioTacs on two fingers."""
-    layout = LAYOUTS['biotac']
-    model, device = (
-        biotac_hand.BioTacHand(scene, surface, rng, layout),
-        EmulatedBioTac(link, rng, biotac_hand.SERIALS),
-    )
-    return LiveSensor(
-        model,
-        device,
-        lambda path: device.advance(model.advance(path)),
-        device.skip,
-        rate_hz=layout.frame_rate_hz,
-        points=model.points_per_frame,
-    )
+    model = biotac_hand.BioTacHand(scene, surface, rng, LAYOUTS['biotac'])
+    device = EmulatedBioTac(link, rng, biotac_hand.SERIALS)
+    return _on_board(model, device, lambda path: device.advance(model.advance(path)))
+
+
+def _on_board(
+    model: biotac.BioTacModel | biotac_hand.BioTacHand, device: EmulatedBioTac, advance: Callable[[Trajectory], None]
+) -> LiveSensor:
+    """Return the sensor of a board whose fingers are all served at the rate of its frames."""
+    rate_hz, points = LAYOUTS['biotac'].frame_rate_hz, model.points_per_frame
+    return LiveSensor(model, device, advance, device.skip, rate_hz=rate_hz, points=points)
 
 
 def live_daq(scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator) -> LiveSensor:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -122,17 +122,19 @@ class SensorNode(LifecycleNode):
 
     def _publish(self, topic: str, batch: TactileSignal) -> None:
         published, baseline = self._watch.add(topic, batch)
-        self._topics[topic].publish(to_msg(self._in_frame(topic, published)))
+        self._topics[topic].publish(self._message(topic, published))
         if baseline is not None:
             self._publish_baseline(topic, baseline)
 
-    def _in_frame(self, topic: str, signal: TactileSignal) -> TactileSignal:
-        """Return a signal in the frame of its fingertip, as tf names it: 'left/finger0/fingertip'."""
+    def _message(self, topic: str, signal: TactileSignal) -> msg.TactileSignal:
+        """Return the message of a signal, in the frame of its fingertip as tf names it: 'left/finger0/fingertip'."""
+        message = to_msg(signal)
         finger = f'{self.get_namespace()}/{topic.rpartition("/")[0]}'
-        return replace(signal, frame_id=frame_name(finger, signal.frame_id))
+        message.header.frame_id = frame_name(finger, signal.frame_id)
+        return message
 
     def _publish_baseline(self, topic: str, baseline: Baseline) -> None:
-        self._baselines[topic].publish(to_msg(self._in_frame(topic, baseline.as_signal())))
+        self._baselines[topic].publish(self._message(topic, baseline.as_signal()))
         self.get_logger().info(f"'{topic}' is tared")
 
     def _on_tare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

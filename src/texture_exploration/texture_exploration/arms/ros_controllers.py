@@ -114,9 +114,7 @@ class RosControllersArm:
         DeviceError
             If one of them does not come within `connect_timeout_s`; it names which.
         """
-        self.close()
-        self._restart()
-        topics = self._open_topics(self._params)
+        topics = self._begin()
         try:
             self._wait_for_controllers(topics)
         finally:
@@ -130,9 +128,7 @@ class RosControllersArm:
         DeviceError
             If one of them does not come within `connect_timeout_s`; it names which.
         """
-        self.close()
-        self._restart()
-        topics = self._open_topics(self._params)
+        topics = self._begin()
         try:
             self._take_over(topics)
             self._wait_for_controllers(topics)
@@ -261,6 +257,12 @@ class RosControllersArm:
             self._halt(topics, now_ns)
         else:
             self._carry_out(topics, self._due(now_ns), now_ns, held_s)
+
+    def _begin(self) -> ControllerTopics:
+        """Let go of an earlier connection, and open the topics of a new one."""
+        self.close()
+        self._restart()
+        return self._open_topics(self._params)
 
     def _restart(self) -> None:
         params = self._params
