@@ -25,6 +25,8 @@ lint: setup
 	@$(RUN) mypy
 	@$(RUN) python tools/check_terms.py
 	@$(RUN) python tools/check_docstrings.py
+	@$(RUN) python tools/check_prose.py
+	@$(RUN) python tools/figures.py --check
 
 test: setup lint
 	@$(TESTS) -n $(TEST_JOBS) -m "not realtime and not benchmark" --doctest-modules

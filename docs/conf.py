@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import re
-import sys
-from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
 DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
-sys.path.insert(0, str(DOCS))  # Sphinx does not put the folder of its configuration there
-
-import reference  # noqa: E402  found by the line above
 
 project = 'Tactile Texture'
 author = 'Tactile Texture maintainers'
@@ -31,27 +26,18 @@ html_title = f'Tactile Texture {release}'
 html_copy_source = False
 highlight_language = 'text'  # most blocks are commands and sentences
 
-# What stands in a page in place of what is made from source when the site is built.
-MADE = {
-    '<!-- messages -->': reference.messages,
-    '<!-- parameters -->': reference.parameters,
-    '<!-- papers -->': reference.papers,
-    '<!-- grades -->': reference.grades,
-    '<!-- recipes later -->': reference.later,
-    **{f'<!-- experiment {name} -->': partial(reference.experiment, name) for name in reference.EXPERIMENTS},
-}
+# Sources of included numbers, which tools/figures.py reads: a forge hides them, and the site leaves them out.
+SOURCES = re.compile(r'<!--=.*?-->|<!-- (?:constants|measured once)(?:: \w+)? -->')
 MORE_PAGES = '<!-- more pages -->'
 # Tables that a benchmark wrote, linked from its page: without a title, so in no list of pages.
 TABLES = 'docs/charts/'
 
 
 def fill(app: object, docname: str, source: list[str]) -> None:
-    """Put what is made from source into the page that asks for it, before Sphinx reads the page."""
+    """Take the sources of numbers out of a page, and list pages in the index, before Sphinx reads the page."""
     if docname.startswith(TABLES):
         source[0] = f'---\norphan: true\n---\n{source[0]}'
-    for place, make in MADE.items():
-        if place in source[0]:
-            source[0] = source[0].replace(place, make(ROOT))
+    source[0] = SOURCES.sub('', source[0])
     if MORE_PAGES in source[0]:
         source[0] = source[0].replace(MORE_PAGES, more_pages(source[0]))
 
