@@ -7,7 +7,7 @@ import pytest
 from texture_benchmarks.result import BenchmarkOptions
 from texture_benchmarks.robustness.scenes import FORCE_N, SCENE, SLIDE_S, SPEED_M_S, TouchConditions
 from texture_benchmarks.robustness.scenes import simulate_slide_signals as simulate
-from texture_benchmarks.trust.chart import trust_table
+from texture_benchmarks.trust.chart import UNDISTURBED_SIMULATED, grid_panels, trust_table
 from texture_benchmarks.trust.run import run
 from texture_benchmarks.trust.simulated import SIMULATED
 from texture_benchmarks.trust.simulated import simulate as simulate_row
@@ -17,6 +17,8 @@ from texture_evaluation.metrics import SlideResult
 from texture_recordings.slides import LabelledSlide
 from texture_simulation.scene import load_scene
 from texture_simulation.simulated_slide import SimulatedSlide
+
+EVERY_ROW = [row.name(strength) for row in ROWS.values() for strength in row.strengths]
 
 
 @pytest.fixture(scope='module')
@@ -95,6 +97,22 @@ def test_the_table_sets_more_wrong_slides_than_allowed_in_bold() -> None:
     lines = trust_table({'fast': rows}, allowed=2 / 60).splitlines()
     assert lines[2] == '| gain × 0.5 | 60 | 50, 7, **3** | 40, 18, 2 |'
     assert lines[3] == '| undisturbed | 200 | 190, 4, 6 | 195, 5, 0 |'
+
+
+def test_the_grid_shows_undisturbed_slides_where_no_change_lies() -> None:
+    panels = grid_panels(
+        ['gain × 0.5', 'gain × 2', 'white noise 3 % of the rms', 'force × 0.8, simulated', UNDISTURBED]
+    )
+    assert panels == {
+        'gain × …': [('0.5', 'gain × 0.5'), ('1', UNDISTURBED), ('2', 'gain × 2')],
+        'white noise … % of the rms': [('none', UNDISTURBED), ('3', 'white noise 3 % of the rms')],
+        'force × …,\nsimulated': [('0.8', 'force × 0.8, simulated'), ('1', UNDISTURBED_SIMULATED)],
+    }
+
+
+def test_the_grid_shows_every_disturbance_once() -> None:
+    shown = [name for ticks in grid_panels([*EVERY_ROW, *SIMULATED]).values() for _, name in ticks]
+    assert sorted({*shown} - {UNDISTURBED, UNDISTURBED_SIMULATED}) == sorted([*EVERY_ROW, *SIMULATED])
 
 
 def test_simulated_slides_tell_their_conditions_only_if_asked_to() -> None:

@@ -22,7 +22,7 @@ from texture_benchmarks.recipes.run import (
 )
 from texture_benchmarks.recipes.trial import at_rate, comparable
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
-from texture_benchmarks.robustness.chart import KEPT, Curve, Panel, robustness_chart, robustness_tables
+from texture_benchmarks.robustness.breakdown_table import KEPT, Curve, Panel, robustness_tables
 from texture_benchmarks.robustness.degradations import DEGRADATIONS, Degradation, breakdown
 from texture_benchmarks.robustness.scenes import (
     CONDITIONS,
@@ -41,12 +41,6 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slides import LabelledSlide
 
-# By how the names of recipes begin; what begins otherwise is in the first.
-FAMILIES: Mapping[str, tuple[str, ...]] = {
-    'this suite, and baselines': (),
-    'Roberge et al.': ('ets-',),
-    'Kaboli et al., Jamali & Sammut': ('kaboli-', 'jamali-'),
-}
 # Pairs of networks, and the search for the penalty of linear machines, learn for as long as all others together.
 SLOW = ('-ann', 'kaboli-svm.yaml')
 RECIPES = of_one_finger(
@@ -226,22 +220,7 @@ def _result(options: BenchmarkOptions, panels: Mapping[str, Panel], tested: int,
             'others for test'
         ),
         numbers={effect: _numbers(panel) for effect, panel in panels.items()},
-        charts=tuple(
-            robustness_chart(
-                effect, panel, _families(panel), options.out / f'robustness_{effect.replace(" ", "_")}.png'
-            )
-            for effect, panel in panels.items()
-        ),
     )
-
-
-def _families(panel: Panel) -> dict[str, list[str]]:
-    """Return the recipes of each family that has any."""
-    first, *others = FAMILIES
-    found: dict[str, list[str]] = {family: [] for family in FAMILIES}
-    for recipe in panel.curves:
-        found[next((family for family in others if recipe.startswith(FAMILIES[family])), first)].append(recipe)
-    return {family: recipes for family, recipes in found.items() if recipes}
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -84,6 +84,15 @@ class Row:
         """Return the name of the disturbance at this strength."""
         return self.form.format(100.0 * strength if self.percent else strength)
 
+    @property
+    def title(self) -> str:
+        """Name of the disturbance, with an ellipsis in place of its strength."""
+        return self.form.replace('{:g}', '…')
+
+    def tick(self, strength: float) -> str:
+        """Return the strength as a number, in percent where the name gives it so."""
+        return f'{100.0 * strength if self.percent else strength:g}'
+
 
 ROWS: Mapping[str, Row] = {
     'gain': Row(_of_vibration('lower gain'), (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0), 'gain × {:g}'),
