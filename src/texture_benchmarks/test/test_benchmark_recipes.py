@@ -18,9 +18,11 @@ from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.charts import pareto_front
 from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
-from texture_evaluation.cross_validation.cross_validate import cross_validate, split_slides
+from texture_evaluation.cross_validation.cross_validate import cross_validate
+from texture_evaluation.cross_validation.slide_splits import split_slides
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.slide_dataset import SlideDataset, cut_slide
-from texture_recordings.slides import LabelledSlide, find_slides
+from texture_recordings.slides import find_slides
 from texture_recordings.tables.import_tables import import_tables
 from texture_recordings.tables.mapping import mapping_from
 

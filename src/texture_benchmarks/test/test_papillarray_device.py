@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from texture_benchmarks.load.rig import CASES, Rig, feed_papillarray
+from texture_benchmarks.load.rig import Rig
+from texture_benchmarks.load.rig_cases import CASES, feed_papillarray
 from texture_core.errors import InvalidParameter
 from texture_drivers.papillarray.sensor import PapillArray
 from texture_drivers.params import SensorParams

@@ -13,12 +13,13 @@ from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
-from texture_benchmarks.load.rig import CASES, Rig, biotac
+from texture_benchmarks.load.rig import Rig
+from texture_benchmarks.load.rig_cases import CASES, biotac
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
-from texture_drivers import channel_watch
+from texture_drivers import stream_watch
 from texture_drivers.nodes.sensor import SensorNode
 from texture_simulation.devices.biotac import EmulatedBioTac
 
@@ -100,7 +101,7 @@ def test_drift_saturation_and_a_dead_channel_are_named_on_diagnostics(
         counts[:, 3], counts[:, 7] = 2**15 - 1, 500
         device.sample(counts)
 
-    monkeypatch.setattr(channel_watch, 'DEAD_S', 2.0)
+    monkeypatch.setattr(stream_watch, 'DEAD_S', 2.0)
     case = replace(CASES['daq'], feed=feed)
     signal = graph.listen(msg.TactileSignal, 'signal', SENSOR_QOS)
     reports = graph.listen(DiagnosticArray, '/diagnostics')

@@ -14,7 +14,7 @@ from texture_benchmarks.trust.simulated import simulate as simulate_row
 from texture_benchmarks.trust.trial import ROWS, UNDISTURBED, Outcome, Row, disturbed
 from texture_core.estimates import TextureEstimate
 from texture_evaluation.metrics import SlideResult
-from texture_recordings.slides import LabelledSlide
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_simulation.scene import load_scene
 from texture_simulation.simulated_slide import SimulatedSlide
 

@@ -5,7 +5,7 @@ import pytest
 
 from texture_bringup.command import main
 from texture_estimation.recipe import load_recipe
-from texture_estimation.search.genetic_search import Generation, ScoredIndividual
+from texture_estimation.search.generation import Generation, ScoredIndividual
 from texture_evaluation.commands.optimise import bar
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
 

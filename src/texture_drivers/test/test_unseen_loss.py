@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from texture_drivers.tsf85.finger_stream import SIGNAL, FingerStream
+from texture_drivers.tsf85.batch_cutter import SIGNAL
+from texture_drivers.tsf85.finger_stream import FingerStream
 from texture_drivers.tsf85.sample_frames import SampleFrame
 from texture_drivers.unseen_loss import UnseenLoss
 

@@ -4,7 +4,9 @@ import math
 import pytest
 
 from texture_core.errors import InvalidData
-from texture_estimation.open_set.domain import FULL_CIRCLE, Domain, DomainMargins, covered_arcs
+from texture_estimation.open_set.domain import Domain
+from texture_estimation.open_set.domain_margins import DomainMargins
+from texture_estimation.open_set.intervals import FULL_CIRCLE, covered_arcs
 from texture_features.slide_conditions import SignalLevel, SlideConditions
 
 

@@ -15,7 +15,8 @@ from texture_estimation.recipe import load_recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.fitness import UNDECIDED, decided_by_slide, decisions, fitness
-from texture_estimation.search.genetic_search import SearchParams, search
+from texture_estimation.search.generation import SearchParams
+from texture_estimation.search.genetic_search import search
 from texture_estimation.search.halves import random_halves
 from texture_estimation.search.optimise import optimise
 from texture_estimation.search.pairs import optimise_pairs

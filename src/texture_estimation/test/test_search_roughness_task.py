@@ -6,7 +6,7 @@ from texture_estimation.roughness.ann5 import Ann5
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.roughness.svm5 import Svm5
-from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.generation import SearchParams
 from texture_estimation.search.halves import random_halves
 from texture_estimation.search.optimise import optimise
 from texture_estimation.search.recipe_space import RecipeSpace

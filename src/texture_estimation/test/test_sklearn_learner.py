@@ -13,7 +13,8 @@ from texture_core.errors import InvalidParameter, ModelMismatch, TextureError
 from texture_estimation import model_files
 from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.learners.sklearn_learner import SklearnLearner, SklearnPredictor
+from texture_estimation.learners.sklearn_learner import SklearnLearner
+from texture_estimation.learners.sklearn_predictor import SklearnPredictor
 from texture_estimation.learners.standardisation import standardisation
 from texture_estimation.model import load_model
 from texture_estimation.recipe import Recipe

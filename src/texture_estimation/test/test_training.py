@@ -9,7 +9,7 @@ from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.recipe import load_recipe
 from texture_features.augmentation.augmentation import Augmentation
-from texture_features.augmentation.augmented_features import AugmentedFeatures, FeatureCopies
+from texture_features.augmentation.feature_copies import AugmentedFeatures, FeatureCopies
 from texture_features.labelled_features import LabelledFeatures
 
 RECIPE = load_recipe('default')

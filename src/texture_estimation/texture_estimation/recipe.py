@@ -13,7 +13,7 @@ from texture_core.parameters import from_mapping, param
 from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
-from texture_estimation.open_set.domain import DomainMargins
+from texture_estimation.open_set.domain_margins import DomainMargins
 from texture_estimation.open_set.stopping_rule import NEVER
 from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet

@@ -21,8 +21,8 @@ from texture_estimation.model import TextureModel
 from texture_evaluation import metrics
 from texture_evaluation.metrics import SlideResult
 from texture_features.windowing.windows import WindowEvent
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.slide_dataset import SlideDataset, no_window
-from texture_recordings.slides import LabelledSlide
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
 from texture_estimation.search.classification_task import ClassificationTask
-from texture_estimation.search.genetic_search import Generation, SearchParams
+from texture_estimation.search.generation import Generation, SearchParams
 from texture_estimation.search.labelled_windows import Cut, LabelledWindows
 from texture_estimation.search.optimise import SearchResult, optimise
 from texture_estimation.search.pairs import PairSearchResult, optimise_pairs

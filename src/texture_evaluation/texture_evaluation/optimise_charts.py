@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from texture_estimation.search.genetic_search import Generation
+from texture_estimation.search.generation import Generation
 from texture_evaluation.charts import COLOURS, chart, pareto_front
 
 NAMED = 10  # lines of more searches than this are not named

@@ -19,7 +19,8 @@ from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
+from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm
+from texture_simulation.devices.twist_controller_params import TwistControllerParams
 
 PERIOD_NS = 4_000_000
 EXPLORER_PERIODS = 2  # of the arm, in one of the explorer

@@ -23,9 +23,10 @@ from texture_core.exploration import ExplorationRequest, Phase
 from texture_core.finger_state import FingerState
 from texture_core.parameters import markdown_table
 from texture_exploration.arms.protocol import ArmCommand
+from texture_exploration.arms.tcp_connection import TcpConnection
 from texture_exploration.arms.ur import UrArm, UrArmParams
 from texture_exploration.arms.ur_params import UrArmParams as Params
-from texture_exploration.arms.ur_probe import TcpConnection, _ask
+from texture_exploration.arms.ur_probe import _ask
 from texture_exploration.arms.ur_tables import PROTOCOL_VERSION, REQUEST_VERSION, RTDE_PORT, SETUP_INPUTS
 from texture_exploration.explorer import Explorer
 from texture_exploration.motions.touch import TouchParams

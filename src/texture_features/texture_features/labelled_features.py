@@ -18,7 +18,7 @@ from texture_core.slide_motion import SlideMotion
 from texture_features.slide_conditions import RunningConditions, SlideConditions
 
 if TYPE_CHECKING:  # which needs scipy
-    from texture_features.augmentation.augmented_features import AugmentedFeatures
+    from texture_features.augmentation.feature_copies import AugmentedFeatures
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,48 +10,17 @@ import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidLaunch, TextureError
-from texture_core.files import FileRefused, read_bounded
+from texture_launch.bounded_xml import MAX_ELEMENTS, parse_launch_file
 from texture_launch.description import Argument, NodeDescription
 from texture_launch.elements import CONDITIONS, attribute, check_form, is_declaration, truth
 from texture_launch.node_element import joined_namespace, read_node
 from texture_launch.scope import Scope
 
 MAX_INCLUDES = 20  # of files within each other
-MAX_BYTES = 200_000  # of one file; the longest in use has 5 kB
-MAX_DEPTH = 30  # of elements within each other
-MAX_ELEMENTS = 5000  # in one file, and that are performed in all files together
-
-
-class _BoundedTree(ElementTree.TreeBuilder):
-    """Build the tree of a file that is neither deep nor large, and defines no entities."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._depth = self._count = 0
-
-    def start(self, tag: str, attrs: dict[str, str], /) -> Element:
-        """Begin an element."""
-        self._depth += 1
-        self._count += 1
-        if self._depth > MAX_DEPTH or self._count > MAX_ELEMENTS:
-            raise FileRefused(
-                f'it has more than {MAX_ELEMENTS} elements, or some more than {MAX_DEPTH} deep within each other'
-            )
-        return super().start(tag, attrs)
-
-    def end(self, tag: str, /) -> Element:
-        """End an element."""
-        self._depth -= 1
-        return super().end(tag)
-
-    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        """Refuse what could define entities that multiply."""
-        raise FileRefused('it has a DOCTYPE, which no launch file needs')
 
 
 @dataclass
@@ -96,7 +65,7 @@ def read(path: Path, given: Mapping[str, str], environment: Mapping[str, str]) -
 
 def declared_arguments(path: Path) -> list[Argument]:
     """Return the arguments that a launch file itself declares."""
-    elements = [item for item in _parse(path).iter('arg') if is_declaration(item)]
+    elements = [item for item in parse_launch_file(path).iter('arg') if is_declaration(item)]
     return [Argument(item.get('name', ''), item.get('default'), item.get('description', '')) for item in elements]
 
 
@@ -111,7 +80,7 @@ def all_arguments(path: Path, environment: Mapping[str, str]) -> list[Argument]:
 
 def _certain_includes(path: Path, environment: Mapping[str, str], seen: set[Path]) -> Iterator[Path]:
     """Yield the files that a file includes at a place that no argument decides, and those that they include, once."""
-    for element in _parse(path).iter('include'):
+    for element in parse_launch_file(path).iter('include'):
         with contextlib.suppress(TextureError):
             included = Path(Scope({}, dict(environment)).expand(attribute(element, 'file')))
             if included in seen or len(seen) > MAX_INCLUDES:
@@ -122,23 +91,8 @@ def _certain_includes(path: Path, environment: Mapping[str, str], seen: set[Path
             yield from inner
 
 
-def _parse(path: Path) -> Element:
-    try:
-        content = read_bounded(path, MAX_BYTES)
-        root: Element = ElementTree.fromstring(content, ElementTree.XMLParser(target=_BoundedTree()))
-    except OSError as error:
-        raise InvalidLaunch(f"launch file '{path}' cannot be read: {error.strerror}") from error
-    except FileRefused as error:
-        raise InvalidLaunch(f"launch file '{path}' is not read: {error}") from error
-    except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: of its encoding
-        raise InvalidLaunch(f"launch file '{path}' is not well-formed XML: {error}") from error
-    if root.tag != 'launch':
-        raise InvalidLaunch(f"launch file '{path}' begins with <{root.tag}>; <launch> is needed")
-    return root
-
-
 def _read_file(path: Path, scope: Scope, reading: ReadState) -> None:
-    root = _parse(path)
+    root = parse_launch_file(path)
     if len(reading.files) > MAX_INCLUDES:
         raise InvalidLaunch(f"'{path}' is included more than {MAX_INCLUDES} levels deep; does it include itself?")
     reading.files.append(path)

@@ -18,8 +18,9 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from texture_core.errors import InvalidData
-from texture_recordings.bags import RawMessage, short_name
+from texture_recordings.bags import RawMessage
 from texture_recordings.cdr import TYPES, encode, typestore
+from texture_recordings.topic_names import short_name
 
 FOREVER = QosTime(2147483647, 4294967295)
 

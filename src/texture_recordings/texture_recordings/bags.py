@@ -18,7 +18,8 @@ from texture_core.errors import InvalidData
 from texture_core.plain_data import parse_yaml
 from texture_core.signal import TactileSignal
 from texture_recordings.bag_limits import CheckedPath, MessageLimit, check_index, check_storage, messages_budget
-from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode, typestore
+from texture_recordings.cdr import MESSAGES, TYPES, SignalDecoder, decode
+from texture_recordings.topic_names import connections_below, topic_names
 
 if sys.version_info >= (3, 14):
     from compression.zstd import ZstdError
@@ -30,9 +31,6 @@ BROKEN = (
     ReaderError, TypesysError, ZstdError, apsw.Error, yaml.YAMLError, OSError, EOFError, struct.error, RuntimeError,
     ValueError, LookupError, TypeError, AttributeError, AssertionError, MemoryError, OverflowError,
 )  # fmt: skip
-
-
-EXPLORATION = 'exploration'
 
 
 class RawMessage(NamedTuple):
@@ -49,11 +47,6 @@ class RawMessage(NamedTuple):
     msgtype: str
     log_ns: int
     data: bytes
-
-
-def short_name(topic: str) -> str:
-    """Return the last part of a topic's name: 'signal' of '/left/signal'."""
-    return topic.rsplit('/', 1)[-1]
 
 
 def is_bag(path: Path) -> bool:
@@ -256,7 +249,7 @@ def _read(
             for storage in getattr(reader.storage, 'storages', [reader.storage]):
                 if hasattr(storage, 'chunks'):
                     check_index(storage)
-            own = reader.connections if foreign else _of_namespace(path, reader.connections, namespace)
+            own = reader.connections if foreign else connections_below(path, reader.connections, namespace)
             names = topic_names(c.topic for c in reader.connections if c.msgtype in MESSAGES)
             connections = [c for c in own if chosen(c, names.get(c.topic, c.topic))]
             if not connections or not reader.message_count:
@@ -285,53 +278,3 @@ def _files(path: Path) -> list[Path]:
         raise ReaderError('it is compressed as a whole; let `ros2 bag convert` make it MCAP, which compresses inside')
     # As rosbags finds them: beside the metadata, wherever the entry says that they were.
     return [path / Path(str(name)).name for name in facts['relative_file_paths']]
-
-
-def _of_namespace(path: Path, connections: list[Connection], namespace: str | None) -> list[Connection]:
-    ours = [c for c in connections if c.msgtype in MESSAGES]
-    if not ours:
-        named = ', '.join(sorted({c.msgtype for c in connections})) or 'nothing'
-        raise InvalidData(
-            f"the bag '{path}' holds {named}; messages of texture_msgs are needed, record the suite's topics"
-        )
-    for connection in ours:
-        if connection.digest and connection.digest != typestore().hash_rihs01(connection.msgtype):
-            raise InvalidData(
-                f"the bag '{path}' was recorded with another definition of {connection.msgtype}; record it again"
-            )
-    names = topic_names(c.topic for c in ours)
-    namespaces = {topic: topic.removesuffix(name).rstrip('/') or '/' for topic, name in names.items()}
-    found = sorted(set(namespaces.values()))
-    if namespace is None and len(found) > 1:
-        raise InvalidData(f"the bag '{path}' has the namespaces {', '.join(found)}; name one of them")
-    prefix = found[0] if namespace is None else '/' + namespace.strip('/')
-    if prefix not in found:
-        raise InvalidData(f"the bag '{path}' has no namespace '{prefix}'; it has {', '.join(found)}")
-    common = [c for c in connections if c.topic == '/diagnostics']
-    return [c for c in ours if namespaces[c.topic] == prefix] + common
-
-
-def topic_names(topics: Iterable[str]) -> dict[str, str]:
-    """Return the name of each topic below its namespace, which is the folder of its explorer.
-
-    Several fingers of one explorer stream on 'finger0/signal' and so on; a topic without an explorer above it belongs
-    to the folder in which it is.
-
-    Examples
-    --------
-    >>> topic_names(['/left/exploration', '/left/finger0/signal', '/right/signal'])
-    {'/left/exploration': 'exploration', '/left/finger0/signal': 'finger0/signal', '/right/signal': 'signal'}
-    """
-    given = list(topics)
-    explorers = {_folder(topic) for topic in given if short_name(topic) == EXPLORATION}
-    names = {}
-    for topic in given:
-        folder = _folder(topic)
-        while folder and folder not in explorers:
-            folder = _folder(folder)
-        names[topic] = topic.removeprefix(f'{folder}/') if folder in explorers else short_name(topic)
-    return names
-
-
-def _folder(topic: str) -> str:
-    return topic.rpartition('/')[0]

@@ -20,14 +20,15 @@ from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_core.window import Window
 from texture_features.labelled_features import LabelledFeatures
 from texture_features.windowing.windows import CutWindow, WindowEvent, WindowParams, cut_recording
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.motion_of_states import motion_made
 from texture_recordings.parquet_export import write_parquet
 from texture_recordings.slide_samples import SlideSamples
-from texture_recordings.slides import STREAMS, LabelledSlide, find_slides, number_slides, parse_selection
+from texture_recordings.slides import STREAMS, find_slides, number_slides, parse_selection
 
 if TYPE_CHECKING:  # which needs scipy: reading, selecting and exporting do not
     from texture_features.augmentation.augmentation import Augmentation
-    from texture_features.augmentation.augmented_features import AugmentedFeatures
+    from texture_features.augmentation.feature_copies import AugmentedFeatures
     from texture_features.feature_set import FeatureSet
 
 GAP_NS = NANOSECONDS  # between two slides that are given as arrays

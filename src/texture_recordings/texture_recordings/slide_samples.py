@@ -13,7 +13,7 @@ from texture_core.errors import InvalidData
 from texture_core.exploration import ExplorationState
 from texture_core.signal import NANOSECONDS
 from texture_features.feature import WindowBatch
-from texture_recordings.slides import LabelledSlide
+from texture_recordings.labelled_slide import LabelledSlide
 
 
 @dataclass(frozen=True, eq=False)

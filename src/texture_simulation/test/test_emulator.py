@@ -15,7 +15,8 @@ from texture_core.signal import TactileSignal, lost_samples
 from texture_drivers.params import SensorParams
 from texture_drivers.tsf85.sensor import Tsf85
 from texture_simulation.devices.faults import ByteFaults
-from texture_simulation.emulator import Emulator, EmulatorParams
+from texture_simulation.emulator import Emulator
+from texture_simulation.emulator_params import EmulatorParams
 
 pytestmark = pytest.mark.realtime
 

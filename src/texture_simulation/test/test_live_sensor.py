@@ -19,7 +19,8 @@ from texture_drivers.catalogue import SENSORS
 from texture_drivers.daq.sensor import daq
 from texture_drivers.params import SensorParams
 from texture_drivers.pvdf.sensor import Pvdf
-from texture_simulation.emulator import Emulator, EmulatorParams
+from texture_simulation.emulator import Emulator
+from texture_simulation.emulator_params import EmulatorParams
 from texture_simulation.live_catalogue import live_biotac, live_biotac_hand, live_daq
 from texture_simulation.scene import load_scene
 from texture_simulation.trajectory import straight

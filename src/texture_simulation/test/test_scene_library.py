@@ -10,7 +10,7 @@ import pytest
 from texture_core.parameters import markdown_table
 from texture_core.resources import folder
 from texture_simulation.effects.catalogue import EFFECTS
-from texture_simulation.emulator import EmulatorParams
+from texture_simulation.emulator_params import EmulatorParams
 from texture_simulation.frictions import FRICTIONS
 from texture_simulation.scene import load_scene
 from texture_simulation.sensors.catalogue import SENSORS

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from texture_drivers.tsf85.finger_stream import SIGNAL, FingerStream
+from texture_drivers.tsf85.batch_cutter import SIGNAL
+from texture_drivers.tsf85.finger_stream import FingerStream
 from texture_drivers.tsf85.protocol import PacketParser
 from texture_drivers.tsf85.sample_frames import SampleFrameSplitter
 from texture_simulation.devices.tsf85_encoder import Tsf85Encoder

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from texture_estimation.recipe import Recipe
-from texture_recordings.slides import LabelledSlide
+from texture_recordings.labelled_slide import LabelledSlide
 
 Changes = Mapping[str, Mapping[str, Any] | None]  # feature or learner → parameters that differ; None leaves it out
 SHIPPED = 'as shipped'

@@ -24,7 +24,7 @@ from texture_benchmarks.endurance.robot_faults import (
     PlannedRobotFault,
     RobotSession,
 )
-from texture_benchmarks.motion.robot_trials import FingerLog
+from texture_benchmarks.motion.robots_under_test import FingerLog
 from texture_core.errors import DeviceError
 from texture_exploration.motions.touch import TouchParams
 from texture_simulation.devices.ur.params import UrControllerParams

@@ -13,7 +13,8 @@ import numpy as np
 from texture_benchmarks.motion.chart import border_chart, hazard_chart, robot_chart, surface_chart
 from texture_benchmarks.motion.defaults import TARGETS, bump_speed_m_s, defaults, margins
 from texture_benchmarks.motion.hazards import LAGS_S, hazard_trials, lag_trials
-from texture_benchmarks.motion.robot_trials import ROBOTS, typical_trial
+from texture_benchmarks.motion.robot_trials import typical_trial
+from texture_benchmarks.motion.robots_under_test import ROBOTS
 from texture_benchmarks.motion.tables import hazard_table, lag_table, robot_table, surface_table
 from texture_benchmarks.motion.trial import (
     ARM,

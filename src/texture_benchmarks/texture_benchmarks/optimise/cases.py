@@ -10,7 +10,7 @@ from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.recipe import load_roughness_recipe
 from texture_estimation.search.classification_task import ClassificationTask
-from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.generation import SearchParams
 from texture_estimation.search.recipe_space import RecipeSpace
 from texture_estimation.search.roughness_task import RoughnessTask
 from texture_estimation.search.search_task import SearchTask

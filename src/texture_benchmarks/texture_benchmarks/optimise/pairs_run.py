@@ -23,7 +23,7 @@ from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.fitness import UNDECIDED, decided_by_slide, decisions
-from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.generation import SearchParams
 from texture_estimation.search.joined_pairs import joined_recipe
 from texture_estimation.search.pairs import Pair, PairSearchResult, optimise_pairs
 from texture_estimation.search.parallel import threaded_map

@@ -28,7 +28,7 @@ from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.catalogue import find
 from texture_estimation.roughness.grades import TRAIN, read_grades
 from texture_estimation.search.feature_cache import FeatureCache
-from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.generation import SearchParams
 from texture_estimation.search.optimise import SearchResult, optimise
 from texture_estimation.search.parallel import threaded_map
 from texture_estimation.search.search_slides import SearchSlides

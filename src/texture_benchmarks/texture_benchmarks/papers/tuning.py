@@ -10,7 +10,7 @@ from typing import Any, Generic
 import yaml
 
 from texture_core.errors import InvalidParameter
-from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.generation import SearchParams
 from texture_estimation.search.optimise import SearchResult, optimise
 from texture_estimation.search.parallel import threaded_map
 from texture_estimation.search.recipe_space import RecipeSpace

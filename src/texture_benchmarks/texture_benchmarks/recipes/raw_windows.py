@@ -15,7 +15,7 @@ from texture_benchmarks.recipes.trial import LENGTH_S
 from texture_core.arrays import AnyArray
 from texture_core.catalogue import find
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_evaluation.cross_validation.cross_validate import split_slides
+from texture_evaluation.cross_validation.slide_splits import split_slides
 from texture_evaluation.cross_validation.splits import Split
 from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
 from texture_recordings.slide_dataset import SlideDataset

@@ -45,7 +45,8 @@ from texture_estimation.channels import with_channels
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
-from texture_evaluation.cross_validation.cross_validate import FoldFeatures, cross_validate, split_slides
+from texture_evaluation.cross_validation.cross_validate import FoldFeatures, cross_validate
+from texture_evaluation.cross_validation.slide_splits import split_slides
 from texture_evaluation.cross_validation.splits import Split
 from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet

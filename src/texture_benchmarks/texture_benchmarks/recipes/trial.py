@@ -17,7 +17,7 @@ from texture_core.signal import TactileSignal
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_evaluation import metrics
-from texture_evaluation.cross_validation.cross_validate import CrossValidation
+from texture_evaluation.cross_validation.cross_validation import CrossValidation
 from texture_evaluation.cross_validation.splits import Split
 from texture_evaluation.evaluate import run_model
 from texture_features.augmentation.augmentation import Augmentation
@@ -27,8 +27,8 @@ from texture_features.features.force import Force
 from texture_features.features.spectrum import Spectrum
 from texture_features.features.speed import Speed
 from texture_features.windowing.time_stretch import Stretched
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.slide_dataset import SlideDataset, cut_slide
-from texture_recordings.slides import LabelledSlide
 
 # Every recipe is given windows of this length, but for those whose paper votes over shorter parts, and is trained on
 # windows this far apart.

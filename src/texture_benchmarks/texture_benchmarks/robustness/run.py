@@ -38,8 +38,8 @@ from texture_benchmarks.robustness.trial import TOPIC, Count, TrainedModels, deg
 from texture_core.resources import folder
 from texture_estimation.channels import with_channels
 from texture_estimation.recipe import Recipe, load_recipe
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.slides import LabelledSlide
 
 # Pairs of networks, and the search for the penalty of linear machines, learn for as long as all others together.
 SLOW = ('-ann', 'kaboli-svm.yaml')

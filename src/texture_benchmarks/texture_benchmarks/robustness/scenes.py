@@ -14,7 +14,7 @@ from texture_core.arrays import Samples
 from texture_core.catalogue import find
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import TactileSignal
-from texture_recordings.slides import LabelledSlide
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_simulation.effects.finger_spread import FingerSpread
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.sensors.catalogue import SENSORS

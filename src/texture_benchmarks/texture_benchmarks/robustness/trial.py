@@ -20,8 +20,8 @@ from texture_estimation.recipe import Recipe
 from texture_evaluation.train import training_examples
 from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.slides import LabelledSlide
 
 TOPIC = 'signal'
 AT_ONCE = 512  # windows evaluated together: many for speed, few enough for the memory

@@ -14,7 +14,8 @@ import numpy as np
 from texture_core.finger_state import FingerSender, FingerState
 from texture_core.signal import NANOSECONDS
 from texture_drivers.tsf85.protocol import start_command
-from texture_simulation.emulator import Emulator, EmulatorParams
+from texture_simulation.emulator import Emulator
+from texture_simulation.emulator_params import EmulatorParams
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.sensors.catalogue import SENSORS
 from texture_simulation.simulated_slide import SimulatedSlide

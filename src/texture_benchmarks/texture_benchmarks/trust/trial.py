@@ -18,8 +18,8 @@ from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.model import TextureModel
 from texture_evaluation.metrics import SlideResult
 from texture_features.augmentation.disturbances import smooth_response
+from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.slides import LabelledSlide
 
 VIBRATION = 'signal'
 FINGER_SEED = 7  # the same other finger for all slides

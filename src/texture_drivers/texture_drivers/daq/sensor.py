@@ -12,10 +12,11 @@ from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
 from texture_core.plain_data import safe_repr
 from texture_drivers.daq import tables
+from texture_drivers.framed_stream import FramedStream
 from texture_drivers.params import SensorParams
 from texture_drivers.serial_sensor import SerialSensor
 from texture_drivers.settings import read_settings
-from texture_drivers.stream_decoder import FramedStream, StreamDecoder
+from texture_drivers.stream_decoder import StreamDecoder
 
 DEFAULT_SETTINGS = 'daq'
 

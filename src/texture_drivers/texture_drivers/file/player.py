@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from texture_core.errors import DeviceError, InvalidData
 from texture_core.parameters import param
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_drivers.file.recording import FileRecording, load_recording
+from texture_drivers.file.file_recording import FileRecording
+from texture_drivers.file.recording import load_recording
 from texture_drivers.params import SensorParams
 from texture_drivers.settings import load_settings
 

@@ -23,10 +23,11 @@ from texture_core.ros.run import run
 from texture_core.signal import TactileSignal
 from texture_drivers.baseline import Baseline
 from texture_drivers.catalogue import SENSORS
-from texture_drivers.channel_watch import ChannelWatch, TareParams
+from texture_drivers.channel_watch import ChannelWatch
 from texture_drivers.params import SensorParams
 from texture_drivers.sensor_health import SensorHealth
 from texture_drivers.sensor_reader import SensorReader
+from texture_drivers.stream_watch import TareParams
 
 # Phases of an exploration in which nothing touches the finger; after an abort it may still.
 UNLOADED = frozenset({msg.ExplorationState.IDLE, msg.ExplorationState.APPROACH, msg.ExplorationState.DONE})

@@ -21,7 +21,7 @@ from texture_core.errors import InvalidData
 from texture_core.files import open_regular
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.tsf85 import tables
-from texture_drivers.tsf85.finger_stream import IMU, SIGNAL, STATIC
+from texture_drivers.tsf85.batch_cutter import IMU, SIGNAL, STATIC
 from texture_drivers.tsf85.settings import Tsf85Settings
 
 TAXELS, AXES = tables.STATIC_ROWS * tables.STATIC_COLUMNS, 3

@@ -16,7 +16,8 @@ from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted, Learner, Predictor, hidden_layer
 from texture_estimation.open_set.class_distance import ClassDistance
 from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, NoveltyDetector, SlideNovelty, space_means
-from texture_features.augmentation.augmented_features import NOISE, FeatureCopies
+from texture_features.augmentation.augmented_features import NOISE
+from texture_features.augmentation.feature_copies import FeatureCopies
 from texture_features.labelled_features import LabelledFeatures
 
 MIN_SLIDES = 3  # of a class: with one held out, two tell how much slides differ

@@ -17,6 +17,7 @@ from texture_core.parameters import param
 from texture_estimation.learners.augmented_examples import AugmentedBatches, AugmentedExamples
 from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted, FoldFit
+from texture_estimation.learners.mlp_predictor import MlpPredictor
 from texture_estimation.log_probabilities import log_loss, log_softmax
 
 Weights = list[NDArray[np.float32]]  # hidden: (n_features, hidden), (hidden,); output: (hidden, n_labels), (n_labels,)
@@ -187,37 +188,6 @@ class _Batches:
         rows = self._order[self._drawn % self._count :: self._count]
         self._drawn += 1
         return self._inputs[rows], self._codes[rows]
-
-
-@dataclass(frozen=True, eq=False)
-class MlpPredictor:
-    """The two layers, made for features as they come.
-
-    Parameters
-    ----------
-    hidden : (n_features, n_hidden)
-    hidden_offset : (n_hidden,)
-    output : (n_hidden, n_labels)
-    output_offset : (n_labels,)
-    """
-
-    hidden: Array
-    hidden_offset: Array
-    output: Array
-    output_offset: Array
-
-    def activations(self, X: Array) -> Array:
-        """Return the outputs of the hidden layer, (..., n_hidden) of (..., n_features)."""
-        active: Array = X @ self.hidden
-        active += self.hidden_offset
-        np.maximum(active, 0.0, out=active)
-        return active
-
-    def __call__(self, X: Array) -> Array:
-        """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        scores: Array = self.activations(X) @ self.output
-        scores += self.output_offset
-        return scores
 
 
 def _calibrated(parameters: Mapping[str, Array], temperature: float) -> dict[str, Array]:

@@ -8,48 +8,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from texture_core.errors import InvalidData
+from texture_estimation.open_set.domain_margins import DomainMargins
+from texture_estimation.open_set.intervals import FULL_CIRCLE, covered_arcs, interval_of, is_beyond, joint_interval
 from texture_features.slide_conditions import Interval, SlideConditions
 
-# Of the slides, at either end of a range: with a hundred slides or more, one odd slide does not widen it.
-ODD_SHARE = 0.01
-FULL_CIRCLE: Interval = (-math.pi, math.pi)
 # Motions whose direction turns within a window: they cover all directions, and theirs is not compared.
 TURNING_MOTIONS = ('circular',)
 REPLAYS = 'file/'  # a sensor that replays a file is named after the file, not after what measured
 OUTSIDE = 'outside what was trained'
-
-
-@dataclass(frozen=True)
-class DomainMargins:
-    """How far an exploration may lie outside the conditions of the training.
-
-    Parameters
-    ----------
-    speed, force
-        Relative margins: from low / (1 + margin) to high · (1 + margin) is within.
-    direction_rad
-        Largest angle to a direction of the training.
-    level
-        Relative margin of the signal level.
-
-    Examples
-    --------
-    >>> DomainMargins(speed=0.2).speed
-    0.2
-    """
-
-    speed: float = 0.15
-    force: float = 0.3
-    direction_rad: float = 0.35
-    level: float = 1.0
-
-    def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if not 0.0 <= value < math.inf:
-                raise InvalidData(f'the margin {name} of a domain is {value}; 0 or a positive number is needed')
 
 
 @dataclass(frozen=True)
@@ -127,8 +94,8 @@ class Domain:
         return cls(
             motions=_names(slide.motion for slide in slides),
             sensors=_names(slide.sensor for slide in slides if not slide.sensor.startswith(REPLAYS)),
-            speed_m_s=_interval((slide.speed_m_s, *slide.speed_range_m_s) for slide in slides),
-            force_n=_interval((slide.force_n, *slide.force_range_n) for slide in slides),
+            speed_m_s=interval_of((slide.speed_m_s, *slide.speed_range_m_s) for slide in slides),
+            force_n=interval_of((slide.force_n, *slide.force_range_n) for slide in slides),
             directions_rad=_directions(slides, margins.direction_rad),
             levels=_levels(slides),
             slides=dict(Counter(labels)),
@@ -152,10 +119,10 @@ class Domain:
             self,
             motions=_names((*self.motions, *new.motions)) if self.motions else (),
             sensors=_names((*self.sensors, *new.sensors)) if self.sensors else (),
-            speed_m_s=_union(self.speed_m_s, new.speed_m_s),
-            force_n=_union(self.force_n, new.force_n),
+            speed_m_s=joint_interval(self.speed_m_s, new.speed_m_s),
+            force_n=joint_interval(self.force_n, new.force_n),
             directions_rad=(*self.directions_rad, *new.directions_rad) if self.directions_rad else (),
-            levels={name: _union(own, new.levels.get(name)) or own for name, own in self.levels.items()},
+            levels={name: joint_interval(own, new.levels.get(name)) or own for name, own in self.levels.items()},
             slides=dict(Counter(self.slides) + Counter(new.slides)),
         )
 
@@ -190,9 +157,9 @@ class Domain:
 
     def _deviations(self, conditions: SlideConditions) -> Iterator[str]:
         speed, force = conditions.speed_m_s, conditions.force_n
-        if _beyond(speed, self.speed_m_s, self.margins.speed):
+        if is_beyond(speed, self.speed_m_s, self.margins.speed):
             yield f'speed {speed:.3g} m/s, trained {_range(self.speed_m_s)} m/s'
-        if _beyond(force, self.force_n, self.margins.force):
+        if is_beyond(force, self.force_n, self.margins.force):
             yield f'force {force:.3g} N, trained {_range(self.force_n)} N'
         if self.motions and conditions.motion and conditions.motion not in self.motions:
             yield f"motion '{conditions.motion}', trained {_listed(self.motions)}"
@@ -203,7 +170,7 @@ class Domain:
             yield f'direction {direction:.3g} rad, trained {" and ".join(map(_range, self.directions_rad))} rad'
         for level in conditions.levels:
             trained = self.levels.get(level.channel)
-            if _beyond(level.rms, trained, self.margins.level):
+            if is_beyond(level.rms, trained, self.margins.level):
                 yield f'signal level {level.rms:.3g} of {level.channel}, trained {_range(trained)}'
 
     def _untrained_directions(self, conditions: SlideConditions) -> list[float]:
@@ -220,30 +187,6 @@ class Domain:
         )
 
 
-def covered_arcs(directions_rad: Iterable[float], gap_rad: float) -> tuple[Interval, ...]:
-    """Return the arcs that directions cover when gaps of at most `gap_rad` between neighbours count as covered.
-
-    Parameters
-    ----------
-    directions_rad
-        Any angles.
-    gap_rad
-        Largest gap that is bridged.
-    """
-    ordered = sorted({math.remainder(direction, math.tau) for direction in directions_rad})
-    if not ordered:
-        return ()
-    turned = [*ordered[1:], ordered[0] + math.tau]
-    ends = [place for place, (one, other) in enumerate(zip(ordered, turned, strict=True)) if other - one > gap_rad]
-    if not ends:
-        return (FULL_CIRCLE,)
-    starts = [ordered[(end + 1) % len(ordered)] for end in (ends[-1], *ends[:-1])]
-    return tuple(
-        (start, ordered[end] if ordered[end] >= start else ordered[end] + math.tau)
-        for start, end in zip(starts, ends, strict=True)
-    )
-
-
 def _directions(slides: Sequence[SlideConditions], margin_rad: float) -> tuple[Interval, ...]:
     if any(slide.motion in TURNING_MOTIONS for slide in slides):
         return (FULL_CIRCLE,)
@@ -256,37 +199,12 @@ def _levels(slides: Sequence[SlideConditions]) -> dict[str, Interval]:
     for slide in slides:
         for level in slide.levels:
             by_channel[level.channel].append((level.rms, level.lowest, level.highest))
-    found = {channel: _interval(means) for channel, means in by_channel.items()}
+    found = {channel: interval_of(means) for channel, means in by_channel.items()}
     return {channel: interval for channel, interval in found.items() if interval is not None}
-
-
-def _union(trained: Interval | None, added: Interval | None) -> Interval | None:
-    """Return the range of the training with that of added slides; None if the training knew none."""
-    if trained is None or added is None:
-        return trained
-    return min(trained[0], added[0]), max(trained[1], added[1])
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted({name for name in names if name}))
-
-
-def _interval(means: Iterable[Iterable[float]]) -> Interval | None:
-    """Return the range of the means of slides without the odd slides; None if no slide has a known one."""
-    known = [own for slide in means for own in [[mean for mean in slide if math.isfinite(mean)]] if own]
-    if not known:
-        return None
-    low = np.quantile([min(own) for own in known], ODD_SHARE, method='lower')
-    high = np.quantile([max(own) for own in known], 1.0 - ODD_SHARE, method='higher')
-    return float(low), float(high)
-
-
-def _beyond(value: float, interval: Interval | None, margin: float) -> bool:
-    """Return whether a value lies outside an interval widened by a relative margin; False for an unknown one."""
-    if interval is None or math.isnan(value):
-        return False
-    low, high = interval
-    return not low / (1.0 + margin) <= value <= high * (1.0 + margin)
 
 
 def _pair(values: Sequence[Any]) -> Interval:

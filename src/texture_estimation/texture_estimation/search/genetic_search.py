@@ -8,91 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from texture_core.arrays import Array
-from texture_core.parameters import param
 from texture_estimation.search.algorithm import algorithm_for
+from texture_estimation.search.generation import Generation, ScoredIndividual, SearchParams, rank
 from texture_estimation.search.parallel import ParallelMap, serial_map
 from texture_estimation.search.racing import EMPTY, FitnessFunction, HalfScores, race, raced_fitness
 from texture_estimation.search.score_cache import ScoreCache
 from texture_estimation.search.variables import Individual, SearchSpace
 
-OBJECTIVES = ('accuracy', 'front')
 # Halves on which the first generation finds its leader.
 FIRST_LOOK = 4
-
-
-@dataclass(frozen=True)
-class SearchParams:
-    """How long and for what is searched; the defaults are those of Roberge et al.
-
-    Examples
-    --------
-    >>> SearchParams(population=10).population
-    10
-    """
-
-    population: int = param(
-        20, 'Sets the number of individuals in a generation; more search wider and take longer.', low=4, high=1000
-    )
-    generations: int = param(
-        30, 'Sets the number of generations, including the first one; more search longer.', low=1, high=10_000
-    )
-    halves: int = param(20, 'Number of random half splits on which each individual is evaluated.', low=2, high=1000)
-    seed: int = param(
-        0, 'Sets the seed of the random half splits and of the search; equal seeds give equal results.', low=0
-    )
-    objective: str = param(
-        'accuracy',
-        "Sets the objective: 'accuracy', or the Pareto 'front' of accuracy and computing cost (NSGA-II).",
-        choices=OBJECTIVES,
-    )
-    finalists: int = param(
-        3, 'Number of best individuals that are evaluated again with the learner itself.', low=1, high=1000
-    )
-    race: bool = param(True, 'Stop evaluating an individual once it is significantly worse than the best one (racing).')
-
-
-@dataclass(frozen=True)
-class ScoredIndividual:
-    """An individual with its fitness (larger is better), its cost and the number of halves behind the fitness.
-
-    Examples
-    --------
-    >>> best = ScoredIndividual((3, 'svm'), fitness=0.9, cost=1e4, halves=20)
-    >>> generation = Generation(1, of=30, best=best, evaluated=20, cache_hits=0, halves=20)
-    >>> SearchOutcome((best,), (best,), (generation,)).ranked[0].individual
-    (3, 'svm')
-    """
-
-    individual: Individual
-    fitness: float
-    cost: float
-    halves: int
-
-
-@dataclass(frozen=True)
-class Generation:
-    """What is reported after each generation.
-
-    Parameters
-    ----------
-    number, of
-        Of the generation, and how many there will be.
-    best
-        Of the individuals alive.
-    evaluated
-        Different individuals met so far.
-    cache_hits
-        How often one was met again.
-    halves
-        Evaluated so far: `evaluated` times the number of halves, had none been given up early.
-    """
-
-    number: int
-    of: int
-    best: ScoredIndividual
-    evaluated: int
-    cache_hits: int
-    halves: int
 
 
 @dataclass(frozen=True)
@@ -107,6 +31,11 @@ class SearchOutcome:
         Those of it that no other beats in both accuracy and cost, cheapest first.
     history
         One entry a generation.
+
+    Examples
+    --------
+    >>> SearchOutcome(ranked=(), front=(), history=()).history
+    ()
     """
 
     ranked: tuple[ScoredIndividual, ...]
@@ -166,12 +95,12 @@ def search(
         algorithm.tell(infills=offspring)
         known = {**members, **{one.individual: one for one in scored}}
         members = {key: known[key] for key in (space.decode(point) for point in algorithm.pop.get('X'))}
-        best = max(members.values(), key=_rank)
+        best = max(members.values(), key=rank)
         history.append(
             Generation(number, params.generations, best, len(score_cache.records), score_cache.hits, racer.halves)
         )
         tell(history[-1])
-    ranked = tuple(sorted(members.values(), key=_rank, reverse=True))
+    ranked = tuple(sorted(members.values(), key=rank, reverse=True))
     return SearchOutcome(ranked, _front(ranked), tuple(history))
 
 
@@ -238,7 +167,7 @@ class _Racer:
         fair = [one for one in leaders if one.cost <= cost and one.halves == n_halves]
         if not fair:
             return None
-        return self._score_cache.records[max(fair, key=_rank).individual].means[:n_halves]
+        return self._score_cache.records[max(fair, key=rank).individual].means[:n_halves]
 
 
 def _race(case: tuple[FitnessFunction, HalfScores, Array | None, int]) -> HalfScores:
@@ -256,10 +185,6 @@ def _settled(known: HalfScores, incumbent: Array | None, n_halves: int) -> bool:
 
 def _objectives(one: ScoredIndividual, params: SearchParams) -> list[float]:
     return [-one.fitness, one.cost] if params.objective == 'front' else [-one.fitness]
-
-
-def _rank(one: ScoredIndividual) -> tuple[float, float, str]:
-    return one.fitness, -one.cost, str(one.individual)
 
 
 def _front(scored: Sequence[ScoredIndividual]) -> tuple[ScoredIndividual, ...]:

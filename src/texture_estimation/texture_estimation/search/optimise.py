@@ -14,7 +14,8 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.fitness import fitness
-from texture_estimation.search.genetic_search import Generation, ScoredIndividual, SearchOutcome, SearchParams, search
+from texture_estimation.search.generation import Generation, ScoredIndividual, SearchParams
+from texture_estimation.search.genetic_search import SearchOutcome, search
 from texture_estimation.search.parallel import ParallelMap, serial_map
 from texture_estimation.search.racing import FitnessFunction, HalfScores
 from texture_estimation.search.recipe_space import RecipeSpace

@@ -16,7 +16,7 @@ from texture_estimation.recipe import Recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.fitness import UNDECIDED, decided_by_slide, decisions, fitness, shares_right
-from texture_estimation.search.genetic_search import Generation, SearchParams
+from texture_estimation.search.generation import Generation, SearchParams
 from texture_estimation.search.halves import Mask
 from texture_estimation.search.optimise import SearchResult, optimise
 from texture_estimation.search.parallel import ParallelMap, serial_map

@@ -12,7 +12,7 @@ import yaml
 from texture_core.errors import InvalidParameter
 from texture_core.files import writing
 from texture_estimation.recipe import Recipe
-from texture_estimation.search.genetic_search import SearchParams
+from texture_estimation.search.generation import SearchParams
 from texture_estimation.search.joined_pairs import joined_recipe
 from texture_estimation.search.optimise import Finalist, SearchResult
 from texture_estimation.search.pairs import PairSearchResult, beside

@@ -12,43 +12,13 @@ from texture_core.catalogue import find, unknown_name
 from texture_core.errors import InvalidParameter
 from texture_core.plain_data import load_yaml, safe_repr
 from texture_core.resources import find_file
+from texture_estimation.search.recipe_edits import Edit, edit_from, enter_place, path_of
 from texture_estimation.search.search_task import R
 from texture_estimation.search.variables import Categorical, Individual, Integer, LogReal, SearchSpace, Value, Variable
 
 MAX_INCLUDES = 10
 KEYS = ('description', 'include', 'variables')
 PACKAGE, FOLDER = 'texture_estimation', 'config/search'
-
-
-@dataclass(frozen=True)
-class Edit:
-    """One change of a recipe: `path` ('inputs/signal/features/force') is set to a value, used, or dropped.
-
-    Examples
-    --------
-    >>> recipe = {'windows': {'length_s': 0.5}}
-    >>> Edit('set', ('windows', 'length_s'), 1.0).apply(recipe)
-    >>> recipe
-    {'windows': {'length_s': 1.0}}
-    """
-
-    action: str
-    path: tuple[str, ...]
-    value: Any = None
-
-    def apply(self, recipe: dict[str, Any]) -> None:
-        """Change a recipe written as mappings and lists.
-
-        Raises
-        ------
-        InvalidParameter
-            If the recipe has no such place.
-        """
-        *way, last = self.path
-        place: Any = recipe
-        for step in way:
-            place = _enter(place, step, self.path)
-        ACTIONS[self.action](place, last, self.value)
 
 
 @dataclass(frozen=True)
@@ -143,7 +113,7 @@ class RecipeSpace(Generic[R]):
             )
         place: Any = content
         for step in axis.path:
-            place = _enter(place, step, axis.path)
+            place = enter_place(place, step, axis.path)
         try:
             return variable.value(variable.index(place))
         except ValueError:
@@ -193,66 +163,24 @@ def _axis(entry: Any, where: str) -> Axis:
 
 
 def _integer(entry: Mapping[str, Any]) -> Axis:
-    return Axis(Integer(int(entry['low']), int(entry['high'])), _path(entry['set']))
+    return Axis(Integer(int(entry['low']), int(entry['high'])), path_of(entry['set']))
 
 
 def _log(entry: Mapping[str, Any]) -> Axis:
-    return Axis(LogReal(float(entry['low']), float(entry['high'])), _path(entry['set']))
+    return Axis(LogReal(float(entry['low']), float(entry['high'])), path_of(entry['set']))
 
 
 def _choice(entry: Mapping[str, Any]) -> Axis:
     options = entry['options']
     if not isinstance(options, Mapping):
-        return Axis(Categorical(tuple(map(str, options))), _path(entry['set']))
-    edits = {str(option): tuple(_edit(step) for step in steps or ()) for option, steps in options.items()}
+        return Axis(Categorical(tuple(map(str, options))), path_of(entry['set']))
+    edits = {str(option): tuple(edit_from(step) for step in steps or ()) for option, steps in options.items()}
     return Axis(Categorical(tuple(edits)), edits=edits)
 
 
 def _use(entry: Mapping[str, Any]) -> Axis:
-    path = _path(entry['feature'])
+    path = path_of(entry['feature'])
     return Axis(Categorical(('no', 'yes')), edits={'no': (Edit('drop', path),), 'yes': (Edit('use', path),)})
-
-
-def _edit(step: Mapping[str, Any]) -> Edit:
-    [(action, path)] = [(key, value) for key, value in step.items() if key != 'to']
-    find(ACTIONS, str(action), 'change of a recipe')
-    return Edit(str(action), _path(path), step.get('to'))
-
-
-def _path(text: str) -> tuple[str, ...]:
-    return tuple(str(text).split('/'))
-
-
-def _set(place: Any, last: str, value: Any) -> None:
-    old = place.get(last)
-    place[last] = float(value) if isinstance(old, float) and isinstance(value, int) else value
-
-
-def _use_feature(features: list[Any], name: str, value: Any) -> None:
-    if _position(features, name) is None:
-        features.append({name: dict(value or {})})
-
-
-def _drop_feature(features: list[Any], name: str, value: Any) -> None:
-    position = _position(features, name)
-    if position is not None:
-        del features[position]
-
-
-def _position(features: Sequence[Any], name: str) -> int | None:
-    return next((index for index, entry in enumerate(features) if name in entry), None)
-
-
-def _enter(place: Any, step: str, path: Sequence[str]) -> Any:
-    if isinstance(place, list):
-        position = _position(place, step)
-        place = place[position] if position is not None else {}
-    if not isinstance(place, Mapping) or step not in place:
-        raise InvalidParameter(
-            f"the recipe has no '{'/'.join(path)}', which the search varies ('{step}' is not there); "
-            'add it to the recipe, or give a search space that fits with --search'
-        )
-    return place[step]
 
 
 def _extracted(variable: Variable) -> tuple[str, str]:
@@ -262,5 +190,4 @@ def _extracted(variable: Variable) -> tuple[str, str]:
     return kind, f'{variable.value(0):g} to {variable.value(variable.count - 1):g}'
 
 
-ACTIONS = {'set': _set, 'use': _use_feature, 'drop': _drop_feature}
 KINDS = {'integer': _integer, 'log': _log, 'choice': _choice, 'use': _use}

@@ -11,7 +11,7 @@ from scipy.stats import binomtest
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
-from texture_evaluation.cross_validation.cross_validate import (
+from texture_evaluation.cross_validation.cross_validation import (
     CONFIDENCE,
     RESAMPLES,
     CrossValidation,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from texture_evaluation.charts import COLOURS, chart, line_styles
-from texture_evaluation.cross_validation.cross_validate import CrossValidation
+from texture_evaluation.cross_validation.cross_validation import CrossValidation
 from texture_evaluation.metrics import curve
 
 KINDS = (('window', 'single windows', 'o'), ('slide', 'whole slides', 's'))

@@ -6,9 +6,8 @@ Tactile Sensory Data"), cut into one `materialNN.npz` a material.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,60 +16,23 @@ import numpy as np
 from texture_core.arrays import AnyArray, Array
 from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData
-from texture_core.exploration import ExplorationState, Phase
+from texture_core.exploration import Phase
 from texture_core.files import Arrays, open_regular
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_recordings.bag_writer import BagWriter
+from texture_recordings.importers.biotac20_slide import FRAME_NS, SLIDE_FRAMES, BiotacSlide, SlideMotion
 from texture_recordings.slides import parse_selection
 
-FRAME_NS = 10_000_000  # a frame every 10 ms; its recorded times jitter by the host's scheduling
 PAC_PER_FRAME = 22
 PAC_COLUMNS = slice(3, 3 + PAC_PER_FRAME)
 STATIC_CHANNELS = ('tdc', 'tac', 'pdc', *(f'electrode{i}' for i in range(1, 20)))
 STATIC_COLUMNS = (0, 1, 2, *range(25, 44))
-# Every slide is cut to the length of the shortest material, or its length would tell the label. The finger runs at
-# speed from the first frame on.
-SLIDE_FRAMES = 600
 BATCH_FRAMES = 2
 STATE_BATCHES = 5  # a state every 0.1 s
 LOST_AFTER_S = 0.025  # frame times jitter by up to 8 ms; a larger step is a loss
 PAUSE_NS = NANOSECONDS
-LONGEST_S = 1000.0  # of one slide; frames that are missing are counted, however many
-LAST_EPOCH_S = 2.0**31 - 1e6  # a stamp of ROS has 31 bits for seconds, and all slides follow each other
 DELAY_NS = 100_000  # a batch is logged this long after its last sample
 FIELDS = ('frames', 'frame_time', 'velocity', 'wrench')
-NORMAL_FORCE = 2  # column of `wrench`: y of the tool, the one component that presses whatever the direction of travel
-
-
-@dataclass(frozen=True, eq=False)
-class BiotacSlide:
-    """One slide as recorded; the fields of the arrays are named as in the files.
-
-    Examples
-    --------
-    >>> frames, velocity, wrench = np.zeros((3, 44)), np.zeros((5, 4)), np.zeros((5, 7))
-    >>> slide = BiotacSlide('material01', '1', frames, np.array([0.0, 0.01, 0.05]), velocity, wrench, epoch=0.0)
-    >>> frame_indices(slide.frame_time).tolist()  # three frames are missing
-    [0, 1, 5]
-    """
-
-    surface: str
-    slide: str
-    frames: AnyArray  # (n_frames, 44) counts
-    frame_time: AnyArray  # (n_frames,) s
-    velocity: AnyArray  # (m, 4): time s, x, y, z m/s
-    wrench: AnyArray  # (k, 7): time s, fx, fy, fz N, tx, ty, tz N m
-    epoch: float  # Unix time of the first frame, s
-
-    def __post_init__(self) -> None:
-        columns = {'frames': 44, 'velocity': 4, 'wrench': 7}
-        wrong = [name for name, count in columns.items() if np.shape(getattr(self, name))[1:] != (count,)]
-        if wrong or self.frame_time.shape != (len(self.frames),) or not len(self.frames):
-            raise ValueError(f"the arrays of '{self.slide}' have the shapes of no slide")
-        if not np.isfinite(self.frame_time).all() or np.ptp(self.frame_time) > LONGEST_S:
-            raise ValueError(f"the frames of '{self.slide}' are not within {LONGEST_S:g} s")
-        if not 0 <= self.epoch < LAST_EPOCH_S:
-            raise ValueError(f"'{self.slide}' began at {self.epoch:g} s; Unix time from 0 is needed")
 
 
 def import_biotac20(
@@ -170,7 +132,7 @@ def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices:
     frames = recording.frames[: len(indices)]
     vibration = restore_sign(frames[:, PAC_COLUMNS].ravel()).astype(np.float32)[:, None]
     static = frames[:, STATIC_COLUMNS].astype(np.float32)
-    motion = _Motion.of(recording)
+    motion = SlideMotion.of(recording)
     stop_ns = start_ns + int(indices[-1] - indices[0] + 1) * FRAME_NS
     for count, part in enumerate(_batches(indices)):
         first = int(indices[part.start])
@@ -203,40 +165,3 @@ def _signal(part: str, channels: tuple[str, ...], stamp_ns: int, first: int, sam
     return TactileSignal(
         stamp_ns, f'biotac/{part}', channels, ('count',) * len(channels), rate_hz, first, samples, 'biotac'
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Motion:
-    """Speed, direction and normal force over the time of one slide."""
-
-    named: ExplorationState
-    velocity: AnyArray
-    wrench: AnyArray
-
-    @classmethod
-    def of(cls, recording: BiotacSlide) -> _Motion:
-        velocity = recording.velocity[np.isfinite(recording.velocity).all(axis=1)]
-        wrench = recording.wrench[np.isfinite(recording.wrench).all(axis=1)]
-        x, y = velocity[:, 1:3].mean(axis=0) if len(velocity) else (math.nan, math.nan)
-        name = f'{recording.surface}/{recording.slide}'
-        named = ExplorationState(
-            0, name, 'linear_slide', Phase.SLIDE, direction_rad=math.atan2(y, x), surface=recording.surface
-        )
-        return cls(named, velocity, wrench)
-
-    def state(self, start_ns: int, stamp_ns: int, end_ns: int) -> ExplorationState:
-        """Return the state that holds from `stamp_ns` to `end_ns` of a slide that began at `start_ns`."""
-        time_s = (stamp_ns - start_ns) / NANOSECONDS
-        speed = np.hypot(self.velocity[:, 1], self.velocity[:, 2])
-        return replace(
-            self.named,
-            stamp_ns=stamp_ns,
-            steady_s=(end_ns - stamp_ns) / NANOSECONDS,
-            speed_m_s=_at(time_s, self.velocity[:, 0], speed),
-            force_n=_at(time_s, self.wrench[:, 0], self.wrench[:, NORMAL_FORCE]),
-            progress=(stamp_ns - start_ns) / (SLIDE_FRAMES * FRAME_NS),
-        )
-
-
-def _at(time_s: float, times: AnyArray, values: AnyArray) -> float:
-    return float(np.interp(time_s, times, values)) if len(times) else math.nan

@@ -17,10 +17,11 @@ from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
 from texture_recordings.bag_writer import BagWriter
-from texture_recordings.bags import RawMessage, short_name
+from texture_recordings.bags import RawMessage
 from texture_recordings.cdr import SignalDecoder
 from texture_recordings.continuity import Continuity
 from texture_recordings.ros.topics import TOPICS, Topic
+from texture_recordings.topic_names import short_name
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
 POLL_S = 0.2

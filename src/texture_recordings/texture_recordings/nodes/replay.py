@@ -17,10 +17,11 @@ from texture_core.errors import DeviceError, InvalidParameter, TextureError
 from texture_core.parameters import param
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
-from texture_recordings.bags import RawMessage, find_bags, read_named, short_name, topics_in
+from texture_recordings.bags import RawMessage, find_bags, read_named, topics_in
 from texture_recordings.ros.topics import TOPICS
 from texture_recordings.schedule import Schedule
 from texture_recordings.slides import find_slides
+from texture_recordings.topic_names import short_name
 
 # What is derived from these is left out: the live graph derives it again.
 INPUTS = ('signal', 'signal_static', 'exploration')

@@ -12,7 +12,7 @@ import numpy as np
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData
 from texture_core.signal import NANOSECONDS, TactileSignal
-from texture_recordings.tables.mapping import SlideBorders
+from texture_recordings.tables.table_columns import SlideBorders
 
 DETECTION_BATCH = 1000  # rows
 

@@ -18,12 +18,13 @@ from texture_core.labels import checked_label
 from texture_core.signal import MAX_HZ
 from texture_recordings.bags import is_bag
 from texture_recordings.tables.borders import SlideRows, spans
-from texture_recordings.tables.mapping import CONDITION_UNITS, TIME_UNITS, Quantity, StreamColumns, TableMapping
+from texture_recordings.tables.mapping import CONDITION_UNITS, TableMapping
 from texture_recordings.tables.name_template import NameTemplate
 from texture_recordings.tables.readers.catalogue import BAG, READERS
 from texture_recordings.tables.report import ImportReport, StreamCounts
 from texture_recordings.tables.slide_bags import ImportedSlide, SlideBags, StateSpan, StreamSamples
 from texture_recordings.tables.table import Columns, Table, TableReader
+from texture_recordings.tables.table_columns import TIME_UNITS, Quantity, StreamColumns
 from texture_recordings.tables.time_grid import estimated_rate_hz, on_grid, repaired
 
 MAX_FILES = 100_000

@@ -17,7 +17,8 @@ from texture_core.parameters import param
 from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
 from texture_core.ros.parameters import declare, on_change
 from texture_core.ros.run import run
-from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm, TwistControllerParams
+from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm
+from texture_simulation.devices.twist_controller_params import TwistControllerParams
 
 
 @dataclass(frozen=True)

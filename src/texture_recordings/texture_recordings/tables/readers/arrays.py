@@ -10,9 +10,10 @@ import numpy as np
 
 from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
-from texture_recordings.tables.mapping import FileFormat, TableMapping
+from texture_recordings.tables.mapping import TableMapping
 from texture_recordings.tables.name_template import NameTemplate
 from texture_recordings.tables.table import EXAMPLES, Columns, MalformedRow, Table, check_size
+from texture_recordings.tables.table_columns import FileFormat
 
 TRIAL = 'trial'  # number of the first axis of arrays (n_trials, n_samples, n_channels)
 MAX_COLUMNS = 10_000

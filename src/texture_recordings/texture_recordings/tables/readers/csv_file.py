@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -15,25 +12,23 @@ import numpy as np
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData
-from texture_core.files import FileRefused, open_regular
-from texture_recordings.tables.mapping import FileFormat, TableMapping
+from texture_recordings.tables.mapping import TableMapping
+from texture_recordings.tables.readers.csv_cells import Line, fill_gaps, likely_delimiter, open_lines, split_cells
 from texture_recordings.tables.table import EXAMPLES, Columns, MalformedRow, Table, check_size
+from texture_recordings.tables.table_columns import FileFormat
 
-DELIMITERS = (',', ';', '\t', '|', ' ')
-MAX_LINE = 1_000_000  # characters; a longer line is cut and thereby malformed
 MAX_COLUMNS = 10_000
 MAX_TEXT = 200  # characters of a cell that is shown or a label
 BLOCK_ROWS = 20_000
-Line = tuple[int, str]  # its number in the file, from 1
 
 
 def read_csv(path: Path, place: str, mapping: TableMapping) -> Iterator[Table]:
     """Yield the one table of a text file."""
     form = mapping.format
-    with _lines(path, place, form) as lines:
+    with open_lines(path, place, form) as lines:
         _, first = next(lines, (0, ''))
-        delimiter = form.delimiter or _delimiter(first)
-        cells = _cells(first, delimiter)
+        delimiter = form.delimiter or likely_delimiter(first)
+        cells = split_cells(first, delimiter)
     if not first or len(cells) > MAX_COLUMNS:
         raise InvalidData(f"'{place}' has {len(cells) if first else 'no'} columns; 1 to {MAX_COLUMNS} are needed")
     names = cells if form.header else [str(number) for number in range(len(cells))]
@@ -49,7 +44,7 @@ def _read(path: Path, place: str, form: FileFormat, names: Sequence[str], *wante
     blocks: list[_Block] = []
     malformed: list[MalformedRow] = []
     values = 0
-    with _lines(path, place, form) as lines:
+    with open_lines(path, place, form) as lines:
         if form.header:
             next(lines, None)
         while rows := list(islice(lines, BLOCK_ROWS)):
@@ -64,7 +59,7 @@ def _read(path: Path, place: str, form: FileFormat, names: Sequence[str], *wante
         raise InvalidData(f"'{place}' has no rows below the names of its columns; choose files with samples")
     return Columns(
         {name: np.concatenate([block.numbers[name] for block in blocks]) for name in numbers},
-        {name: _filled(np.concatenate([block.texts[name] for block in blocks])) for name in texts},
+        {name: fill_gaps(np.concatenate([block.texts[name] for block in blocks])) for name in texts},
         np.concatenate([block.rows for block in blocks]),
         malformed,
     )
@@ -80,7 +75,7 @@ class _Block:
         self.texts: dict[str, AnyArray] = {}
         self.malformed: list[MalformedRow] = []
         for number, line in rows:
-            cells = _cells(line, delimiter)
+            cells = split_cells(line, delimiter)
             self.cells.append(cells if len(cells) == width else None)
             if len(cells) != width:
                 self._note(number, 'all', f'{len(cells)} cells, {width} are needed')
@@ -124,47 +119,3 @@ def _number(cell: str) -> float:
         return float(cell)
     except ValueError:
         return float('nan')
-
-
-def _filled(texts: AnyArray) -> AnyArray:
-    """Return texts in which a malformed row has the one before it: no border is seen there."""
-    known = np.array([text is not None for text in texts])
-    if not known.any():
-        return np.full(len(texts), '', dtype=str)
-    last = np.maximum.accumulate(np.where(known, np.arange(len(texts)), -1))
-    last[last < 0] = int(np.argmax(known))
-    filled: AnyArray = texts[last].astype(str)
-    return filled
-
-
-@contextmanager
-def _lines(path: Path, place: str, form: FileFormat) -> Iterator[Iterator[Line]]:
-    """Give the lines that are neither empty nor comments, each with its number."""
-    try:
-        with open_regular(path) as opened, io.TextIOWrapper(opened, 'utf-8-sig', 'replace', newline=None) as text:
-            yield _kept(text, form)
-    except (OSError, FileRefused) as error:
-        raise InvalidData(f"'{place}' cannot be read: {error}; give a text file") from error
-
-
-def _kept(text: io.TextIOWrapper, form: FileFormat) -> Iterator[Line]:
-    for number, line in enumerate(iter(partial(text.readline, MAX_LINE), ''), 1):
-        bare = line.rstrip('\r\n')
-        if number > form.skip_rows and bare.strip() and not (form.comment and bare.startswith(form.comment)):
-            yield number, bare
-
-
-def _delimiter(line: str) -> str:
-    counts = {delimiter: line.count(delimiter) for delimiter in DELIMITERS}
-    return next((delimiter for delimiter in DELIMITERS[:-1] if counts[delimiter]), ' ' if counts[' '] else ',')
-
-
-def _cells(line: str, delimiter: str) -> list[str]:
-    if delimiter == ' ':
-        return line.split()
-    if '"' not in line:
-        return [cell.strip() for cell in line.split(delimiter)]
-    try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
-    except csv.Error:
-        return []

@@ -1,0 +1,76 @@
+"""Split labelled slides into folds of training and test slides."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import AnyArray
+from texture_core.errors import InvalidData
+from texture_evaluation.cross_validation.splits import Splitter
+from texture_recordings.slide_dataset import SlideDataset
+
+
+def split_slides(
+    dataset: SlideDataset, splitter: Splitter, groups: str | AnyArray = 'slide'
+) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Return the training and test slides of each split, by their place in the data set.
+
+    Parameters
+    ----------
+    dataset
+        The slides.
+    splitter
+        One of scikit-learn's, or a `ChronologicalSplit`.
+    groups
+        As in `cross_validate`.
+
+    Returns
+    -------
+    list of ((n_train,), (n_test,))
+        Indices of slides.
+
+    Raises
+    ------
+    InvalidData
+        If the slides cannot be split so.
+    """
+    labels, columns = dataset.labels, slide_groups(dataset, groups)
+    folds = getattr(splitter, 'n_splits', 1)
+    names, counts = np.unique(labels, return_counts=True)
+    if type(splitter).__name__.startswith('Stratified') and counts.min() < folds:
+        raise InvalidData(
+            f"'{names[counts.argmin()]}' has {counts.min()} slides, too few for {folds} folds; "
+            'use fewer folds or record more slides'
+        )
+    try:
+        return list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
+    except ValueError as error:
+        raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
+
+
+def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:
+    """Return the group of each slide.
+
+    Parameters
+    ----------
+    groups
+        'slide', the name of a condition, or one value for each slide.
+
+    Returns
+    -------
+    (n_slides,)
+
+    Raises
+    ------
+    InvalidData
+        If there are not as many values as slides.
+    """
+    if isinstance(groups, str):
+        return dataset.names if groups == 'slide' else dataset.condition(groups)
+    columns = np.asarray(groups)
+    if columns.shape != (len(dataset),):
+        raise InvalidData(
+            f'groups have the shape {columns.shape}; one value for each of {len(dataset)} slides is needed'
+        )
+    return columns
