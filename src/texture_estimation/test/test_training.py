@@ -196,6 +196,15 @@ def test_a_recipe_without_augmentation_ignores_copies(make_examples):
     np.testing.assert_array_equal(with_copies.parameters['hidden'], without.parameters['hidden'])
 
 
+def test_an_augmented_network_learns_windows_of_other_lengths_too(make_examples):
+    examples, shorter = make_examples(), make_examples(seed=1, labels=('cork', 'felt', 'wood', 'slate'), windows=3)
+    moved = dataclasses.replace(shorter, values=shorter.values + 10.0)
+    recipe = dataclasses.replace(RECIPE, augmentation=Augmentation(copies=2))
+    alone = augmented(examples, np.zeros(6))
+    wider = dataclasses.replace(alone, resized=moved)
+    assert accuracy(train(recipe, wider), moved) > 0.9 > accuracy(train(recipe, alone), moved)
+
+
 def test_windows_of_other_lengths_train_the_learner_and_decide_nothing_else(make_examples):
     examples, shorter = make_examples(), make_examples(seed=1, labels=('cork', 'felt', 'wood', 'slate'), windows=3)
     moved = dataclasses.replace(shorter, values=shorter.values + 10.0)

@@ -12,7 +12,7 @@ from texture_core.errors import InvalidParameter
 from texture_core.parameters import from_mapping, param
 from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, EvidenceRule
 from texture_estimation.learners.catalogue import LEARNERS
-from texture_estimation.learners.learner import Learner
+from texture_estimation.learners.learner import Learner, extras_of
 from texture_estimation.open_set.domain_margins import DomainMargins
 from texture_estimation.open_set.stopping_rule import NEVER
 from texture_features.augmentation.augmentation import Augmentation
@@ -23,7 +23,6 @@ from texture_features.windowing.windows import WindowParams
 
 KEYS = ('description', 'windows', 'inputs', 'learner', 'evidence', 'training')
 AUGMENTATION = 'augmentation'  # section within `training`
-AUGMENTABLE = ('mlp',)
 SPEEDS = 5  # from the slowest to the fastest, for windows of as many lengths
 
 
@@ -213,7 +212,7 @@ class Recipe:
         learner = choose(LEARNERS, content.get('learner', 'svm_rbf'), 'learner', where)
         evidence = choose(EVIDENCE_RULES, content.get('evidence', 'soft_vote'), 'evidence rule', where)
         training, augmentation = _training(content.get('training') or {}, where)
-        if augmentation.copies and learner[0] not in AUGMENTABLE:
+        if augmentation.copies and 'augmented' not in extras_of(learner[1]):
             raise InvalidParameter(
                 f"{where}: training is augmented, but learner '{learner[0]}' cannot be trained so; use 'mlp' or remove "
                 "the section 'augmentation'"

@@ -12,13 +12,11 @@ from scipy.optimize import minimize_scalar
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_estimation.classification.evidence_rules import EvidenceRule, deciding_rows, running_means
+from texture_estimation.classification.learner_fitting import fit_learner
 from texture_estimation.classification.novelty_training import SlideTrace, fit_novelty
 from texture_estimation.group_means import group_means
 from texture_estimation.incremental.training_examples import TrainingExamples
-from texture_estimation.learners.augmented_examples import AugmentedExamples
 from texture_estimation.learners.learner import Codes, Fitted, of_examples
-from texture_estimation.learners.mlp import Mlp
-from texture_estimation.learners.svm_rbf import SvmRbf
 from texture_estimation.log_probabilities import is_tied, log_loss
 from texture_estimation.model import TextureModel
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
@@ -31,7 +29,6 @@ from texture_features.slide_conditions import SlideConditions
 
 # Of windows that share a slide when nothing could be held out: between "all the same" (0) and independent (1).
 DEFAULT_TEMPERING_EXPONENT = 0.5
-MIN_SLIDES = 2
 
 
 def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> TextureModel:
@@ -65,7 +62,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     labels, codes = np.unique(examples.labels, return_inverse=True)
     slides, groups = np.unique(examples.groups, return_inverse=True)
     trained = replace(recipe, learner=of_examples(recipe.learner, examples.names, labels.tolist()))
-    fitted = _fit(trained, examples, codes, groups)
+    fitted = fit_learner(trained, examples, codes, groups)
     overlap = min(examples.hop_s / examples.window_s, 1.0)
     slides_held_out = _held_out_slides(fitted, codes, groups, recipe.evidence, overlap)
     tempering_exponent = _fit_tempering_exponent(slides_held_out, recipe.evidence)
@@ -110,94 +107,6 @@ def _check(examples: LabelledFeatures) -> None:
             f"feature '{name}' and {int(bad.sum()) - 1} others are not finite in {windows} of {len(examples.labels)} "
             'windows; leave these features out of the recipe, or these windows out of the examples'
         )
-
-
-def _fit(recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes) -> Fitted:
-    """Let the learner learn, the windows that begin within the length of one counting more often.
-
-    Not where a label has a single slide: its windows are held out one by one, and must not be there twice.
-    """
-    if min(len(np.unique(groups[codes == code])) for code in np.unique(codes)) < MIN_SLIDES:
-        return recipe.learner.fit(examples.values, codes, groups)
-    times = _times(groups, examples, recipe.training.start_weight)
-    own = np.cumsum(times) - times
-    rows = np.repeat(np.arange(len(codes)), times)
-    augmented = _augmented_examples(recipe, examples, codes, groups)
-    if augmented is not None and isinstance(recipe.learner, Mlp):
-        fitted = recipe.learner.fit(examples.values[rows], codes[rows], groups[rows], augmented)
-    elif isinstance(recipe.learner, SvmRbf):
-        differences = _touch_differences(examples, groups)
-        fitted = recipe.learner.fit(*_with_resized(examples, codes, groups, rows), differences)
-    else:
-        fitted = recipe.learner.fit(*_with_resized(examples, codes, groups, rows))
-    if fitted.held_out is None:
-        return fitted
-    return replace(fitted, held_out=fitted.held_out[own])
-
-
-def _with_resized(examples: LabelledFeatures, codes: Codes, groups: Codes, rows: Codes) -> tuple[Array, Codes, Codes]:
-    """Return features, labels and slides of these windows, and behind them those of the windows of other lengths."""
-    taken = examples.values[rows], codes[rows], groups[rows]
-    if examples.resized is None:
-        return taken
-    names, first = np.unique(examples.groups, return_index=True)
-    own = np.isin(examples.resized.groups, names)
-    slides = np.searchsorted(names, examples.resized.groups[own])
-    further = examples.resized.values[own], codes[first][slides], slides
-    return (
-        np.concatenate([taken[0], further[0]]),
-        np.concatenate([taken[1], further[1]]),
-        np.concatenate([taken[2], further[2]]),
-    )
-
-
-def _touch_differences(examples: LabelledFeatures, groups: Codes) -> Array | None:
-    """Return by number of the slide how it differs from its touch before the finger moved; NaN where there is none."""
-    if not examples.touches:
-        return None
-    means = group_means(examples.values, groups)
-    unknown = np.full(means.shape[1], np.nan)
-    touches = [examples.touches.get(slide, unknown) for slide in np.unique(examples.groups).tolist()]
-    differences: Array = means - np.stack(touches)
-    return differences
-
-
-def _times(runs: Codes, examples: LabelledFeatures, start_weight: int) -> Codes:
-    """Return how often each window counts, (n,): more often those that begin within the length of the first one.
-
-    `runs` are the numbers of the slides or copies to which the windows belong, (n,).
-    """
-    starting = max(1, round(examples.window_s / examples.hop_s))
-    times = np.ones(len(runs), dtype=np.intp)
-    for run in np.unique(runs):
-        times[np.flatnonzero(runs == run)[:starting]] = start_weight
-    return times
-
-
-def _augmented_examples(
-    recipe: Recipe, examples: LabelledFeatures, codes: Codes, groups: Codes
-) -> AugmentedExamples | None:
-    """Return what the learner draws besides the examples; None without augmentation or without copies of the slides."""
-    if examples.augmented is None or not recipe.augmentation.copies:
-        return None
-    copies = examples.augmented.copies
-    names, first = np.unique(examples.groups, return_index=True)
-    own = np.isin(copies.groups, names)
-    copied = np.searchsorted(names, copies.groups[own])
-    runs = np.unique(np.stack([copied, copies.copies[own]]), axis=1, return_inverse=True)[1].reshape(-1)
-    means = group_means(examples.values, groups)
-    classes = codes[first]
-    centres = np.stack([means[classes == code].mean(axis=0) for code in range(int(codes.max()) + 1)])
-    return AugmentedExamples(
-        values=copies.values[own],
-        codes=classes[copied],
-        groups=copied,
-        rows=np.repeat(np.arange(len(copied)), _times(runs, examples, recipe.training.start_weight)),
-        gain_response=examples.augmented.gain_response,
-        slide_deviations=means - centres[classes],
-        slides=np.arange(len(names)),
-        augmentation=recipe.augmentation,
-    )
 
 
 @dataclass(frozen=True, eq=False)

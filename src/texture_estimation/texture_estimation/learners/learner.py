@@ -111,7 +111,10 @@ class Fitted:
 
 
 class Learner(Protocol):
-    """Frozen parameters of a learner."""
+    """Frozen parameters of a learner.
+
+    `fit` may take more keyword arguments than here; a learner names them in a class variable `extras`.
+    """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -159,3 +162,13 @@ def of_examples(learner: Learner, names: Sequence[str], labels: Sequence[str]) -
     """
     bind: Callable[[Sequence[str], Sequence[str]], Learner] | None = getattr(learner, 'of_examples', None)
     return bind(names, labels) if bind else learner
+
+
+def extras_of(learner: Learner | type[Learner]) -> tuple[str, ...]:
+    """Return the names of the keyword arguments that `fit` of a learner takes besides the examples.
+
+    A learner declares them in its class variable `extras`: 'augmented' for copies of the slides to draw from,
+    'differences' for what sets slides apart without being of their texture. Most learners take none.
+    """
+    names: tuple[str, ...] = getattr(learner, 'extras', ())
+    return names

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,8 @@ class Mlp:
     >>> isinstance(predictor, MlpPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
     (True, True)
     """
+
+    extras: ClassVar[tuple[str, ...]] = ('augmented',)
 
     hidden: int = param(
         128,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -34,6 +34,8 @@ class SvmRbf:
     >>> SvmRbf.predictor(fitted.parameters)(values).argmax(axis=1).tolist() == codes.tolist()
     True
     """
+
+    extras: ClassVar[tuple[str, ...]] = ('differences',)
 
     c: float = param(
         10.0,
