@@ -9,7 +9,7 @@ from texture_benchmarks.catalogue import run_benchmark
 from texture_benchmarks.papers import Experiment, run_experiment
 from texture_benchmarks.papers.roughness_answers import Answers
 from texture_benchmarks.result import BenchmarkOptions
-from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 
 
 @pytest.fixture(scope='module')

@@ -8,7 +8,7 @@ import pytest
 from texture_core.resources import folder
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
-from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.exploration import Exploration, no_signal_watch
 from texture_exploration.motions.catalogue import MOTIONS

@@ -18,7 +18,7 @@ from texture_core.resources import folder  # noqa: E402
 from texture_estimation.classification.training import train  # noqa: E402
 from texture_estimation.recipe import load_recipe  # noqa: E402
 from texture_estimation.roughness.grades import read_grades  # noqa: E402
-from texture_estimation.roughness.recipe import load_roughness_recipe  # noqa: E402
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe  # noqa: E402
 from texture_estimation.roughness.training import train_grades  # noqa: E402
 from texture_exploration.presets import load_preset  # noqa: E402
 from texture_features.labelled_features import LabelledFeatures  # noqa: E402

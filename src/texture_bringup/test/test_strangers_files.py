@@ -50,7 +50,7 @@ from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import Grades, read_grades
 from texture_estimation.roughness.model import load_roughness_model
-from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
 from texture_estimation.search.racing import HalfScores
 from texture_estimation.search.recipe_space import RecipeSpace

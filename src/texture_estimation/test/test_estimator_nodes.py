@@ -21,7 +21,7 @@ from texture_estimation.nodes.roughness_estimator import RoughnessEstimator
 from texture_estimation.recipe import Recipe
 from texture_estimation.roughness.evidence import RoughnessAccumulator
 from texture_estimation.roughness.grades import Grades
-from texture_estimation.roughness.recipe import RoughnessRecipe
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
 from texture_estimation.roughness.training import train_grades
 from texture_features.labelled_features import LabelledFeatures
 

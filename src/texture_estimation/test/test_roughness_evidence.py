@@ -12,7 +12,7 @@ from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.evidence import NO_MODEL, NO_WINDOW, SILENT, RoughnessAccumulator
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.model import NORMAL_90, load_roughness_model
-from texture_estimation.roughness.recipe import RoughnessRecipe
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
 from texture_estimation.roughness.training import hold_out, train_grades
 from texture_features.labelled_features import LabelledFeatures
 

@@ -8,7 +8,7 @@ from texture_estimation.roughness.catalogue import REGRESSORS
 from texture_estimation.roughness.gaussian_process import GaussianProcess
 from texture_estimation.roughness.grade_votes import mean_of_votes
 from texture_estimation.roughness.grades import read_grades
-from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe, load_roughness_recipe
 from texture_estimation.roughness.svm5 import Svm5
 
 SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/roughness').glob('*.yaml'))

@@ -4,7 +4,7 @@ import pytest
 from texture_estimation.roughness.ann1 import Ann1
 from texture_estimation.roughness.ann5 import Ann5
 from texture_estimation.roughness.grades import Grades
-from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 from texture_estimation.roughness.svm5 import Svm5
 from texture_estimation.search.generation import SearchParams
 from texture_estimation.search.halves import random_halves

@@ -13,7 +13,7 @@ from texture_core.errors import InvalidData, InvalidParameter
 from texture_estimation.channels import with_channels
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.grades import read_grades
-from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe, load_roughness_recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.generation import Generation, SearchParams
 from texture_estimation.search.labelled_windows import Cut, LabelledWindows

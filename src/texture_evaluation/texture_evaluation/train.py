@@ -13,7 +13,7 @@ from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.roughness.grades import read_grades
 from texture_estimation.roughness.model import RoughnessModel
-from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
 from texture_features.labelled_features import LabelledFeatures
 from texture_recordings.bags import find_bags

@@ -33,7 +33,7 @@ from texture_benchmarks.recipes.trial import all_at_rate, comparable, latency_us
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData
 from texture_estimation.channels import with_channels
-from texture_estimation.classification.training import DEFAULT_TEMPERING_EXPONENT
+from texture_estimation.classification.decision_fitting import DEFAULT_TEMPERING_EXPONENT
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_features.labelled_features import LabelledFeatures

@@ -8,7 +8,7 @@ from typing import Any
 
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import read_grades
-from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 from texture_estimation.search.classification_task import ClassificationTask
 from texture_estimation.search.generation import SearchParams
 from texture_estimation.search.recipe_space import RecipeSpace

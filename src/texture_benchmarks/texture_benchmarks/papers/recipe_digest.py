@@ -9,7 +9,7 @@ from typing import Any
 
 from texture_core.errors import UnknownName
 from texture_estimation.recipe import load_recipe
-from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 
 # What of `training` decides the label after a whole slide. The rest says when a slide ends early, or what is outside.
 TRAINING = frozenset({'augmentation', 'false_rejection_rate', 'hop_s', 'start_weight'})

@@ -22,7 +22,7 @@ from texture_benchmarks.papers.roughness_tuning import TARGET_S, TunedRegressor,
 from texture_benchmarks.roughness.grade_latency import times_us
 from texture_estimation.roughness.grades import TEST, TRAIN, read_grades
 from texture_estimation.roughness.model import RoughnessModel
-from texture_estimation.roughness.recipe import RoughnessRecipe, load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe, load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
 from texture_features.labelled_features import LabelledFeatures
 from texture_simulation.effects.skids import Skids

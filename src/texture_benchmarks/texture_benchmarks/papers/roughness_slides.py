@@ -13,7 +13,7 @@ from texture_core.catalogue import find
 from texture_core.window import Window
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.model import RoughnessModel
-from texture_estimation.roughness.recipe import RoughnessRecipe
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
 from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
 from texture_features.feature_set import FeatureSet
 from texture_features.labelled_features import LabelledFeatures

@@ -7,7 +7,7 @@ from typing import Any
 from texture_benchmarks.papers import tuning
 from texture_benchmarks.papers.tuning import TunedRecipe
 from texture_estimation.roughness.grades import Grades
-from texture_estimation.roughness.recipe import RoughnessRecipe
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
 from texture_estimation.search.recipe_space import RecipeSpace
 from texture_estimation.search.roughness_task import RoughnessTask
 from texture_estimation.search.slide_arrays import SlideArrays

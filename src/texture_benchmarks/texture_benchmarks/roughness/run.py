@@ -9,7 +9,7 @@ from texture_benchmarks.papers.roughness_slides import FORCE_N, SPEED_M_S, USED_
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.roughness.grade_latency import times_us
 from texture_estimation.roughness.grades import TEST, TRAIN, read_grades
-from texture_estimation.roughness.recipe import load_roughness_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
 from texture_simulation.scene import load_scene
 

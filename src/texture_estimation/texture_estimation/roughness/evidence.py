@@ -31,7 +31,7 @@ class RoughnessAccumulator:
     Examples
     --------
     >>> import numpy as np
-    >>> from texture_estimation.roughness.recipe import RoughnessRecipe
+    >>> from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
     >>> from texture_estimation.roughness.training import train_grades
     >>> from texture_estimation.roughness.grades import Grades
     >>> from texture_features.labelled_features import LabelledFeatures

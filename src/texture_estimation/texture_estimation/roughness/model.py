@@ -15,8 +15,8 @@ from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch
 from texture_estimation import model_files
 from texture_estimation.roughness.checks import Checks, graded_columns
-from texture_estimation.roughness.recipe import RoughnessRecipe
 from texture_estimation.roughness.regressor import RegressorPredictor
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
 
 NORMAL_90 = 1.6449  # a normal value lies so many standard deviations around its mean in 90 of 100 cases
 
@@ -103,7 +103,7 @@ class RoughnessModel:
     Examples
     --------
     >>> import numpy as np
-    >>> from texture_estimation.roughness.recipe import RoughnessRecipe
+    >>> from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
     >>> from texture_estimation.roughness.training import train_grades
     >>> from texture_estimation.roughness.grades import Grades
     >>> from texture_features.labelled_features import LabelledFeatures

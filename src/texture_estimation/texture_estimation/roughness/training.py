@@ -15,8 +15,8 @@ from texture_estimation.learners.learner import Codes
 from texture_estimation.roughness.checks import graded_columns, limits_of
 from texture_estimation.roughness.grades import Grades
 from texture_estimation.roughness.model import NORMAL_90, Calibration, RoughnessModel
-from texture_estimation.roughness.recipe import RoughnessRecipe
 from texture_estimation.roughness.regressor import RoughnessRegressor
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
 from texture_features.labelled_features import LabelledFeatures
 
 MIN_TEXTURES = 4  # to hold one out and train on the others

@@ -10,8 +10,8 @@ import numpy as np
 from texture_core.arrays import Array
 from texture_estimation.roughness.checks import LEVEL, STICK_SLIP
 from texture_estimation.roughness.grades import Grades
-from texture_estimation.roughness.recipe import RoughnessRecipe
 from texture_estimation.roughness.regressor import GRADES
+from texture_estimation.roughness.roughness_recipe import RoughnessRecipe
 from texture_estimation.search.cost import operations
 from texture_estimation.search.halves import Mask
 from texture_estimation.search.labelled_windows import LabelledWindows
