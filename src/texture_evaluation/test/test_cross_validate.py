@@ -8,9 +8,9 @@ from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, Stratif
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_estimation.recipe import Recipe
 from texture_evaluation.commands.evaluation_text import table
+from texture_evaluation.cross_validation.accuracy_figures import interval, slide_counts
 from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
 from texture_evaluation.cross_validation.cross_validate import cross_validate
-from texture_evaluation.cross_validation.cross_validation import interval, slide_counts
 from texture_evaluation.cross_validation.splits import parse_split
 from texture_evaluation.evaluate import evaluate_dataset
 from texture_evaluation.metrics import SlideResult
@@ -51,6 +51,19 @@ def test_tones_are_told_apart_in_every_fold() -> None:
     assert [fold['window_accuracy'] for fold in figures['folds']] == [1.0] * 3
     assert figures['n_slides'] == 24
     assert figures['window_accuracy_interval'] == [1.0, 1.0]
+
+
+def test_each_fold_and_each_time_has_an_interval_around_its_share() -> None:
+    figures = cross_validate(RECIPE, tones(9, shuffled=True), LeaveOneGroupOut(), groups='speed').as_json()
+    for row in (figures, *figures['folds']):
+        shares = {name: row[f'{name}_accuracy'] for name in ('window', 'slide')}
+        for name, share in shares.items():
+            low, high = row[f'{name}_accuracy_interval']
+            assert low <= share <= high
+            assert high - low > 0.1  # few slides by chance alone: no narrow interval
+        low, high = row['accuracy_at_s_interval']['0.5']
+        assert low <= row['accuracy_at_s']['0.5'] <= high
+        assert row['accuracy_at_s_interval']['5.0'] is None  # no slide is so long
 
 
 def test_shuffled_labels_are_recognised_by_chance_alone() -> None:

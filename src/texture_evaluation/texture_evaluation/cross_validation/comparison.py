@@ -11,13 +11,8 @@ from scipy.stats import binomtest
 
 from texture_core.arrays import Array
 from texture_core.errors import InvalidData
-from texture_evaluation.cross_validation.cross_validation import (
-    CONFIDENCE,
-    RESAMPLES,
-    CrossValidation,
-    slide_counts,
-    window_counts,
-)
+from texture_evaluation.cross_validation.accuracy_figures import CONFIDENCE, RESAMPLES, slide_counts, window_counts
+from texture_evaluation.cross_validation.cross_validation import CrossValidation
 
 
 @dataclass(frozen=True)

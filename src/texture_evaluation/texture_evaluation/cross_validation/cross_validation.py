@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from texture_core.arrays import Array
 from texture_core.plain_data import write_json
 from texture_estimation.model import TextureModel
 from texture_evaluation import metrics
+from texture_evaluation.cross_validation.accuracy_figures import figures
 from texture_evaluation.metrics import SlideResult
-
-RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +66,10 @@ class CrossValidation:
         return [result for fold in self.folds for result in fold.results.values()]
 
     def as_json(self) -> dict[str, Any]:
-        """Return the pooled figures with 95 % intervals, those of each fold, and the label of each test slide."""
+        """Return the pooled figures, those of each fold, all with 95 % intervals, and the label of each test slide."""
         return {
             'recipe': self.recipe,
             **figures(self.pooled),
-            'window_accuracy_interval': interval(self.pooled, window_counts),
-            'slide_accuracy_interval': interval(self.pooled, slide_counts),
             'labels': list(self.labels),
             'confusion': metrics.confusion(self.pooled, self.labels).tolist(),
             'folds': [
@@ -93,56 +87,3 @@ class CrossValidation:
     def write(self, path: str | Path) -> None:
         """Write the figures as JSON; InvalidParameter if the file cannot be written."""
         write_json(self.as_json(), path)
-
-
-def figures(results: Sequence[SlideResult]) -> dict[str, Any]:
-    """Return the shares of windows and slides that are right, and how many slides there are; None without slides."""
-    return {
-        'n_slides': len(results),
-        'n_windows': sum(len(result.window_labels) for result in results),
-        'window_accuracy': metrics.window_accuracy(results) if results else None,
-        'slide_accuracy': metrics.accuracy_at_end(results) if results else None,
-        'accuracy_at_s': dict(metrics.accuracy_at_times(results)),
-    }
-
-
-def interval(results: Sequence[SlideResult], counts: Callable[[Sequence[SlideResult]], Array]) -> list[float]:
-    """Return the 95 % interval of a share by bootstrap over slides: windows of a slide are not independent.
-
-    Parameters
-    ----------
-    results
-        Of the test slides.
-    counts
-        Gives right and all answers of each slide, (n_slides, 2).
-
-    Source: Efron & Tibshirani 1993, chapter 13 (percentile interval).
-    """
-    pairs = counts(results)
-    drawn = np.random.default_rng(0).integers(len(pairs), size=(RESAMPLES, len(pairs)))
-    sums = pairs[drawn].sum(axis=1)
-    edges = np.quantile(sums[:, 0] / sums[:, 1], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
-    return [float(edge) for edge in edges]
-
-
-def window_counts(results: Sequence[SlideResult]) -> Array:
-    """Return right and all windows of each slide, (n_slides, 2).
-
-    Returns
-    -------
-    (n_slides, 2)
-        Whole numbers.
-    """
-    counts = [(sum(label == one.surface for label in one.window_labels), len(one.window_labels)) for one in results]
-    return np.array(counts, dtype=np.float64)
-
-
-def slide_counts(results: Sequence[SlideResult]) -> Array:
-    """Return whether each slide is right, and 1, (n_slides, 2).
-
-    Returns
-    -------
-    (n_slides, 2)
-        0 or 1, and 1.
-    """
-    return np.array([(one.estimates[-1].label == one.surface, 1) for one in results], dtype=np.float64)

@@ -1,0 +1,92 @@
+"""Shares of windows and slides that are right, with 95 % intervals by bootstrap over slides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_evaluation import metrics
+from texture_evaluation.metrics import SlideResult
+
+RESAMPLES, CONFIDENCE = 2000, 0.95  # of the bootstrap
+
+
+def figures(results: Sequence[SlideResult]) -> dict[str, Any]:
+    """Return the shares of windows and slides that are right, with 95 % intervals, and how many slides there are.
+
+    Parameters
+    ----------
+    results
+        Of the test slides.
+
+    Returns
+    -------
+    dict
+        A share is None where no slide is long enough, and so is its interval.
+    """
+    return {
+        'n_slides': len(results),
+        'n_windows': sum(len(result.window_labels) for result in results),
+        'window_accuracy': metrics.window_accuracy(results) if results else None,
+        'slide_accuracy': metrics.accuracy_at_end(results) if results else None,
+        'accuracy_at_s': dict(metrics.accuracy_at_times(results)),
+        'window_accuracy_interval': interval(results, window_counts) if results else None,
+        'slide_accuracy_interval': interval(results, slide_counts) if results else None,
+        'accuracy_at_s_interval': {f'{seconds:.1f}': _interval_at(results, seconds) for seconds in metrics.TIMES_S},
+    }
+
+
+def _interval_at(results: Sequence[SlideResult], seconds: float) -> list[float] | None:
+    """Return the interval of `metrics.accuracy_at`, over the slides that are long enough; None without any."""
+    ends = [(result.surface, result.after(seconds)) for result in results]
+    right = [(end.label == surface, 1) for surface, end in ends if end is not None]
+    return _bootstrap(np.array(right, dtype=np.float64)) if right else None
+
+
+def interval(results: Sequence[SlideResult], counts: Callable[[Sequence[SlideResult]], Array]) -> list[float]:
+    """Return the 95 % interval of a share by bootstrap over slides: windows of a slide are not independent.
+
+    Parameters
+    ----------
+    results
+        Of the test slides.
+    counts
+        Gives right and all answers of each slide, (n_slides, 2).
+
+    Source: Efron & Tibshirani 1993, chapter 13 (percentile interval).
+    """
+    return _bootstrap(counts(results))
+
+
+def _bootstrap(pairs: Array) -> list[float]:
+    """Return the 95 % interval of a share; `pairs` holds right and all answers of each slide, (n_slides, 2)."""
+    drawn = np.random.default_rng(0).integers(len(pairs), size=(RESAMPLES, len(pairs)))
+    sums = pairs[drawn].sum(axis=1)
+    edges = np.quantile(sums[:, 0] / sums[:, 1], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
+    return [float(edge) for edge in edges]
+
+
+def window_counts(results: Sequence[SlideResult]) -> Array:
+    """Return right and all windows of each slide, (n_slides, 2).
+
+    Returns
+    -------
+    (n_slides, 2)
+        Whole numbers.
+    """
+    counts = [(sum(label == one.surface for label in one.window_labels), len(one.window_labels)) for one in results]
+    return np.array(counts, dtype=np.float64)
+
+
+def slide_counts(results: Sequence[SlideResult]) -> Array:
+    """Return whether each slide is right, and 1, (n_slides, 2).
+
+    Returns
+    -------
+    (n_slides, 2)
+        0 or 1, and 1.
+    """
+    return np.array([(one.estimates[-1].label == one.surface, 1) for one in results], dtype=np.float64)
