@@ -82,3 +82,12 @@ def test_bytes_of_noise_alone_are_reported_and_none_is_published(make: Make) -> 
     rig.set(faults=ByteFaults(flip=0.3))
     assert 'bytes but no valid frame' in rig.fault()
     assert rig.sensor.counts['samples'] == 0
+
+
+def test_a_brown_out_of_the_board_is_survived_and_nothing_moves(make: Make) -> None:
+    rig = make()
+    batches = rig.signal_s(0.5)
+    rig.run_locked(rig.device.reset)
+    batches += rig.signal_s(0.5)
+    assert len(set(rig.offsets(batches))) == 1
+    assert rig.sensor.counts['bogus'] == 0

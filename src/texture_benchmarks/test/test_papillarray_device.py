@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
@@ -14,6 +15,7 @@ import pytest
 from texture_benchmarks.load.rig import Rig
 from texture_benchmarks.load.rig_cases import CASES, feed_papillarray
 from texture_core.errors import InvalidParameter
+from texture_core.signal import lost_samples
 from texture_drivers.papillarray.sensor import PapillArray
 from texture_drivers.params import SensorParams
 from texture_simulation.devices.papillarray import EmulatedPapillArray
@@ -74,3 +76,19 @@ def test_the_bias_command_takes_the_present_values_for_none(make: Make) -> None:
     assert rig.signal_s(0.2)[-1].samples.max() == 0.25
     rig.sensor.send(b'z\n')
     assert np.abs(rig.signal_s(0.3)[-1].samples).max() == 0.0
+
+
+def test_a_brown_out_of_the_hub_is_survived_and_the_gap_is_reported(make: Make) -> None:
+    rig = make()
+    batches = rig.signal_s(0.5)
+    rig.run_locked(rig.device.reset)  # the hub is back at its usual rate, too: the driver asks for its own again
+    deadline_s = time.monotonic() + 30.0
+    while rig.device.rate_hz != 250:
+        assert time.monotonic() < deadline_s
+        batches += rig.sensor.read().get('signal', [])
+    batches += rig.signal_s(0.5)
+    assert rig.sensor.counts['device restarts'] >= 1
+    assert lost_samples(batches) == rig.sensor.counts['lost']
+    first, last = batches[0], batches[-1]
+    elapsed_s = (last.stamp_ns - first.stamp_ns) / 1e9
+    assert (last.first_sample - first.first_sample) / 250 == pytest.approx(elapsed_s, abs=0.05)

@@ -272,7 +272,24 @@ class PapillArray(SerialSensor):
         settings = load_settings(PapillArraySettings, params.config)
         prefixes = {array: f'finger{array}/' for array in arrays} or {params.finger: ''}
         decoder = PapillArrayDecoder(settings, prefixes, params.device, params.frame_id)
-        super().__init__(params, now_ns, decoder, start_command=tables.COMMANDS_OF_RATE[settings.rate_hz])
+        self._rate_command = tables.COMMANDS_OF_RATE[settings.rate_hz]
+        super().__init__(params, now_ns, decoder, start_command=self._rate_command)
+
+    def read(self) -> Mapping[str, Sequence[TactileSignal]]:
+        """Return what arrived within the length of one batch; see `SerialSensor.read`.
+
+        A hub that has begun again, as after a brown-out, is back at its own rate: it is asked for that of the settings.
+
+        Raises
+        ------
+        DeviceError
+            If the port is not open or is gone, or no valid packet has come for 1 s.
+        """
+        restarts = self.counts['device restarts']
+        batches = super().read()
+        if self.counts['device restarts'] > restarts:
+            self.send(self._rate_command)
+        return batches
 
     def set_bias(self) -> float:
         """Make the hub take the present state of its pillars for none; return the seconds that this takes.
