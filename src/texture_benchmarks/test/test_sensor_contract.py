@@ -21,7 +21,10 @@ from texture_simulation.devices.faults import ByteFaults, FrameFaults
 
 pytestmark = pytest.mark.realtime
 
-WITHOUT_DEVICE = {'file', 'sound_card'}  # a recording; a card that PortAudio opens: test_sound_card.py
+WITHOUT_DEVICE = {
+    'file',
+    'sound_card',
+}  # a recording; a card that PortAudio opens, whose rows of the contract are in test_sound_card.py
 NUMBERED = (
     'tsf85',
     'biotac',

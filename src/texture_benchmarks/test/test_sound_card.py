@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,38 @@ from texture_simulation.devices.sound_card import FRAMES_AT_ONCE, SYSTEM_CONFIG,
 
 pytestmark = pytest.mark.realtime
 
+# What of the contract of the other sensors holds here: the test of this file that shows it, or why it cannot apply.
+NO_LINE = 'a sound card has no line of its own: the operating system delivers whole blocks of samples'
+CONTRACT_ROWS = {
+    'test_every_sensor_with_a_device_is_under_contract': 'a sound card is no serial device with an emulator of its own',
+    'test_what_was_sampled_arrives_in_its_place_unit_and_time': (
+        'test_each_sample_of_the_card_arrives_once_in_its_order, test_the_stamps_follow_the_card_s_clock'
+    ),
+    'test_it_may_be_opened_and_closed_any_number_of_times': (
+        'test_closed_and_opened_again_it_goes_on_at_the_index_of_the_time'
+    ),
+    'test_replugged_under_another_name_it_goes_on_at_the_index_of_the_time': (
+        "ALSA's file plugin cannot be unplugged; what the driver does then is shown by "
+        'test_a_silent_card_is_reported, test_a_card_that_is_not_there_is_named and '
+        'test_closed_and_opened_again_it_goes_on_at_the_index_of_the_time'
+    ),
+    'test_a_second_program_is_refused_and_the_first_is_not_disturbed': (
+        "the operating system decides whether a card may be shared, and ALSA's file plugin may be"
+    ),
+    'test_a_device_that_opens_and_stays_silent_is_reported_by_its_path': 'test_a_silent_card_is_reported',
+    'test_wrong_firmware_is_an_error_and_none_of_it_is_published': NO_LINE,
+    'test_bytes_lost_added_or_changed_are_counted_and_no_sample_moves': NO_LINE,
+    'test_frames_left_out_are_lost_and_those_sent_twice_come_once': (
+        'test_an_overflow_is_counted_and_its_samples_are_left_out_of_the_index, '
+        'test_a_gap_that_no_flag_reports_is_known_after_half_a_second'
+    ),
+    'test_a_stall_of_the_line_delays_and_loses_nothing': 'test_blocks_that_come_late_in_one_burst_lose_nothing',
+    'test_a_clock_that_drifts_is_followed_and_reported': 'test_a_card_whose_clock_drifts_is_followed_and_reported',
+    'test_a_device_ten_times_too_fast_is_read_in_order_and_noticed': (
+        'test_a_card_ten_times_too_fast_keeps_its_order_and_the_stamps_of_the_host, '
+        'test_a_reader_that_is_too_busy_is_an_overflow_and_the_time_goes_on'
+    ),
+}
 DEADLINE_S = 20.0
 RATE_HZ = 48_000
 TURN = 30_000
@@ -97,6 +131,15 @@ def numbers(batches: list[TactileSignal]) -> np.ndarray:
     return np.concatenate([batch.samples[:, 0] for batch in batches]) * 32768
 
 
+def test_each_row_of_the_contract_is_shown_here_or_cannot_apply() -> None:
+    contract, own = (
+        set(re.findall(r'^def (test_\w+)', Path(__file__).with_name(name).read_text(), re.MULTILINE))
+        for name in ('test_sensor_contract.py', 'test_sound_card.py')
+    )
+    assert set(CONTRACT_ROWS) == contract
+    assert {name for row in CONTRACT_ROWS.values() for name in re.findall(r'test_\w+', row)} <= own
+
+
 def test_each_sample_of_the_card_arrives_once_in_its_order(make: Callable[..., SoundCard]) -> None:
     sensor = make()
     batches = read_s(sensor, 1.0)
@@ -152,6 +195,23 @@ def test_a_card_that_is_not_there_is_named() -> None:
         sensor.open()
 
 
+def test_a_reader_that_is_too_busy_is_an_overflow_and_the_time_goes_on(
+    make: Callable[..., SoundCard], card: PacedCard
+) -> None:
+    sensor = make()
+    last = read_s(sensor, 0.3)[-1]
+    deadline_s = time.monotonic() + DEADLINE_S
+    while not sensor._capture._overflowed:  # type: ignore[union-attr]
+        assert time.monotonic() < deadline_s
+        time.sleep(0.01)
+    card.card.drain()
+    batches = read_s(sensor, 1.5)
+    assert sensor.counts['overflows'] >= 1
+    assert sensor.counts['lost'] > 0
+    elapsed_s = (batches[-1].stamp_ns - last.stamp_ns) / 1e9
+    assert (batches[-1].first_sample - last.first_sample) / RATE_HZ == pytest.approx(elapsed_s, abs=0.05)
+
+
 class Blocks:
     """What stands for the capture: hands over blocks by hand."""
 
@@ -165,18 +225,62 @@ class Blocks:
     def close(self) -> None: ...
 
 
-def test_an_overflow_is_counted_and_its_samples_are_left_out_of_the_index() -> None:
+def by_hand(
+    late_s: Callable[[int], float], overflows: frozenset[int] = frozenset(), count: int = 200
+) -> tuple[SoundCard, list[Any]]:
+    """Return a sensor that has read blocks of 10 ms, and its batches.
+
+    Parameters
+    ----------
+    late_s
+        By how much the block of a number ends later than its samples at the nominal rate do.
+    overflows
+        Numbers of the blocks that report one.
+    count
+        Number of blocks.
+    """
     sensor = SoundCard(SensorParams(config='{decimation: 1}', batch_s=0.001))
     blocks = Blocks()
     sensor._capture = blocks  # type: ignore[assignment]
     batches: list[Any] = []
-    for number in range(100):
-        lost = 2400 if number >= 50 else 0  # 50 ms, at once
-        end_ns = 10**18 + round(((number + 1) * 480 + lost) / RATE_HZ * 1e9)
-        blocks.waiting.append(Block(np.zeros((480, 1), dtype=np.float32), end_ns, number == 50))
-        batches += sensor.read().get('signal', [])
+    for number in range(count):
+        end_ns = 10**18 + round(((number + 1) * 480 / RATE_HZ + late_s(number)) * 1e9)
+        blocks.waiting.append(Block(np.zeros((480, 1), dtype=np.float32), end_ns, number in overflows))
+        if number % 5 == 4:
+            batches += sensor.read().get('signal', [])
+    return sensor, batches
+
+
+def test_an_overflow_is_counted_and_its_samples_are_left_out_of_the_index() -> None:
+    sensor, batches = by_hand(lambda number: 0.05 * (number >= 50), frozenset({50}))
     assert sensor.counts['overflows'] == 1
     assert lost_samples(batches) == sensor.counts['lost'] == pytest.approx(2400, abs=5)
+
+
+def test_a_gap_that_no_flag_reports_is_known_after_half_a_second() -> None:
+    sensor, batches = by_hand(lambda number: 0.05 * (number >= 50))
+    assert sensor.counts['overflows'] == 0
+    assert lost_samples(batches) == sensor.counts['lost'] == pytest.approx(2400, abs=60)
+
+
+def test_blocks_that_come_late_in_one_burst_lose_nothing() -> None:
+    sensor, batches = by_hand(lambda number: max(0.0, 0.01 * (120 - number)) if 100 <= number < 120 else 0.0)
+    assert lost_samples(batches) == sensor.counts['lost'] == 0
+    assert sensor.counts['samples'] > 0.9 * 200 * 480
+
+
+def test_a_card_whose_clock_drifts_is_followed_and_reported() -> None:
+    sensor, batches = by_hand(lambda number: -0.004 * number * 0.01, count=500)
+    assert lost_samples(batches) == 0
+    assert sensor.details['device clock slow by [ppm]'] == pytest.approx(-4000, abs=400)
+
+
+def test_a_card_ten_times_too_fast_keeps_its_order_and_the_stamps_of_the_host() -> None:
+    _, batches = by_hand(lambda number: -0.9 * (number + 1) * 0.01)
+    assert all(after.first_sample >= before.next_sample for before, after in pairwise(batches))
+    samples = batches[-1].next_sample - batches[0].first_sample
+    lasted_s = (batches[-1].stamp_ns - batches[0].stamp_ns) / 1e9
+    assert lasted_s < 0.5 * samples / RATE_HZ  # the stamps follow the host, which saw them come so fast
 
 
 def test_a_decimation_that_does_not_divide_the_rate_is_refused() -> None:
