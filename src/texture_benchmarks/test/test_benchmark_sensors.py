@@ -29,3 +29,9 @@ def test_the_load_of_sensor_nodes_is_measured(tmp_path: Path) -> None:
     assert 0 < daq['cpu_percent'] < 100
     assert set(result.numbers['together']) == {'tsf85', 'biotac', 'daq', 'pvdf', 'cpu_percent'}
     assert result.charts[0].is_file()
+    replugged, flooded = (result.numbers[name]['anyskin'] for name in ('replugged', 'ten_times_too_fast'))
+    assert replugged['times'] == 1
+    assert 0 < replugged['back_s'][1] < 10.0
+    assert replugged['out_of_order'] == flooded['out_of_order'] == 0
+    assert replugged['index_error_s'] < 0.05
+    assert flooded['samples_per_s'] > 1.05 * 250.0  # its nominal rate: the flood is seen

@@ -1,4 +1,4 @@
-"""What the sensor nodes cost, what they lose, and how fast a device may be."""
+"""What the sensor nodes cost, what they lose, how fast a device may be, and how replugging and a flood are borne."""
 
 from __future__ import annotations
 
@@ -12,26 +12,31 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from texture_benchmarks.charts import line_chart
+from texture_benchmarks.load.interruptions import flood, replug
 from texture_benchmarks.load.rig import Rig, fast_daq
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 
 if TYPE_CHECKING:
     from texture_benchmarks.ros.sensor_load import SensorLoad
 
-ALONE = ('tsf85', 'tsf85_pair', 'biotac', 'daq', 'pvdf')
+ALONE = ('tsf85', 'tsf85_pair', 'biotac', 'daq', 'pvdf', 'anyskin', 'papillarray')
 TOGETHER = ('tsf85', 'biotac', 'daq', 'pvdf')
+INTERRUPTED = ('tsf85', 'biotac', 'daq', 'pvdf', 'anyskin', 'papillarray')
+QUICK_INTERRUPTED = ('anyskin',)
+REPLUGS, QUICK_REPLUGS = 10, 1
 FACTORS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)  # of the DAQ finger's 2.5 kHz
 QUICK_FACTORS = (1.0,)
-QUICK_S, ALONE_S, RATE_S = 2.0, 30.0, 10.0
+QUICK_S, ALONE_S, RATE_S, FLOOD_S = 2.0, 30.0, 10.0, 10.0
 TARGETS = {'daq_lost': 0, 'daq_cpu_percent': 12.0, 'tsf85_cpu_percent': 12.0}
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Run each sensor's node alone, four at once, and one at ever higher rates."""
+    """Run each sensor's node alone, four at once, one at ever higher rates; replug and flood each driver."""
     seconds = QUICK_S if options.quick else max(QUICK_S, options.duration_s)
     alone_s, rate_s = min(seconds, ALONE_S), min(seconds, RATE_S)
     alone = {name: _loads([name], alone_s)[name] for name in (('daq',) if options.quick else ALONE)}
     together = _loads(TOGETHER, seconds)
+    interrupted = _interrupted(quick=options.quick)
     rates = [_fast(factor, rate_s) for factor in (QUICK_FACTORS if options.quick else FACTORS)]
     kilohertz = np.array([wanted_hz for wanted_hz, _ in rates]) / 1000
     chart = line_chart(
@@ -48,7 +53,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         measured=(
             f'the node `sensor` as a process of its own: each alone for {alone_s:g} s, four together for {seconds:g} '
             f's, each other rate for {rate_s:g} s, with one subscriber. Samples and losses by its own counts, '
-            'computing time in percent of one core. '
+            'computing time in percent of one core. Replugged and ten times too fast: the driver without a node. '
             'unsent_bytes: what the emulated device could not send, for the machine was busy'
         ),
         data='emulated devices on pseudo-terminals, fed in real time on the same machine',
@@ -57,11 +62,23 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'targets': TARGETS,
             'alone': _numbers(alone),
             'together': {**_numbers(together), 'cpu_percent': sum(100 * load.cpu for load in together.values())},
+            **interrupted,
             'daq_at_rates': {f'{wanted_hz:g} Hz': _row(load) for wanted_hz, load in rates},
             'highest_rate_without_loss_hz': max((w for w, load in rates if not load.lost), default=0.0),
         },
         charts=(chart,),
     )
+
+
+def _interrupted(*, quick: bool) -> Mapping[str, Any]:
+    """Return the figures of each driver whose device is unplugged again and again, and sends ten times too fast."""
+    names, times = (QUICK_INTERRUPTED, QUICK_REPLUGS) if quick else (INTERRUPTED, REPLUGS)
+    with tempfile.TemporaryDirectory() as folder:
+        seconds = QUICK_S if quick else FLOOD_S
+        return {
+            'replugged': {name: asdict(replug(name, Path(folder), times)) for name in names},
+            'ten_times_too_fast': {name: asdict(flood(name, Path(folder), seconds)) for name in names},
+        }
 
 
 def _loads(names: tuple[str, ...] | list[str], seconds: float) -> Mapping[str, SensorLoad]:
