@@ -104,20 +104,16 @@ ITEM = re.compile(r'^ *(?:[-*+]|\d+\.) ')
 UNCONVERTED: frozenset[str] = frozenset(
     {
         'CONTRIBUTING.md',
-        'README.md',
         'docs/any-speed.md',
         'docs/architecture.md',
         'docs/benchmarks.md',
         'docs/colcon.md',
-        'docs/dashboard.md',
-        'docs/decisions.md',
         'docs/deployment.md',
         'docs/endurance.md',
         'docs/experiments.md',
         'docs/extending.md',
         'docs/frontier.md',
         'docs/import.md',
-        'docs/index.md',
         'docs/integrate.md',
         'docs/learning.md',
         'docs/motion.md',
@@ -146,7 +142,6 @@ UNCONVERTED: frozenset[str] = frozenset(
         'docs/sensors/pvdf.md',
         'docs/sensors/sound_card.md',
         'docs/sensors/tsf85.md',
-        'docs/start.md',
         'docs/stick-slip.md',
         'docs/taxels.md',
         'docs/troubleshooting.md',
@@ -172,7 +167,7 @@ def blank(found: re.Match[str]) -> str:
 def units(text: str) -> Iterator[tuple[int, str]]:
     """Yield each paragraph, item and cell of a page without code and links, with its line."""
     text = CODE_BLOCK.sub(blank, HIDDEN.sub(blank, text))
-    text = LINK.sub(lambda found: found[1] or 'link', INLINE_CODE.sub('code', text))
+    text = LINK.sub(lambda found: found[1] or 'link', INLINE_CODE.sub('Code', text))
     held: list[str] = []
     start = 0
     for line, row in enumerate([*text.split('\n'), ''], 1):

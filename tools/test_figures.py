@@ -73,6 +73,7 @@ def test_a_number_with_a_unit_needs_a_source(page: Path, number: str) -> None:
         'Windows last 0.5 s. <!-- constants -->',
         '<!-- constants: section -->\n\nWindows last 0.5 s.',
         'It took 2 min. <!-- measured once -->',
+        '| recipe | after 5 s |\n|---|---|\n| gain of 3 dB | good |',
         'Windows\n\n<!-- constants: page -->',
         'Write `0.5 s`.\n\n```\n5 ms\n```',
         'There are 5 slides and 3 surfaces, at 81.1<!--=speed/default/accuracy;.1%--> %.',

@@ -1,4 +1,4 @@
-"""The lines of docs/services.md, as requests to running nodes."""
+"""The lines of docs/operate.md, as requests to running nodes."""
 
 import importlib
 import re
@@ -15,7 +15,7 @@ from texture_exploration.nodes.explorer import ExplorerNode
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
-PAGE = Path(__file__).parents[3] / 'docs' / 'services.md'
+PAGE = Path(__file__).parents[3] / 'docs' / 'operate.md'
 LINE = re.compile(r'`(ros2 (?:service call|action send_goal) [^`]+)`')
 OF_OTHERS = {'/reboot', '/touch_surface', '/forget_touches', '/add_texture', '/remove_last_added', '/remove_texture'}
 
