@@ -128,7 +128,6 @@ UNCONVERTED: frozenset[str] = frozenset(
         'docs/robots/rails.md',
         'docs/robots/ros_controllers.md',
         'docs/robots/ur.md',
-        'docs/robustness.md',
         'docs/roughness.md',
         'docs/safety.md',
         'docs/scenes.md',

@@ -7,7 +7,8 @@ A number in a page is followed by a comment that names its source, so that a for
 The source is a file of `docs/charts` without its ending, then the keys below `numbers` (a `/` in a key is written
 `~1`), then the format after a semicolon. A format is a Python format, optionally with a factor (`.0f*1e6`); `.1%` gives
 percent without the sign. `*` in place of a key takes every entry, and `min`, `max`, `mean`, `sum` or `len` before the
-format reduces them. `A minus B` takes a difference. A new number is written as `?` and filled by the tool.
+format reduces them. `A minus B` takes a difference, and a stored null is printed as a dash. A new number is written as
+`?` and filled by the tool.
 
 Every other number with a unit needs a marker that says where it comes from: `<!-- constants -->` for settings, physics
 and figures of others, `<!-- measured once -->` for a measurement without a stored file. A marker holds for its
@@ -31,7 +32,7 @@ ROOT = Path(__file__).parents[1]
 CHARTS = ROOT / 'docs' / 'charts'
 PAGES = ('README.md', 'CONTRIBUTING.md', 'docs/*.md', 'docs/*/*.md', 'src/*/README.md')
 GENERATED = ('docs/charts/', 'docs/reference/')  # their tests compare them with the data
-FIGURE = re.compile(r'(?P<value>[+−-]?\d[\d.,]*|\?)<!--=\s*(?P<source>[^;>]+?)\s*;\s*(?P<form>[^;>]+?)\s*-->')
+FIGURE = re.compile(r'(?P<value>[+−-]?\d[\d.,]*|\?|–)<!--=\s*(?P<source>[^;>]+?)\s*;\s*(?P<form>[^;>]+?)\s*-->')
 COMMENT = re.compile(r'<!--=.*?-->')
 FORM = re.compile(r'^(?:(?P<reduce>min|max|mean|sum|len) )?(?P<format>[^*\s]*)(?:\*(?P<factor>[\d.e-]+))?$')
 REDUCTIONS: dict[str, Callable[[Any], float]] = {'min': min, 'max': max, 'mean': fmean, 'sum': sum, 'len': len}
@@ -65,7 +66,6 @@ UNCONVERTED: frozenset[str] = frozenset(
         'docs/robots/rails.md',
         'docs/robots/ros_controllers.md',
         'docs/robots/ur.md',
-        'docs/robustness.md',
         'docs/roughness.md',
         'docs/safety.md',
         'docs/scenes.md',
@@ -128,6 +128,8 @@ def figure(source: str, form: str) -> str:
     if parsed is None:
         raise BadFigure(f"'{form}' is no format; write one such as .1f, .1%, .0f*1e6 or 'max .1%'")
     left, *right = (entry(part.strip()) for part in source.split(' minus '))
+    if left is None:
+        return '–'
     if right:
         left -= right[0]
     if parsed['reduce']:

@@ -9,7 +9,10 @@ import figures
 import pytest
 
 STORED = {
-    'numbers': {'default': {'accuracy': 0.8114, 'time s/window': 0.000162}, 'rows': [{'ms': 2.0}, {'ms': 5.25}]},
+    'numbers': {
+        'default': {'accuracy': 0.8114, 'time s/window': 0.000162, 'breakdown': None},
+        'rows': [{'ms': 2.0}, {'ms': 5.25}],
+    },
 }
 
 
@@ -34,6 +37,7 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ('speed/rows/1/ms minus speed/rows/0/ms;.1f', '3.2'),
         ('speed/rows/0/ms minus speed/rows/1/ms;.1f', '−3.2'),
         ('speed/rows;len d', '2'),
+        ('speed/default/breakdown;.2f', '–'),
     ],
 )
 def test_a_number_is_filled_from_its_source(page: Path, comment: str, printed: str) -> None:

@@ -162,7 +162,7 @@ def test_the_page_shows_what_the_bench_measured(kind: str) -> None:
         for effect, found in numbers.items()
         if found['slides'] == kind
     }
-    assert robustness_tables(panels) in (DOCS / 'robustness.md').read_text()
+    assert robustness_tables(panels) in (DOCS / 'charts' / 'robustness.md').read_text()
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
