@@ -84,9 +84,8 @@ def table_picture(views: Sequence[SceneView], title: str, path: str | Path) -> P
             _profile(profile, view)
             _signal(signal, view)
             _spectrum(spectrum, view)
-        for axes, name in zip(rows[0], ('', 'height along the way', 'signal', 'its power'), strict=True):
-            if name:
-                axes.set_title(name)
+        for axes, name in zip(rows[0][1:], ('height along the way', 'signal', 'its power'), strict=True):
+            axes.set_title(name)
         rows[0][1].legend(loc='upper center', bbox_to_anchor=(0.5, -0.3), ncols=2, fontsize=7)
     return Path(path)
 

@@ -39,8 +39,7 @@ def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
     InvalidParameter
         If a name is unknown (with the nearest known one), or a value has the wrong type or range.
     """
-    if values is None:
-        values = {}
+    values = {} if values is None else values
     if not isinstance(values, Mapping):
         raise InvalidParameter(f'{where}: came {safe_repr(values)}; a mapping of parameter names to values is needed')
     known = {parameter.name: parameter for parameter in parameters_of(cls)}

@@ -101,10 +101,7 @@ class StreamClock:
             self._origin = (index, arrival_ns)
         arrival = self._arrival(index, arrival_ns)
         if self._has_stepped(index, arrival, arrival_ns):
-            self.steps += 1
-            self.restart()
-            self._origin = (index, arrival_ns)
-            self.settled = True
+            self._follow_step((index, arrival_ns))
             arrival = Arrival(0.0, 0.0)
         self._last_index = index
         self._store(arrival)
@@ -126,6 +123,13 @@ class StreamClock:
         elapsed_ns = (reached_ns - self._now.offset_ns) / (1 + self._now.drift)
         remaining_ns = self._now.delay_ns_at(elapsed_ns, self._slew_rate) - self._now.trend_ns(elapsed_ns)
         return first_index + (elapsed_ns - remaining_ns) / self._period_ns
+
+    def _follow_step(self, origin: tuple[int, int]) -> None:
+        """Begin anew where the host's clock was set to another time."""
+        self.steps += 1
+        self.restart()
+        self._origin = origin
+        self.settled = True
 
     def _arrival(self, index: int, arrival_ns: int) -> Arrival:
         first_index, first_ns = self._origin or (index, arrival_ns)

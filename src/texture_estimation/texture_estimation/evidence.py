@@ -94,10 +94,7 @@ class EvidenceAccumulator:
     def _start(self, exploration_id: str) -> None:
         self._exploration_id = exploration_id
         self._over = False
-        self._windows = 0
-        self._evidence_ns = 0
-        self._window_ns = 0
-        self._end_ns = 0
+        self._windows = self._evidence_ns = self._window_ns = self._end_ns = 0
         self._message = '' if self.model else NO_MODEL
         self._evidence = GroupedEvidence(
             len(self.model.labels) if self.model else 0, self.model.recipe.evidence.group if self.model else 0

@@ -75,7 +75,8 @@ def one_against_rest(grades: Array) -> tuple[float, float]:
         errors.append(float(np.abs(own[shared] - rest).mean()))
         if own[shared].std() > 0 and rest.std() > 0:
             correlations.append(float(np.corrcoef(own[shared], rest)[0, 1]))
-    return (
-        float(np.mean(errors)) if errors else math.nan,
-        float(np.mean(correlations)) if correlations else math.nan,
-    )
+    return _mean(errors), _mean(correlations)
+
+
+def _mean(values: list[float]) -> float:
+    return float(np.mean(values)) if values else math.nan

@@ -181,9 +181,9 @@ def _test(model: TextureModel, slide: LabelledSlide, events: Sequence[WindowEven
     used, received, before = [], [], 0
     for vector, estimate in zip(vectors, estimates, strict=True):
         if not vector.last and vector.feature_set != model.feature_set:
+            difference = fingerprint_difference(vector.feature_set, model.feature_set)
             raise ModelMismatch(
-                f"model '{model.name}' does not fit slide '{slide.name}' in '{slide.bag}': "
-                f'{fingerprint_difference(vector.feature_set, model.feature_set)}'
+                f"model '{model.name}' does not fit slide '{slide.name}' in '{slide.bag}': {difference}"
             )
         if estimate.windows > before and not vector.last:
             used.append(vector.values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -68,20 +68,19 @@ class Wanted:
             raise InvalidParameter('grades are not told pair by pair; leave --per-pair or --grades out')
 
 
+def _named_windows(dataset: SlideDataset, plan: FeatureSet) -> Iterator[CutWindow]:
+    """Yield the windows by names of slides: unlike ids of explorations, these are unique over all bags."""
+    for slide, events in dataset.windows(plan):
+        yield from (replace(event, exploration_id=slide.name) for event in events if isinstance(event, CutWindow))
+
+
 def cut_of(dataset: SlideDataset, feature_set: FeatureSet) -> Cut:
     """Return what gives the windows of all slides, by window parameters; each length is cut once."""
 
     @cache
     def cut(windows: WindowParams) -> LabelledWindows:
         plan = replace(feature_set, windows=windows, _layouts={})
-        # Unlike ids of explorations, names of slides are unique over all bags.
-        named = (
-            replace(event, exploration_id=slide.name)
-            for slide, events in dataset.windows(plan)
-            for event in events
-            if isinstance(event, CutWindow)
-        )
-        return LabelledWindows.from_events(named, feature_set.window_names)
+        return LabelledWindows.from_events(_named_windows(dataset, plan), feature_set.window_names)
 
     return cut
 

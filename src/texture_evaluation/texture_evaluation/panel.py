@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -105,13 +106,16 @@ def protocol_violations(ratings: Ratings) -> list[str]:
     given = ratings.grades[counts]
     if (given != np.rint(given)).any():
         found.append(f'{int((given != np.rint(given)).sum())} grades are not whole; the votes count them rounded')
+    return [*found, *_uneven_raters(ratings)]
+
+
+def _uneven_raters(ratings: Ratings) -> Iterator[str]:
     low, high = _allowed_a_grade(len(ratings.textures))
     for name, row in zip(ratings.raters, ratings.grades, strict=True):
         used = (np.rint(row)[:, None] == GRADES).sum(axis=0)
         if used.min() < low or used.max() > high:
             shown = ', '.join(f'{count} × {grade}' for grade, count in zip(GRADES, used, strict=True))
-            found.append(f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are asked')
-    return found
+            yield f'rater {name} did not spread the textures evenly: {shown}; {low} to {high} a grade are asked'
 
 
 def _allowed_a_grade(n_textures: int) -> tuple[int, int]:

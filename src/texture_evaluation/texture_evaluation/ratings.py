@@ -130,10 +130,8 @@ def _grade(text: str, scale: tuple[float, float], where: str) -> float:
     except ValueError:
         value = math.nan
     if not low <= value <= high:
-        raise InvalidData(
-            f"{where}: the grade is '{text}'; a number from {low:g} to {high:g} is needed, "
-            'or name another scale with --scale'
-        )
+        needed = f'a number from {low:g} to {high:g} is needed, or name another scale with --scale'
+        raise InvalidData(f"{where}: the grade is '{text}'; {needed}")
     return SMOOTH + (ROUGH - SMOOTH) * (value - low) / (high - low)
 
 

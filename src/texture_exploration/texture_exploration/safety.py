@@ -198,10 +198,8 @@ class SafetyLimits:
                 raise MotionRefused(f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}')
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
         if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
-            raise MotionRefused(
-                f'{request.motion}: direction_rad is {request.direction_rad:g}; '
-                f'allowed is -{MAX_DIRECTION_RAD:g} to {MAX_DIRECTION_RAD:g} rad'
-            )
+            allowed = f'allowed is -{MAX_DIRECTION_RAD:g} to {MAX_DIRECTION_RAD:g} rad'
+            raise MotionRefused(f'{request.motion}: direction_rad is {request.direction_rad:g}; {allowed}')
         return request
 
     @staticmethod

@@ -38,8 +38,7 @@ def choose(catalogue: Mapping[str, type[T]], entry: Any, kind: str, where: str) 
     InvalidParameter, UnknownName
         If the entry is not of that form, or the name or a parameter is unknown or out of range.
     """
-    if isinstance(entry, str):
-        entry = {entry: {}}
+    entry = {entry: {}} if isinstance(entry, str) else entry
     if not isinstance(entry, Mapping) or len(entry) != 1:
         raise InvalidParameter(
             f"{where}: came {safe_repr(entry)}; a {kind} is written 'name' or 'name: {{parameter: value}}'"

@@ -92,10 +92,7 @@ class SlideConditions:
             directions_rad=tuple(map(float, values.get('directions_rad', ()))),
             speed_range_m_s=_pair(values.get('speed_range_m_s', UNKNOWN)),
             force_range_n=_pair(values.get('force_range_n', UNKNOWN)),
-            levels=tuple(
-                SignalLevel(str(channel), float(rms), *_pair(interval))
-                for channel, rms, *interval in values.get('levels', ())
-            ),
+            levels=tuple(_level(*level) for level in values.get('levels', ())),
         )
 
 
@@ -161,6 +158,10 @@ class _RunningMean:
             self.value = mean = self._sum / self._count
             low, high = self.range
             self.range = (low if low <= mean else mean, high if high >= mean else mean)  # NaN is neither
+
+
+def _level(channel: Any, rms: Any, *interval: Any) -> SignalLevel:
+    return SignalLevel(str(channel), float(rms), *_pair(interval))
 
 
 def _pair(values: Sequence[Any]) -> Interval:

@@ -130,16 +130,15 @@ class SignalDecoder:
 
     def decode(self, raw: bytes) -> TactileSignal:
         """Return the signal in the CDR of a TactileSignal; `samples` is a view of `raw`."""
-        tail = STAMP_END + len(self._head)
-        if self._like is None or raw[STAMP_END:tail] != self._head or not raw.startswith(LITTLE_ENDIAN):
+        like, tail = self._like, STAMP_END + len(self._head)
+        if like is None or raw[STAMP_END:tail] != self._head or not raw.startswith(LITTLE_ENDIAN):
             return self._decode_first(raw)
         seconds, nanoseconds = STAMP.unpack_from(raw, len(LITTLE_ENDIAN))
         first, length = INDEX_AND_LENGTH.unpack_from(raw, tail)
-        columns = len(self._like.channels)
+        columns = len(like.channels)
         if length % columns or len(raw) < tail + INDEX_AND_LENGTH.size + 4 * length:
             return self._decode_first(raw)
         samples = np.frombuffer(raw, '<f4', length, tail + INDEX_AND_LENGTH.size)
-        like = self._like
         return TactileSignal(
             seconds * NANOSECONDS + nanoseconds, like.sensor, like.channels, like.units, like.sampling_rate_hz,
             first, samples.reshape(-1, columns), like.frame_id,

@@ -71,12 +71,11 @@ class SlideSamples:
             If it has no samples of the topic or lost some.
         """
         batches, states = slide.signals.get(topic, ()), slide.sliding
+        where = f"slide '{slide.name}' in '{slide.bag}'"
         if not batches or not states:
-            raise InvalidData(
-                f"slide '{slide.name}' in '{slide.bag}' has no '{topic}' while sliding; name another topic"
-            )
+            raise InvalidData(f"{where} has no '{topic}' while sliding; name another topic")
         if any(after.first_sample != before.next_sample for before, after in pairwise(batches)):
-            raise InvalidData(f"slide '{slide.name}' in '{slide.bag}' has lost samples; use windows of it instead")
+            raise InvalidData(f'{where} has lost samples; use windows of it instead')
         rate_hz = batches[0].sampling_rate_hz
         samples = np.concatenate([batch.samples for batch in batches]).astype(np.float64)
         first, last = (round((at - batches[0].stamp_ns) * rate_hz / NANOSECONDS) for at in _covered(states))

@@ -95,12 +95,7 @@ def live_tsf85(
 
 
 def live_tsf85_pair(
-    scene: Scene,
-    surface: Surface,
-    link: FilePath,
-    rng: np.random.Generator,
-    *,
-    long_stamps: bool = True,
+    scene: Scene, surface: Surface, link: FilePath, rng: np.random.Generator, *, long_stamps: bool = True
 ) -> LiveSensor:
     """Return a TSF-85 of which both fingers touch.
 

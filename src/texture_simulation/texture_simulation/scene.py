@@ -68,10 +68,8 @@ class Scene:
         if 'skin' in effects:
             effects['skin'] = replace(effects['skin'], resonance_hz=effects['skin'].resonance_hz / thicker)
         if 'noise' in effects:
-            noise = effects['noise']
-            effects['noise'] = replace(
-                noise, fast_count=noise.fast_count * noisier, slow_count=noise.slow_count * noisier
-            )
+            fast, slow = (count * noisier for count in (effects['noise'].fast_count, effects['noise'].slow_count))
+            effects['noise'] = replace(effects['noise'], fast_count=fast, slow_count=slow)
         mean = self.contact
         contact = replace(mean, blur_m=mean.blur_m * thicker, stiffness_n_m=mean.stiffness_n_m / thicker)
         return replace(self, contact=contact, effects=effects)

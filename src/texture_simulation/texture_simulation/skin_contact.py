@@ -101,10 +101,7 @@ class SkinContact:
         return placed
 
     def variation_n(
-        self,
-        placed: Trajectory,
-        own_blur_m: float | Array = 0.0,
-        offset_m: tuple[Array, Array] | None = None,
+        self, placed: Trajectory, own_blur_m: float | Array = 0.0, offset_m: tuple[Array, Array] | None = None
     ) -> Array:
         """Return by how much the shape of the surface, and its friction, change the force on the skin; 0 in the air.
 

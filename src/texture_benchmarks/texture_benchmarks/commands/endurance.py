@@ -20,16 +20,16 @@ from texture_core.errors import InvalidData
 ROBOT_SHARE = 2 / 3  # of the time of a run of both parts
 
 
+PART_HELP = (
+    'sensor: all nodes with emulated sensor and the simulated arm; robots: the explorer with the emulated UR, '
+    'the emulated hand and the simulated arm; all: a third of the time the first, then the second (default)'
+)
+
+
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
     parser.add_argument('--duration', type=float, default=3600.0, metavar='S', help='how long, s (default: an hour)')
-    parser.add_argument(
-        '--part',
-        choices=('all', *PARTS),
-        default='all',
-        help='sensor: all nodes with emulated sensor and the simulated arm; robots: the explorer with the emulated UR, '
-        'the emulated hand and the simulated arm; all: a third of the time the first, then the second (default)',
-    )
+    parser.add_argument('--part', choices=('all', *PARTS), default='all', help=PART_HELP)
     parser.add_argument('--quiet', type=float, default=20.0, metavar='S', help='mean time between two faults, s')
     parser.add_argument('--model', type=Path, help='trained model; one of simulated slides is trained if not given')
     parser.add_argument(

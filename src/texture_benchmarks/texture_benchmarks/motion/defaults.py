@@ -66,14 +66,6 @@ def margins() -> dict[str, float]:
     params, period_s = ForceLoopParams(), 1 / RATE_HZ
     gain = params.default_gain(params.max_stiffness_n_m, period_s)
     delays = np.linspace(1.0, 20.0, 191)
-    late = [
-        stability_limit_gain(
-            replace(params.loop(params.max_stiffness_n_m, period_s), delay_s=float(f) * params.loop_delay_s)
-        )
-        > gain
-        for f in delays
-    ]
-    return {
-        'stiffness': stability_limit_gain(params.loop(params.max_stiffness_n_m, period_s)) / gain,
-        'delay': float(delays[np.argmin(late)]),
-    }
+    loop = params.loop(params.max_stiffness_n_m, period_s)
+    late = [stability_limit_gain(replace(loop, delay_s=float(f) * params.loop_delay_s)) > gain for f in delays]
+    return {'stiffness': stability_limit_gain(loop) / gain, 'delay': float(delays[np.argmin(late)])}

@@ -145,8 +145,7 @@ def _measured(
     # A window is cut where every stream has samples: the slowest decides, and a slide ends with one of its samples.
     slowest_hz = min(stream.rate_hz for stream in kind.streams[: None if slow else 1])
     duration_s = math.ceil(visits.sliding.duration_s * slowest_hz - ROUNDING) / slowest_hz
-    place = list(scene.surfaces).index(surface)
-    own = [seed, place, zlib.crc32(visits.condition.encode())]
+    own = [seed, list(scene.surfaces).index(surface), zlib.crc32(visits.condition.encode())]
     rng = np.random.default_rng([*own, number])
     sliding = replace(_sliding(visits, np.random.default_rng(own)), duration_s=duration_s)
     sliding = replace(sliding, direction_rad=sliding.direction_rad + view.turned_rad)

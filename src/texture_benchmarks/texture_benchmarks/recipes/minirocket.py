@@ -31,11 +31,7 @@ def installed() -> bool:
 
 
 def try_minirocket(
-    dataset: SlideDataset,
-    split: Split,
-    seed: int,
-    length_s: float = LENGTH_S,
-    every: int = 1,
+    dataset: SlideDataset, split: Split, seed: int, length_s: float = LENGTH_S, every: int = 1
 ) -> dict[str, Any]:
     """Return the figures of MiniRocket on the vibration, the vote being one window, one vote.
 

@@ -196,6 +196,13 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     return result_of('recipes', numbers, options)
 
 
+def _refuse_unfit(names: Sequence[str], setting: Setting) -> None:
+    for name in names:
+        if not takes_windows(name) and not _fits(name, setting):
+            needed = ', '.join(own_recipe(name).feature_set.topics)
+            raise InvalidData(f"'{name}' needs {needed}; the slides have {', '.join(setting.dataset[0].signals)}")
+
+
 def run_own(options: BenchmarkOptions) -> BenchmarkResult:
     """Try the user's own methods beside some shipped recipes, on the user's own slides if there are any.
 
@@ -207,10 +214,7 @@ def run_own(options: BenchmarkOptions) -> BenchmarkResult:
     settings = own_settings(options) if options.own_bags else _settings(options)
     first = next(iter(settings.values()))
     shipped = [name for name in (QUICK_RECIPES[:1] if options.quick else BESIDE) if _fits(name, first)]
-    for name in options.own_methods:
-        if not takes_windows(name) and not _fits(name, first):
-            needed = ', '.join(own_recipe(name).feature_set.topics)
-            raise InvalidData(f"'{name}' needs {needed}; the slides have {', '.join(first.dataset[0].signals)}")
+    _refuse_unfit(options.own_methods, first)
     tried = _numbers(settings, (*shipped, *options.own_methods), options)
     numbers = {
         setting: {split: {shown_name(name): cell for name, cell in cells.items()} for split, cells in splits.items()}

@@ -54,12 +54,8 @@ def with_paper(ablation: Ablation, repeats: int, seed: int, *, quick: bool = Fal
     touch_protocol = TOUCH_PROTOCOLS[ablation.scene]
     scene = completed(load_scene(ablation.scene), touch_protocol)
     worlds = {term: world for term, world in variants(scene, touch_protocol).items() if term in scene.effects}
-    right = np.array(
-        [
-            [_right(paper, world, seed + number, quick=quick) for world in (scene, *worlds.values())]
-            for number in range(repeats)
-        ]
-    )
+    tried = (scene, *worlds.values())
+    right = np.array([[_right(paper, world, seed + n, quick=quick) for world in tried] for n in range(repeats)])
     changes = {term: difference(column) for term, column in zip(worlds, (right[:, 1:] - right[:, :1]).T, strict=True)}
     term_effects = [replace(term_effect, paper=changes.get(term_effect.term)) for term_effect in ablation.term_effects]
     return replace(ablation, term_effects=term_effects, paper=float(right[:, 0].mean()))

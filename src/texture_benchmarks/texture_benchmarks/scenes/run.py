@@ -15,7 +15,7 @@ from texture_benchmarks.scenes.costs import MANY, SCAN_S, DeviceLoad, ScanCost, 
 from texture_benchmarks.scenes.paper_ablation import with_paper
 from texture_benchmarks.scenes.tables import added_table, cost_table, term_table
 from texture_benchmarks.scenes.touch_protocols import HOST, TOUCH_PROTOCOLS, completed, with_one_more
-from texture_benchmarks.scenes.trial import CONFIDENCE, Ablation, MeanDifference, ablate, timed
+from texture_benchmarks.scenes.trial import CONFIDENCE, Ablation, MeanDifference, TermEffect, ablate, timed
 from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.scene import Scene, load_scene
 
@@ -161,20 +161,21 @@ def _kind(name: str, sticks: bool) -> str:
 
 
 def _terms(ablation: Ablation) -> dict[str, Any]:
-    term_effects = {
-        term_effect.term: {
-            'accuracy_without': _numbers(term_effect.easier),
-            'accuracy_trained_without': _numbers(term_effect.unprepared),
-            'decisions_changed': _numbers(term_effect.changed),
-            **({'paper_without': _numbers(term_effect.paper)} if term_effect.paper else {}),
-            'cost_us': round(term_effect.cost_us, 1),
-            'verdict': term_effect.verdict,
-        }
-        for term_effect in ablation.term_effects
-    }
+    term_effects = {term_effect.term: _effect(term_effect) for term_effect in ablation.term_effects}
     whole = {'accuracy': round(ablation.accuracy, 4), 'tested': ablation.tested, 'slide_us': round(ablation.slide_us)}
     paper = {'paper_accuracy': round(ablation.paper, 4)} if ablation.paper is not None else {}
     return {**whole, **paper, **term_effects}
+
+
+def _effect(effect: TermEffect) -> dict[str, Any]:
+    return {
+        'accuracy_without': _numbers(effect.easier),
+        'accuracy_trained_without': _numbers(effect.unprepared),
+        'decisions_changed': _numbers(effect.changed),
+        **({'paper_without': _numbers(effect.paper)} if effect.paper else {}),
+        'cost_us': round(effect.cost_us, 1),
+        'verdict': effect.verdict,
+    }
 
 
 def _numbers(difference: MeanDifference) -> dict[str, float]:

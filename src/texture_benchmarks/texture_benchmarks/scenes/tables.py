@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from texture_benchmarks.scenes.costs import DeviceLoad, ScanCost
-from texture_benchmarks.scenes.trial import Ablation, MeanDifference
+from texture_benchmarks.scenes.trial import Ablation, MeanDifference, TermEffect
 
 
 def cost_table(
@@ -38,21 +38,21 @@ def cost_table(
     return _table((*headings, 'device in real time (% of a core)'), rows)
 
 
+def _term_row(scene: str, effect: TermEffect) -> tuple[str, ...]:
+    return (
+        f'`{scene}`',
+        effect.term.replace('_', ' '),
+        f'{effect.cost_us:.0f}',
+        _points(effect.easier),
+        _points(effect.unprepared),
+        _points(effect.paper) if effect.paper else '',
+        effect.verdict,
+    )
+
+
 def term_table(ablations: Sequence[Ablation]) -> str:
     """Return for each term of each scene what it costs, and how the accuracy changes when it is removed."""
-    rows = [
-        (
-            f'`{ablation.scene}`',
-            term_effect.term.replace('_', ' '),
-            f'{term_effect.cost_us:.0f}',
-            _points(term_effect.easier),
-            _points(term_effect.unprepared),
-            _points(term_effect.paper) if term_effect.paper else '',
-            term_effect.verdict,
-        )
-        for ablation in ablations
-        for term_effect in ablation.term_effects
-    ]
+    rows = [_term_row(ablation.scene, effect) for ablation in ablations for effect in ablation.term_effects]
     headings = ('scene', 'term', 'costs (µs a slide)', 'change if nowhere (points)', 'change if held out (points)')
     return _table((*headings, "the paper's method, if nowhere", 'verdict'), rows)
 

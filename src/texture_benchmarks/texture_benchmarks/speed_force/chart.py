@@ -38,6 +38,9 @@ def held_out_chart(panels: Mapping[str, tuple[Methods, Mapping[str, float]]], pa
     return Path(path)
 
 
+WINDOW_TITLE = 'Single windows of 0.6 s at a speed that was not in the training set (ntp21)\nTrained on windows of …'
+
+
 def window_chart(outcomes: Mapping[str, HeldOutResult], goal: float, path: str | Path) -> Path:
     """Draw the share of single windows recognised by the speed left out, a line for each way of adding examples.
 
@@ -64,9 +67,7 @@ def window_chart(outcomes: Mapping[str, HeldOutResult], goal: float, path: str |
             axes.plot(speeds, share, marker=marker, color=colour, label=label)
         axes.axhline(100 * goal, color='k', linestyle='--', linewidth=1, label=f'goal for the average, {goal:.0%}')
         axes.set(xlabel='speed that was not in the training set (mm/s)', ylabel='windows recognised (%)', ylim=(0, 103))
-        axes.set_title(
-            'Single windows of 0.6 s at a speed that was not in the training set (ntp21)\nTaught: windows of …'
-        )
+        axes.set_title(WINDOW_TITLE)
         axes.legend(loc='lower right')
     return Path(path)
 

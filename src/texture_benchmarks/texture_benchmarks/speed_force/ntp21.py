@@ -127,8 +127,7 @@ class Ntp21:
         def trial(train: Mask, test: Mask) -> Mask:
             known = np.array([slide.speed_m_s for slide in self.samples])
             array = self._array(train)
-            slides = self.samples
-            estimated = np.array([array(slide.samples, slide.rate_hz, SPEEDS_M_S) for slide in slides])
+            estimated = np.array([array(slide.samples, slide.rate_hz, SPEEDS_M_S) for slide in self.samples])
             wrong = np.abs(np.log(estimated / known))
             errors.append(np.expm1(wrong[test]))
             most = float(np.quantile(wrong[train], SPANNED))

@@ -21,16 +21,15 @@ def drag_vibration(shares: tuple[float, ...]) -> Vibration:
     """Return how the tip vibrates over the speed."""
     critical = critical_speed_m_s(FRICTION, FORCE_N)
     speeds = critical * np.array(shares)
-    pulls = [_pulled_n(speed) for speed in speeds]
-    late = [pull[len(pull) // 2 :] for pull in pulls]
-    slid = [_pulled_n(speed, from_sliding=True) for speed in speeds]
+    late = [_second_half(_pulled_n(speed)) for speed in speeds]
+    slid = [_second_half(_pulled_n(speed, from_sliding=True)) for speed in speeds]
     return Vibration(
         speed_m_s=speeds,
         critical_m_s=critical,
         period_s=np.array([_period_s(pull) for pull in late]),
         formula_s=np.array([slow_drag(FRICTION, speed, FORCE_N).period_s for speed in speeds]),
         from_rest_n=np.array([float(np.ptp(pull)) for pull in late]),
-        from_sliding_n=np.array([float(np.ptp(pull[len(pull) // 2 :])) for pull in slid]),
+        from_sliding_n=np.array([float(np.ptp(pull)) for pull in slid]),
         step_s=FINE_S,
         shown={share * critical: _pulled_n(share * critical) for share in SHOWN_SHARES},
     )
@@ -54,3 +53,7 @@ def _period_s(pull: Array) -> float:
     if np.ptp(pull) < 1e-3 or len(rises) < 2:
         return math.nan
     return float((rises[-1] - rises[0]) / (len(rises) - 1) * FINE_S)
+
+
+def _second_half(pull: Array) -> Array:
+    return pull[len(pull) // 2 :]

@@ -205,8 +205,7 @@ class Operator:
             return any(vector.last and vector.exploration_id == explored.exploration_id for vector in vectors)
 
         self._until(over, FEATURES_DEADLINE_S, "the features of the slide do not arrive on 'features'")
-        own = [vector for vector in vectors if vector.exploration_id == explored.exploration_id]
-        return explored, [vector for vector in own if not vector.last]
+        return explored, [one for one in vectors if one.exploration_id == explored.exploration_id and not one.last]
 
     def stop(self, deadline_s: float = 5.0) -> str:
         """Stop whatever moves; return what the explorer says."""

@@ -50,11 +50,7 @@ class Tsf85MessageConverter:
     """
 
     def __init__(
-        self,
-        finger: int = 0,
-        settings: Tsf85Settings | None = None,
-        static_rate_hz: float = 0.0,
-        frame_id: str = '',
+        self, finger: int = 0, settings: Tsf85Settings | None = None, static_rate_hz: float = 0.0, frame_id: str = ''
     ) -> None:
         settings = Tsf85Settings() if settings is None else settings
         self.repeated = 0  # messages of packets without a new dynamic value

@@ -101,9 +101,7 @@ class IncrementalClassifier:
         self._refuse_second_label(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
         if self._path is not None:
-            number = self._numbers[-1] + 1 if self._numbers else 1
-            write_added_slide(self._path, number, added_slide, self.model.feature_set)
-            self._numbers.append(number)
+            self._store(self._path, added_slide)
         self._update((*self.model.added_slides, added_slide), label)
         return len(self._ridge_classifier.examples_of(self.model.labels.index(label)))
 
@@ -159,6 +157,11 @@ class IncrementalClassifier:
         finally:
             self._start_again(tuple(kept))
         return tuple(reversed(removed))
+
+    def _store(self, path: str | Path, added_slide: AddedSlide) -> None:
+        number = self._numbers[-1] + 1 if self._numbers else 1
+        write_added_slide(path, number, added_slide, self.model.feature_set)
+        self._numbers.append(number)
 
     def _refuse_removal(self, label: str) -> None:
         added = sorted({slide.label for slide in self.model.added_slides})

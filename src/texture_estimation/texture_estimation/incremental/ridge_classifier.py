@@ -99,13 +99,7 @@ class RidgeClassifier:
     """
 
     def __init__(
-        self,
-        X: Array,
-        y: Codes,
-        slides: Codes,
-        *,
-        trained: Predictor,
-        parameters: Mapping[str, Any] | None = None,
+        self, X: Array, y: Codes, slides: Codes, *, trained: Predictor, parameters: Mapping[str, Any] | None = None
     ) -> None:
         self._trained = trained
         self._kept = set(range(int(y.max()) + 1))

@@ -126,11 +126,11 @@ class Checks:
         if not finite.all():
             bad = vector.names[int(finite.argmin())]
             return f"its feature '{bad}' is not finite; is the speed known?"
-        if LEVEL in self.limits and float(vector.values[self._columns[LEVEL]].max()) < self.limits[LEVEL]:
+        if LEVEL in self.limits and self._highest(vector, LEVEL) < self.limits[LEVEL]:
             return 'no contact: the signal is weaker than on the smoothest training surface'
-        if (
-            STICK_SLIP in self.limits
-            and float(vector.values[self._columns[STICK_SLIP]].max()) > self.limits[STICK_SLIP]
-        ):
+        if STICK_SLIP in self.limits and self._highest(vector, STICK_SLIP) > self.limits[STICK_SLIP]:
             return 'the finger skids: stick-slip dominates the signal'
         return ''
+
+    def _highest(self, vector: FeatureVector, name: str) -> float:
+        return float(vector.values[self._columns[name]].max())

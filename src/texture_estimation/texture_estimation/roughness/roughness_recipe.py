@@ -85,12 +85,10 @@ class RoughnessRecipe:
         for key in content:
             if key not in KEYS:
                 raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
-        regressor_name, regressor = choose(REGRESSORS, content.get('regressor', 'gaussian_process'), 'regressor', where)
         return cls(
             name,
             FeatureSet.from_mapping(content, where),
-            regressor_name,
-            regressor,
+            *choose(REGRESSORS, content.get('regressor', 'gaussian_process'), 'regressor', where),
             from_mapping(CheckParams, content.get('checks') or {}, f'{where}, checks'),
             from_mapping(EvidenceParams, content.get('evidence') or {}, f'{where}, evidence'),
             from_mapping(CalibrationParams, content.get('training') or {}, f'{where}, training'),

@@ -36,17 +36,21 @@ def split_slides(
         If the slides cannot be split so.
     """
     labels, columns = dataset.labels, slide_groups(dataset, groups)
-    folds = getattr(splitter, 'n_splits', 1)
-    names, counts = np.unique(labels, return_counts=True)
-    if type(splitter).__name__.startswith('Stratified') and counts.min() < folds:
-        raise InvalidData(
-            f"'{names[counts.argmin()]}' has {counts.min()} slides, too few for {folds} folds; "
-            'use fewer folds or record more slides'
-        )
+    if type(splitter).__name__.startswith('Stratified'):
+        _check_folds(labels, getattr(splitter, 'n_splits', 1))
     try:
         return list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
     except ValueError as error:
         raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
+
+
+def _check_folds(labels: AnyArray, folds: int) -> None:
+    names, counts = np.unique(labels, return_counts=True)
+    if counts.min() < folds:
+        raise InvalidData(
+            f"'{names[counts.argmin()]}' has {counts.min()} slides, too few for {folds} folds; "
+            'use fewer folds or record more slides'
+        )
 
 
 def slide_groups(dataset: SlideDataset, groups: str | AnyArray) -> AnyArray:

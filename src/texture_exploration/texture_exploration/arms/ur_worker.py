@@ -59,9 +59,8 @@ class Observer:
     """
 
     def __init__(self, receive: Any, channel: socket.socket, params: UrArmParams) -> None:
-        self.silent = False
         self.connected = True
-        self.unsteady = self.zeroed = False
+        self.silent = self.unsteady = self.zeroed = False
         self.watchdog_s = 1.0 / params.watchdog_hz
         self.counts = Counts()
         self.newest: UrReport | None = None

@@ -52,11 +52,7 @@ class DynamixelHand:
     """
 
     def __init__(
-        self,
-        profile: str,
-        device: str,
-        torque_off_on_fault: bool = False,
-        limits: CommandLimits = LIMITS,
+        self, profile: str, device: str, torque_off_on_fault: bool = False, limits: CommandLimits = LIMITS
     ) -> None:
         self.profile: Profile = load_profile(profile)
         self.finger_sets: Mapping[str, FingerSet] = self.profile.finger_sets

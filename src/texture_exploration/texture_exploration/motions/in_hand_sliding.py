@@ -79,8 +79,7 @@ class Strokes:
         self._runs_on_m = speed_m_s * turn_s / math.pi  # until it stands: the integral of the cosine over half a turn
         self._forth = True
         self._end_m = ends(True, 0.0)
-        self._along_m = 0.0
-        self._age_m = 0.0
+        self._along_m = self._age_m = 0.0
         self._turning_s = math.nan  # since the turn began; NaN between turns
         self._time_ns = 0
         self._origin: tuple[float, float] | None = None

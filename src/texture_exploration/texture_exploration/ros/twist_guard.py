@@ -76,8 +76,11 @@ def main() -> None:
     rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node('arm_guard', enable_rosout=False, start_parameter_services=False)
     publisher = node.create_publisher(TwistStamped, topic, 1)
-    if wait(publisher) == DONE:
-        return
+    if wait(publisher) != DONE:
+        _command_standstill(node, publisher, frame_id)
+
+
+def _command_standstill(node: Any, publisher: Any, frame_id: str) -> None:
     end_s = time.monotonic() + REPEATED_S
     while time.monotonic() < end_s:
         message = TwistStamped()

@@ -93,8 +93,7 @@ def region_peaks(spectrum: Array, count: int, regions: int, *, by_frequency: boo
     bins = _largest(spectrum[..., 1:], np.repeat(peak, widths, axis=-1), count)
     found = bins if by_frequency else _first_step(peak, rank, count)
     order = np.argsort(np.where(bins > 0, found, np.inf), axis=-1, kind='stable')
-    ranked: Array = np.take_along_axis(bins, order, axis=-1)
-    return ranked
+    return np.asarray(np.take_along_axis(bins, order, axis=-1))
 
 
 def _last_step(rank: NDArray[np.intp], count: int) -> NDArray[np.intp]:

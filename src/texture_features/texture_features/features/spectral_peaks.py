@@ -100,8 +100,7 @@ def highest_peaks(spectrum: Array, count: int, gap: float) -> tuple[Array, Array
     middle = spectrum[..., 1:-1]
     is_peak = (middle > spectrum[..., :-2]) & (middle >= spectrum[..., 2:])
     left[..., 1:-1] = np.where(is_peak, middle, 0.0)
-    bins = np.zeros((*spectrum.shape[:-1], count))
-    heights = np.zeros_like(bins)
+    bins, heights = np.zeros((2, *spectrum.shape[:-1], count))
     index = np.arange(spectrum.shape[-1])
     for number in range(count):
         best = left.argmax(axis=-1)[..., None]

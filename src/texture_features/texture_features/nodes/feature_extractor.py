@@ -41,9 +41,7 @@ class FeatureExtractor(Node):
         super().__init__('feature_extractor', **kwargs)
         self._feature_set = FeatureSet.load(declare(self, ExtractorParams).recipe)
         self._cutter = WindowCutter(self._feature_set.windows, self._feature_set.window_names)
-        self._invalid = 0
-        self._reported = 0
-        self._sent = 0
+        self._invalid = self._reported = self._sent = 0
         self._frame_id = ''  # of the fingertip, of several that of the first input
         self._sensors: dict[str, str] = {}  # by topic
         self._publisher = self.create_publisher(msg.FeatureVector, 'features', FEATURE_QOS)

@@ -106,9 +106,8 @@ def _write(bag: BagWriter, stream: ImportedStream, slide: SteadySlide, start_ns:
         direction_rad=slide.direction_rad, surface=slide.surface,
     )  # fmt: skip
     for phase, part in phases:
-        if not len(part) and phase is Phase.CONTACT:
-            continue
-        _write_phase(bag, stream, slide, replace(named, phase=phase), part=part, start_ns=start_ns, first=first)
+        if len(part) or phase is not Phase.CONTACT:
+            _write_phase(bag, stream, slide, replace(named, phase=phase), part=part, start_ns=start_ns, first=first)
     end_ns = start_ns + stream.to_ns(count)
     bag.write('exploration', replace(named, stamp_ns=end_ns, phase=Phase.DONE, progress=1.0), end_ns + 2 * DELAY_NS)
     return end_ns

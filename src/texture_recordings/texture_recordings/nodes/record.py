@@ -122,11 +122,9 @@ class RecordNode(Node):
             raise InvalidData(f"'{self._path}' cannot be written: {self._error}; free some space and record again")
 
     def _report(self) -> DiagnosticReport:
-        faults = {
-            'lost_samples': sum(self._continuity.lost.values()),
-            'dropped_messages': self._counts['dropped'],
-            'bad_messages': self._counts['bad'],
-        }
+        lost = sum(self._continuity.lost.values())
+        dropped, bad = self._counts['dropped'], self._counts['bad']
+        faults = {'lost_samples': lost, 'dropped_messages': dropped, 'bad_messages': bad}
         numbers: dict[str, Any] = {
             'messages': self._counts['messages'],
             **faults,
@@ -134,8 +132,8 @@ class RecordNode(Node):
             **{f'samples {topic}': count for topic, count in self._continuity.samples.items()},
         }
         said = ', '.join(f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count)
-        message = f'{self._counts["messages"]} messages recorded, {said or "nothing lost"}'
-        return ('WARN' if said else 'OK'), message, numbers
+        sentence = f'{self._counts["messages"]} messages recorded, {said or "nothing lost"}'
+        return 'WARN' if said else 'OK', sentence, numbers
 
 
 def main() -> None:

@@ -35,10 +35,7 @@ SAME_TIME_S = 1e-9
 
 
 def import_tables(
-    mapping: TableMapping,
-    source: str | Path,
-    out: str | Path,
-    readers: Mapping[str, TableReader] = READERS,
+    mapping: TableMapping, source: str | Path, out: str | Path, readers: Mapping[str, TableReader] = READERS
 ) -> ImportReport:
     """Write bags of the slides in the tables below a folder, and return what was found.
 
@@ -303,12 +300,15 @@ class _TableSlides:
             self._report.rows += rows
             self._report.note(self._table.place, count, self._columns.malformed)
             if not rows or count > self._mapping.max_malformed * rows:
-                first = str(next(iter(self._columns.malformed), 'no row at all'))
-                raise InvalidData(
-                    f"'{self._table.place}' has {count} malformed rows of {rows}, first {first}; "
-                    f'at most {100 * self._mapping.max_malformed:g} % are taken (`max_malformed`); look at the columns '
-                    'and at `format` in the mapping'
-                )
+                raise InvalidData(self._malformed_sentence(count, rows))
+
+    def _malformed_sentence(self, count: int, rows: int) -> str:
+        first = str(next(iter(self._columns.malformed), 'no row at all'))
+        return (
+            f"'{self._table.place}' has {count} malformed rows of {rows}, first {first}; "
+            f'at most {100 * self._mapping.max_malformed:g} % are taken (`max_malformed`); look at the columns '
+            'and at `format` in the mapping'
+        )
 
     def _text(self, name: str) -> AnyArray | None:
         return None if name in self._fields else self._columns.texts[name]

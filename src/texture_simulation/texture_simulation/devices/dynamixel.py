@@ -98,9 +98,8 @@ class EmulatedDynamixelBus(EmulatedSerialRobot):
             self._received = self._received[at + 7 + length :]
             if crc16(packet[:-2]) == int.from_bytes(packet[-2:], 'little'):
                 self.motors.receive()
-                answers += self._execute(
-                    packet[4], packet[7], packet[8:-2].replace(b'\xff\xff\xfd\xfd', b'\xff\xff\xfd')
-                )
+                unstuffed = packet[8:-2].replace(b'\xff\xff\xfd\xfd', b'\xff\xff\xfd')
+                answers += self._execute(packet[4], packet[7], unstuffed)
         return answers
 
     def _execute(self, motor: int, instruction: int, params: bytes) -> bytes:

@@ -60,8 +60,7 @@ class RailsFirmware:
 
     def __init__(self, machine: RailsMachine) -> None:
         self.machine = machine
-        self.watchdog_stops = 0
-        self.bad_frames = 0
+        self.watchdog_stops = self.bad_frames = 0
         self.position = np.array([0.0, 0.0, machine.start_height_m])
         self.velocity = np.zeros(3)
         self.surface_m = 0.0  # height of what lies there
@@ -144,6 +143,9 @@ class RailsFirmware:
                 self._flags |= STALL
                 self._halt()
         self.position[:2] += self.velocity[:2] * dt_s
+        self._stop_at_ends()
+
+    def _stop_at_ends(self) -> None:
         travel = self.machine.travel_m
         for axis in (0, 1):
             low, high = self.position[axis] <= -travel, self.position[axis] >= travel

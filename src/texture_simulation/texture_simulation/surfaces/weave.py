@@ -76,13 +76,14 @@ class Weave:
         height = 0.25 * self.thickness_x_m * weak_x * np.cos(across_x)
         height += 0.25 * self.thickness_y_m * weak_y * np.cos(across_y)
         weak = (weak_x * weak_y) ** (1 / self.repeat**2)
-        over = (
-            np.cos(across_x / 2) * np.cos(across_y / 2)
-            if self.repeat == 2
-            else 0.5 * np.cos((across_x + across_y) / self.repeat)
-        )
-        crossing: Array = height + 0.25 * (self.thickness_x_m + self.thickness_y_m) * weak * over
-        return crossing
+        over = self._over(across_x, across_y)
+        return np.asarray(height + 0.25 * (self.thickness_x_m + self.thickness_y_m) * weak * over)
+
+    def _over(self, across_x: Array, across_y: Array) -> Array:
+        """Return where which thread lies above, from -1 to 1."""
+        if self.repeat == 2:
+            return np.asarray(np.cos(across_x / 2) * np.cos(across_y / 2))
+        return np.asarray(0.5 * np.cos((across_x + across_y) / self.repeat))
 
     def _even(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
         """Return where places would lie if the yarns were even."""

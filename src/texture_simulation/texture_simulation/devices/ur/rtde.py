@@ -40,18 +40,24 @@ class RtdeSession:
         """Take over what came; return the answers."""
         self._received += data
         answers = b''
-        while len(self._received) >= HEADER.size:
-            size, kind = HEADER.unpack_from(self._received)
-            if size < HEADER.size:
-                self._received = b''
-                break
-            if len(self._received) < size:
-                break
-            payload, self._received = self._received[HEADER.size : size], self._received[size:]
+        while (packet := self._take_packet()) is not None:
+            kind, payload = packet
             handler = HANDLERS.get(kind)
             answer = handler(self, payload) if handler is not None else None
             answers += _message(kind, answer) if answer is not None else b''
         return answers
+
+    def _take_packet(self) -> tuple[int, bytes] | None:
+        """Return the kind and the content of the next packet; None if it is not complete."""
+        if len(self._received) < HEADER.size:
+            return None
+        size, kind = HEADER.unpack_from(self._received)
+        if size < HEADER.size:
+            self._received = b''
+        if len(self._received) < size or size < HEADER.size:
+            return None
+        payload, self._received = self._received[HEADER.size : size], self._received[size:]
+        return kind, payload
 
     def close(self) -> None:
         """Give the inputs free."""
