@@ -50,6 +50,7 @@ class EvidenceAccumulator:
     A new exploration id, or a vector after the `last` one, starts a new slide. Every estimate says whether the surface
     is known; a label is certain only while it is. An exploration under conditions that were not trained is neither
     known nor decided, and the message says which condition it is. Equally probable labels give no label: unclassified.
+    No confidence is above what the slides held out of the training can show.
 
     Parameters
     ----------
@@ -162,16 +163,17 @@ class EvidenceAccumulator:
         within = not self._deviation
         novelty_score, known = self._novelty_score(model, mean, best, effective_windows)
         known = known and within
-        certain = decided and known and model.stopping_rule.certain(confidence, effective_windows, novelty_score)
+        certain = decided and known and model.certain(confidence, effective_windows, novelty_score)
+        reported = model.error_bound.limited(probabilities)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
             frame_id=vector.frame_id,
             label=model.labels[best] if decided else '',
             known=decided and known,
-            confidence=confidence,
+            confidence=float(reported.max()),
             labels=model.labels,
-            probabilities=tuple(listed),
+            probabilities=tuple(reported.tolist()),
             decided=certain,
             prediction_set=self._candidates(model, probabilities, effective_windows) if final and within else (),
             windows=self._windows,
@@ -183,8 +185,8 @@ class EvidenceAccumulator:
 
     def _explanation(self, model: TextureModel, final: bool) -> str:
         """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
-        no_set = model.prediction_sets.reason if final and not self._deviation else ''
-        return '; '.join(filter(None, (self._deviation, self._message, no_set)))
+        missing = (model.prediction_sets.reason, model.error_bound.reason) if final and not self._deviation else ()
+        return '; '.join(filter(None, (self._deviation, self._message, *missing)))
 
     def _novelty_score(
         self, model: TextureModel, mean: Array, best: int, effective_windows: float

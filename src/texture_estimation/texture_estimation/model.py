@@ -23,6 +23,7 @@ from texture_estimation.learners.learner import Predictor, hidden_layer
 from texture_estimation.log_probabilities import is_tied, log_softmax
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
 from texture_estimation.open_set.domain import Domain
+from texture_estimation.open_set.error_bound import ANY_ERROR_RATE, ErrorBound
 from texture_estimation.open_set.novelty import NoveltyDetector, SlideNovelty, space_means
 from texture_estimation.open_set.prediction_sets import PredictionSets
 from texture_estimation.open_set.stopping_rule import StoppingRule
@@ -70,6 +71,8 @@ class TextureModel:
         Predictor since slides were added; None if none were.
     domain
         Conditions under which the model was trained; outside them it decides nothing.
+    error_bound
+        What the held-out slides can show; it limits the confidence, and early stopping.
 
     Examples
     --------
@@ -102,6 +105,7 @@ class TextureModel:
     added_slides: tuple[AddedSlide, ...] = ()
     incremental_predictor: Predictor | None = None
     domain: Domain = field(default_factory=Domain)
+    error_bound: ErrorBound = ANY_ERROR_RATE
 
     @cached_property
     def predictor(self) -> Predictor:
@@ -129,6 +133,24 @@ class TextureModel:
         return self.domain.widened(
             [added.conditions for added in self.added_slides], [added.label for added in self.added_slides]
         )
+
+    def certain(self, confidence: float, effective_windows: float, novelty_score: float) -> bool:
+        """Return whether a slide may end: by the stopping rule, if enough slides were held out to show its error rate.
+
+        Parameters
+        ----------
+        confidence
+            Probability of the best label, 0 to 1, as the evidence gives it.
+        effective_windows
+            Effective window count so far.
+        novelty_score
+            Novelty score so far.
+
+        Returns
+        -------
+        bool
+        """
+        return self.error_bound.shown and self.stopping_rule.certain(confidence, effective_windows, novelty_score)
 
     @cached_property
     def _hidden_layer(self) -> Callable[[Array], Array] | None:
@@ -247,6 +269,7 @@ class TextureModel:
             'features': list(self.names),
             'tempering_exponent': self.tempering_exponent,
             'stopping_rule': asdict(self.stopping_rule),
+            'error_bound': asdict(self.error_bound),
             'prediction_sets': asdict(self.prediction_sets),
             'domain': self.domain.as_card(),
             'motions': [asdict(motion) for motion in self.next_touch_model.gaussians] if self.next_touch_model else [],
@@ -307,6 +330,7 @@ def load_model(path: str | Path) -> TextureModel:
             next_touch_model=NextTouchModel.from_arrays(gaussians) if gaussians else None,
             examples=TrainingExamples.from_arrays(examples) if examples else None,
             domain=Domain.from_card(card.get('domain', {})),
+            error_bound=ErrorBound(**card['error_bound']) if 'error_bound' in card else ANY_ERROR_RATE,
         )
         model.validate()
     added_slides = read_added_slides(target, model.feature_set, model.names)

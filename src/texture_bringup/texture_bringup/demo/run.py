@@ -137,7 +137,7 @@ def _train(places: Places, recipe: str, progress: ProgressLog) -> None:
 
 
 def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> list[Row]:
-    progress.section('Recognising: new slides at other places; each ends as soon as the classifier is certain')
+    progress.section('Recognising: new slides at other places; each may end as soon as the classifier is certain')
     rows = []
     with rig.recording(places.recognition_bag):
         for surface in plan.surfaces:
@@ -147,6 +147,8 @@ def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressL
                 rows.append(Row(surface, explored.texture))
                 progress.part(f'{", " if number else "recognised as "}{explored.texture.label or "nothing"}')
             progress.part('', last=True)
+    for sentence in filter(None, rows[-1].estimate.message.split('; ')):
+        progress.line(f'the estimates say: {sentence}')
     return rows
 
 

@@ -21,6 +21,7 @@ from texture_estimation.log_probabilities import is_tied
 from texture_estimation.model import TextureModel
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
 from texture_estimation.open_set.domain import Domain
+from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import DecisionParams, Recipe
 from texture_features.labelled_features import LabelledFeatures
 from texture_features.slide_conditions import SlideConditions
@@ -85,6 +86,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         },
         examples=TrainingExamples.of(examples.values, codes, groups),
         domain=_domain(examples, recipe.training),
+        error_bound=ErrorBound(len(slides_held_out), decisions.max_error_rate),
     )
 
 
