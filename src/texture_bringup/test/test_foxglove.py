@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from std_srvs.srv import Trigger
+from texture_msgs import srv
 
 from texture_recordings.ros.topics import TOPICS
 
@@ -16,6 +18,12 @@ FIELD = re.compile(r'^(/\w+)(?:\.(\w+)(\[:\])?)?$')
 # What scripts in the layout make of the topics of the suite, and of which of them.
 SCRIPTS = [script['sourceCode'] for script in LAYOUT['userNodes'].values()]
 MADE = {re.search(r'export const output = "(/\w+)"', code).group(1) for code in SCRIPTS}
+PANELS = LAYOUT['configById']
+BUTTONS = {name: config for name, config in PANELS.items() if name.startswith('CallService!')}
+VIEWS = {name: config for name, config in PANELS.items() if name not in BUTTONS}
+# Services with a request of their own; the others are triggers.
+REQUESTS = {'/explore': srv.Explore, '/add_texture': srv.AddTexture, '/remove_texture': srv.RemoveTexture}
+SERVICE = re.compile(r"create_service\([\w.]+, '(\w+)'")
 TYPES = {'/' + topic.name.lstrip('/'): topic.type for topic in TOPICS.values()}
 
 
@@ -33,9 +41,9 @@ def placed(node: Any) -> list[str]:
     return [node] if isinstance(node, str) else placed(node['first']) + placed(node['second'])
 
 
-@pytest.mark.parametrize('panel', LAYOUT['configById'])
+@pytest.mark.parametrize('panel', VIEWS)
 def test_a_panel_shows_fields_that_its_messages_have(panel: str) -> None:
-    shown = paths(LAYOUT['configById'][panel])
+    shown = paths(VIEWS[panel])
     assert shown
     for path in shown:
         topic, field, all_of_it = FIELD.fullmatch(path).groups()
@@ -48,12 +56,26 @@ def test_a_panel_shows_fields_that_its_messages_have(panel: str) -> None:
 
 
 def test_every_panel_has_its_place() -> None:
-    assert sorted(placed(LAYOUT['layout'])) == sorted(LAYOUT['configById'])
+    assert sorted(placed(LAYOUT['layout'])) == sorted(PANELS)
 
 
 def test_the_topics_of_the_suite_are_all_shown_but_the_features() -> None:
-    shown = {FIELD.fullmatch(path).group(1) for path in paths(LAYOUT['configById'])}
+    shown = {FIELD.fullmatch(path).group(1) for path in paths(VIEWS)}
     assert set(TYPES) - shown == {'/features'}
+
+
+@pytest.mark.parametrize('button', BUTTONS)
+def test_a_button_calls_a_service_of_a_node_with_a_request_that_fits(button: str) -> None:
+    name = BUTTONS[button]['serviceName']
+    nodes = Path(__file__).parents[2].glob('*/texture_*/nodes/*.py')
+    assert name in {f'/{service}' for node in nodes for service in SERVICE.findall(node.read_text())}
+    values = json.loads(BUTTONS[button]['requestPayload'])
+    REQUESTS.get(name, Trigger).Request(**values)  # rclpy checks names and types
+
+
+def test_an_operator_has_a_button_for_each_of_his_actions() -> None:
+    called = {config['serviceName'] for config in BUTTONS.values()}
+    assert {'/explore', '/stop', '/recover', '/tare', '/touch_surface', '/add_texture', '/remove_texture'} <= called
 
 
 @pytest.mark.parametrize('code', SCRIPTS)
