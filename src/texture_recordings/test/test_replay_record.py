@@ -15,13 +15,14 @@ from texture_recordings.bags import read_bag
 
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
+BEGIN_NS = 10**18  # in 2001
 STEP_NS = 10_000_000
 
 
 def write(path: Path, lost: int = 0) -> Path:
     with BagWriter(path) as bag:
         for count in range(200):
-            stamp_ns = 10**18 + count * STEP_NS
+            stamp_ns = BEGIN_NS + count * STEP_NS
             state = ExplorationState(
                 stamp_ns, f'slide{count // 100}', 'linear_slide', Phase.SLIDE, 0.01, surface='cork'
             )
@@ -45,12 +46,12 @@ def wait_for(path: Path, deadline_s: float = 30.0) -> None:
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_what_is_replayed_is_recorded_whole_and_in_order(number: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize(('number', 'sim_time'), [(signal.SIGINT, True), (signal.SIGTERM, False)])
+def test_what_is_replayed_is_recorded_whole_and_in_order(number: int, sim_time: bool, tmp_path: Path) -> None:
     source = write(tmp_path / 'source', lost=5)
-    with node('record', 50, out=str(tmp_path / 'copy')) as record:
+    with node('record', 50, out=str(tmp_path / 'copy'), use_sim_time=sim_time) as record:
         wait_for(tmp_path / 'copy')
-        with node('replay', 50, bag=str(source), rate=5.0) as replay:
+        with node('replay', 50, bag=str(source), rate=5.0, clock=sim_time, use_sim_time=sim_time) as replay:
             assert replay.wait(60.0) == 0, replay.output
         assert record.stop(number) == 0, record.output
     assert 'published 200 exploration, 200 signal' in replay.output
@@ -59,6 +60,9 @@ def test_what_is_replayed_is_recorded_whole_and_in_order(number: int, tmp_path: 
         sent = [value for _, _, value in read_bag(source, (topic,))]
         got = [value for _, _, value in read_bag(tmp_path / 'copy', (topic,))]
         assert [value.stamp_ns for value in got] == [value.stamp_ns for value in sent]
+    recorded_ns = [log_ns for _, log_ns, _ in read_bag(tmp_path / 'copy')]
+    during = [BEGIN_NS <= log_ns <= BEGIN_NS + 200 * STEP_NS for log_ns in recorded_ns]
+    assert all(during) if sim_time else not any(during)
     np.testing.assert_array_equal(
         [value.samples for _, _, value in read_bag(tmp_path / 'copy', ('signal',), '/left')],
         [value.samples for _, _, value in read_bag(source, ('signal',))],

@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -57,8 +58,9 @@ class RecordNode(Node):
         for topic in TOPICS.values():
             self._subscribe(topic, self.resolve_topic_name(topic.name))
         self._diagnostics = Diagnostics(self, self._report)
-        self.create_timer(POLL_S, self._check)
-        self.create_timer(DISCOVERY_S, self._find_more)
+        steady = Clock(clock_type=ClockType.STEADY_TIME)  # with use_sim_time the node's own may stand still
+        self.create_timer(POLL_S, self._check, clock=steady)
+        self.create_timer(DISCOVERY_S, self._find_more, clock=steady)
         self.get_logger().info(f"recording {', '.join(TOPICS)} to '{self._path}'")
 
     def shutdown(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections import Counter
@@ -9,14 +10,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
+from rosgraph_msgs.msg import Clock as ClockTime
 
 from texture_core.errors import DeviceError, InvalidParameter, TextureError
 from texture_core.parameters import param
 from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
+from texture_core.ros.time import to_stamp
 from texture_recordings.bags import RawMessage, find_bags, read_named, topics_in
 from texture_recordings.ros.topics import TOPICS
 from texture_recordings.schedule import Schedule
@@ -51,6 +55,10 @@ class ReplayParams:
     )
     deadline_s: float = param(30.0, 'Sets how long to wait for the subscribers before giving up.', unit='s', low=0.0)
     start_delay_s: float = param(1.0, 'Sets the time between finding the subscribers and the start.', unit='s', low=0.0)
+    clock: bool = param(
+        False,
+        "Publishes the time of the recording on '/clock', for nodes whose parameter 'use_sim_time' is true.",
+    )
 
 
 class ReplayNode(Node):
@@ -64,12 +72,14 @@ class ReplayNode(Node):
         self._messages, names = self._chosen()
         topics = {name: TOPICS[short_name(name)] for name in names}
         self._outputs = {name: self.create_publisher(t.type, name, t.qos) for name, t in topics.items()}
+        self._clock_time = self.create_publisher(ClockTime, '/clock', 10) if self._params.clock else None
         self._counts: Counter[str] = Counter()
         self._stop = threading.Event()
         self._error: TextureError | None = None
         self._player = threading.Thread(target=self._play, name='player')
         self._player.start()
-        self.create_timer(POLL_S, self._check)
+        # With use_sim_time the node's own time would end with the recording.
+        self.create_timer(POLL_S, self._check, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def shutdown(self) -> None:
         """Stop publishing."""
@@ -101,6 +111,8 @@ class ReplayNode(Node):
     def _play(self) -> None:
         try:
             self._wait_for_subscribers()
+            self._begin_clock()
+            self._stop.wait(self._params.start_delay_s)
             self._publish_all()
         except TextureError as error:
             self._error = error
@@ -116,7 +128,16 @@ class ReplayNode(Node):
                     f"within {self._params.deadline_s} s '{missing[0]}' did not get {self._params.subscribers} "
                     "subscription(s); start what shall listen, or set 'subscribers' to 0"
                 )
-        self._stop.wait(self._params.start_delay_s)
+
+    def _begin_clock(self) -> None:
+        """Publish the time of the first message, so that no node is at time 0 when it comes."""
+        for name, message in itertools.islice(self._messages, 1):
+            self._publish_time(message.log_ns)
+            self._messages = itertools.chain([(name, message)], self._messages)
+
+    def _publish_time(self, time_ns: int) -> None:
+        if self._clock_time is not None:
+            self._clock_time.publish(ClockTime(clock=to_stamp(time_ns)))
 
     def _listeners(self) -> dict[str, int]:
         """Return how many subscriptions there are; those of `features` tell that a classifier is ready, too."""
@@ -137,6 +158,7 @@ class ReplayNode(Node):
             if self._stop.is_set():
                 break
             latest_s = max(latest_s, -ahead_s)
+            self._publish_time(message.log_ns)
             self._outputs[name].publish(message.data)
             self._counts[name] += 1
         for publisher in self._outputs.values():
