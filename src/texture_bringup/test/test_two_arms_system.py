@@ -33,6 +33,7 @@ SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance
 LONG = ExplorationRequest('linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.09)
 FINGERS = 'finger0/signal finger1/signal'
 STREAMS = ('left/signal', 'right/finger0/signal', 'right/finger1/signal')
+ALL_UP = 'all nodes are up: sensor feature_extractor classifier explorer'
 # A busy machine may hold up the emulated robots for longer than real ones are allowed to be silent.
 PATIENT = {
     'state_timeout_s': 2.0,
@@ -54,7 +55,7 @@ def arms(tmp_path: Path):
     (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': PATIENT}}))
     models = {'left': trained(tmp_path, 'default', 1), 'right': trained(tmp_path, 'two-fingers', 2)}
     given: dict[str, Any] = {'robot': 'emulator', 'right_sensor': 'tsf85_pair', 'right_signal_topics': FINGERS}
-    given |= {'right_recipe': 'two-fingers', 'record_both': True, 'both_bag': tmp_path / 'bag'}
+    given |= {'autostart': False, 'right_recipe': 'two-fingers', 'record_both': True, 'both_bag': tmp_path / 'bag'}
     for arm, surface in SURFACES.items():
         given[f'{arm}_surface'], given[f'{arm}_model'] = surface, models[arm]
         given[f'{arm}_params'], given[f'{arm}_device'] = tmp_path / 'patient.yaml', tmp_path / f'{arm}_sensor'
@@ -71,10 +72,10 @@ def at_once(do: Callable[[str], ExplorationResult]) -> dict[str, ExplorationResu
         return {arm: future.result() for arm, future in done.items()}
 
 
-def errors(reports: list[DiagnosticArray]) -> dict[str, str]:
-    """Return what nodes reported as errors, by their names."""
+def reported(reports: list[DiagnosticArray], level: bytes = DiagnosticStatus.ERROR) -> dict[str, str]:
+    """Return what nodes reported at that level last, by their names."""
     statuses = [status for report in reports for status in report.status]
-    return {status.name: status.message for status in statuses if status.level == DiagnosticStatus.ERROR}
+    return {status.name: status.message for status in statuses if status.level == level}
 
 
 def test_two_arms_explore_at_once_with_their_own_estimates_and_a_finger_that_drops_out_is_named(arms, tmp_path) -> None:
@@ -103,6 +104,7 @@ def test_two_arms_explore_at_once_with_their_own_estimates_and_a_finger_that_dro
         graph.until(lambda: all(streams))
         frames = [batches[-1].header.frame_id for batches in streams]
         assert frames == ['left/fingertip', 'right/finger0/fingertip', 'right/finger1/fingertip']
+        graph.until(lambda: arms.log.read_text().count(ALL_UP) == len(SURFACES))
         explored = at_once(explore)
         assert {arm: result.message for arm, result in explored.items()} == dict.fromkeys(
             SURFACES, 'the motion ended as asked'
@@ -114,8 +116,9 @@ def test_two_arms_explore_at_once_with_their_own_estimates_and_a_finger_that_dro
         assert (explored['left'].success, explored['left'].texture.label) == (True, SURFACES['left'])
         assert not explored['right'].success
         assert explored['right'].message.startswith("no samples have come on 'right/finger1/signal' for")
-        graph.until(lambda: 'finger1' in errors(reports).get('/right/sensor', ''))
-        assert '/left/sensor' not in errors(reports[-5:])
+        graph.until(lambda: 'finger1' in reported(reports).get('/right/sensor', ''))
+        graph.until(lambda: 'finger1' in reported(reports, DiagnosticStatus.WARN).get('/right/feature_extractor', ''))
+        assert '/left/sensor' not in reported(reports[-5:])
     arms.stop()
     assert 'finger1/signal' in topics_in(tmp_path / 'bag', 'right')
     assert {'signal', 'exploration', 'texture'} <= set(topics_in(tmp_path / 'bag', 'left'))
