@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xacro
 
-
 pytestmark = pytest.mark.ros  # xacro belongs to ROS
 
 FRAGMENT = Path(__file__).parents[1] / 'config' / 'urdf' / 'tsf85_fingertip.urdf.xacro'

@@ -17,7 +17,15 @@ pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 PAGE = Path(__file__).parents[3] / 'docs' / 'operate.md'
 LINE = re.compile(r'`(ros2 (?:service call|action send_goal) [^`]+)`')
-OF_OTHERS = {'/reboot', '/touch_surface', '/forget_touches', '/add_texture', '/remove_last_added', '/remove_texture'}
+OF_OTHERS = {
+    '/reboot',
+    '/touch_surface',
+    '/forget_touches',
+    '/tare',
+    '/add_texture',
+    '/remove_last_added',
+    '/remove_texture',
+}
 
 
 def parsed(line):
