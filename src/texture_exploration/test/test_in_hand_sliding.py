@@ -1,10 +1,12 @@
 import itertools
+import math
 
 import numpy as np
 import pytest
 
 from texture_core.errors import MotionRefused
 from texture_core.exploration import ExplorationRequest, Phase
+from texture_exploration.arms.simulated import SimulatedArmParams
 from texture_exploration.motions.in_hand_sliding import in_hand_random, in_hand_sliding, random_strokes
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
@@ -31,6 +33,30 @@ def test_nothing_is_guaranteed_for_a_turn(table):
     slow = [s.stamp_ns for s, _ in sliding(table) if abs(s.speed_m_s - 0.02) > 0.0005]
     assert len(slow) >= 5
     assert not any(begin <= stamp < end for stamp in slow for begin, end in guaranteed if end > begin)
+
+
+def guaranteed_speeds(table, request):
+    """Explore, and return the true speeds at all times for which a steady one was guaranteed, m/s."""
+    speeds, pace = [], table.pace
+
+    def watched():
+        pace()
+        speeds.append((table.now_ns, math.hypot(*table.arm.state().velocity[:2])))
+
+    table.pace = watched
+    assert table.explore(request).success
+    guaranteed = [(s.stamp_ns, s.stamp_ns + s.steady_s * 1e9) for s, _ in sliding(table)]
+    return [speed for stamp, speed in speeds if any(begin <= stamp < end for begin, end in guaranteed)]
+
+
+@pytest.mark.parametrize('lag_s', [0.008, 0.02, 0.05])
+def test_after_a_turn_a_late_arm_is_steady_only_when_it_has_turned(make_table, lag_s):
+    table = make_table(SimulatedArmParams(force_mode=False, loop_delay_s=lag_s, start_height_m=0.002))
+    speeds = guaranteed_speeds(table, RUB)
+    assert len(speeds) > 100
+    begun_within = abs(speeds[0] / 0.02 - 1)
+    assert begun_within <= table.touch.speed_tolerance
+    assert max(abs(speed / 0.02 - 1) for speed in speeds[1:]) <= 0.02
 
 
 def test_the_direction_alternates(table):

@@ -19,7 +19,7 @@ from texture_exploration.safety import SafetyLimits
 
 # A stroke is about what a fingertip reaches; duration: Kaboli et al. 2015.
 DEFAULTS = {'speed_m_s': 0.02, 'force_n': 1.0, 'distance_m': 0.02, 'duration_s': 2.0}
-TURN_MARGIN_S = 0.01  # steady speed is guaranteed until one step before the turn
+TURN_MARGIN_S = 0.01  # steady speed is guaranteed from one step after a turn until one step before the next
 LEAST_SHARE = 0.5  # of the longest stroke: a random stroke is at least so long
 # (whether the next stroke goes forth, where it begins, m) -> where it ends, m
 StrokeEnds = Callable[[bool, float], float]
@@ -53,7 +53,8 @@ class Strokes:
     """Steer a finger to and fro on a line; a `Follower`.
 
     A turn follows a cosine from full speed one way to full speed the other way, so the finger neither stops with a jolt
-    nor rests.
+    nor rests. Arms follow late: when the finger is seen to move the other way, half of its own turn is still to come,
+    and nothing is guaranteed until that is over.
 
     Parameters
     ----------
@@ -80,20 +81,21 @@ class Strokes:
         self._forth = True
         self._end_m = ends(True, 0.0)
         self._along_m = self._age_m = 0.0
-        self._turning_s = math.nan  # since the turn began; NaN between turns
+        self._since_turn_s = math.inf  # since the newest turn began
+        self._reversed_s = 0.0  # when, after that, the finger was seen to move the other way; inf until then
         self._time_ns = 0
         self._origin: tuple[float, float] | None = None
 
     @property
     def direction_rad(self) -> float:
         """Present direction of travel."""
-        forth = self._forth if math.isnan(self._turning_s) else self._forth is (self._turning_s > 0.5 * self._turn_s)
+        forth = self._forth is (self._since_turn_s > 0.5 * self._turn_s)
         return math.remainder(self._heading_rad + (0.0 if forth else math.pi), 2 * math.pi)
 
     @property
     def steady_m(self) -> float:
         """The way left until the finger turns; none while it does."""
-        if not math.isnan(self._turning_s):
+        if self._since_turn_s < max(self._turn_s, self._reversed_s + 0.5 * self._turn_s + TURN_MARGIN_S):
             return 0.0
         return max(0.0, self._left_m - self._age_m - TURN_MARGIN_S * self._speed_m_s)
 
@@ -108,26 +110,30 @@ class Strokes:
         cos, sin = math.cos(self._heading_rad), math.sin(self._heading_rad)
         along = (x - self._origin[0]) * cos + (y - self._origin[1]) * sin
         passed_s = (time_ns - self._time_ns) * 1e-9
-        straight = math.isnan(self._turning_s)
-        self.travelled_m += abs(along - self._along_m) if straight else self._speed_m_s * passed_s
+        self.travelled_m += self._speed_m_s * passed_s if self._turning else abs(along - self._along_m)
         self._along_m = along
         self._age_m = self._speed_m_s * max(0.0, (time_ns - arm.time_ns) * 1e-9)
-        self._turn(passed_s)
+        self._turn(passed_s, arm.velocity[0] * cos + arm.velocity[1] * sin)
         self._time_ns = time_ns
 
     def velocity(self, speed_m_s: float) -> tuple[float, float]:
         """Return the velocity for a speed, m/s; less than it while turning."""
-        turned = 1.0 if math.isnan(self._turning_s) else -math.cos(math.pi * self._turning_s / self._turn_s)
+        turned = -math.cos(math.pi * self._since_turn_s / self._turn_s) if self._turning else 1.0
         along = speed_m_s * (turned if self._forth else -turned)
         return along * math.cos(self._heading_rad), along * math.sin(self._heading_rad)
 
-    def _turn(self, passed_s: float) -> None:
-        self._turning_s += passed_s
-        if self._turning_s >= self._turn_s:
-            self._turning_s = math.nan
-        if math.isnan(self._turning_s) and self._left_m < 0.0:
-            self._forth, self._turning_s = not self._forth, 0.0
+    def _turn(self, passed_s: float, along_m_s: float) -> None:
+        self._since_turn_s += passed_s
+        if along_m_s > 0.0 if self._forth else along_m_s < 0.0:
+            self._reversed_s = min(self._reversed_s, self._since_turn_s)
+        if not self._turning and self._left_m < 0.0:
+            self._forth = not self._forth
+            self._since_turn_s, self._reversed_s = 0.0, math.inf
             self._end_m = self._ends(self._forth, self._end_m)
+
+    @property
+    def _turning(self) -> bool:
+        return self._since_turn_s < self._turn_s
 
     @property
     def _left_m(self) -> float:
