@@ -6,9 +6,11 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from geometry_msgs.msg import PoseStamped
+from std_srvs.srv import Trigger
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ExplorationRequest, Phase
@@ -110,3 +112,27 @@ def test_a_hand_over_without_the_messages_of_the_controller_manager_is_refused(g
             topics.switch_controllers(('twist_controller',), ())
     finally:
         topics.close()
+
+
+def test_the_controller_manager_is_asked_over_ros_and_one_that_is_not_there_is_waited_for_in_vain(graph):
+    """The service stands in for SwitchController, whose messages the wheels of ROS lack."""
+    asked = []
+
+    def answer(request, response):
+        asked.append(request)
+        response.success, response.message = False, 'a stand-in'
+        return response
+
+    graph.peer.create_service(Trigger, 'manager/switch_controller', answer)
+    topics = controller_topics.RosTopics(RosControllersParams(connect_timeout_s=DEADLINE_S))
+    silent = controller_topics.RosTopics(RosControllersParams(connect_timeout_s=0.2))
+    try:
+        with ThreadPoolExecutor() as pool:
+            answered = pool.submit(topics._ask, Trigger, 'manager/switch_controller', Trigger.Request())
+            graph.until(answered.done)
+        assert answered.result().message == 'a stand-in'
+        assert len(asked) == 1
+        assert silent._ask(Trigger, 'no_manager/switch_controller', Trigger.Request()) is None
+    finally:
+        topics.close()
+        silent.close()
