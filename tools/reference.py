@@ -159,9 +159,13 @@ def difficulty(chosen: dict[str, Any]) -> str:
     if not chosen:
         return ''
     shortfall = f'; {chosen["shortfall"]}' if chosen.get('shortfall') else ''
-    return (
-        f'Anchor (no finding): the scene setting "{chosen["setting"]}" was chosen by {chosen["set_by"]}{shortfall}.\n'
-    )
+    parts = [
+        f'{task}: {percent(part["here"])}, in the paper {percent(part["paper"])}'
+        for task, part in chosen.get('parts', {}).items()
+    ]
+    along = f'; set along with it: {"; ".join(parts)}' if parts else ''
+    setting = f'Anchor (no finding): the scene setting "{chosen["setting"]}" was chosen by {chosen["set_by"]}'
+    return f'{setting}{shortfall}{along}.\n'
 
 
 def grades(root: Path) -> str:

@@ -1,3 +1,4 @@
+import json
 from itertools import combinations
 from pathlib import Path
 
@@ -8,12 +9,15 @@ from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.optimise.cases import CASES, DATA, LINEAR
 from texture_benchmarks.optimise.pairs_run import CASES as PAIR_CASES
 from texture_benchmarks.optimise.pairs_run import counts, measured, recognised
+from texture_benchmarks.papers.recipe_digest import _decisive
 from texture_benchmarks.result import BenchmarkOptions
 from texture_estimation.learners.learner import of_examples
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_estimation.search.feature_cache import FeatureCache
 from texture_estimation.search.fitness import decisions
 from texture_estimation.search.joined_pairs import joined_recipe
+
+STORED = Path(__file__).parents[3] / 'docs' / 'charts' / 'optimise-pairs.json'
 
 
 def test_searches_have_the_size_of_the_papers() -> None:
@@ -54,6 +58,14 @@ def test_choices_of_all_pairs_are_counted_and_the_pairs_are_tested_together(tmp_
             assert 0.0 <= shares['recognised'][0] <= 1.0
     linear = result.numbers['cases']['linear, SVM']
     assert Recipe.from_mapping(linear['joined'], 'joined').learner_name == 'tuned_pairs'
+
+
+@pytest.mark.parametrize('kind', ['ANN', 'SVM'])
+def test_the_shipped_recipe_of_tuned_pairs_is_the_one_that_the_stored_search_found(kind: str) -> None:
+    stored = json.loads(STORED.read_text(encoding='utf-8'))['numbers']['cases'][f'linear, {kind}']
+    found = Recipe.from_mapping(stored['joined'], 'joined').as_mapping()
+    shipped = load_recipe(f'ets-linear-{kind.lower()}-pairs').as_mapping()
+    assert _decisive(shipped) == _decisive(found)  # all but descriptions and rules that end a slide early
 
 
 def test_counts_are_of_options_and_of_numbers_lowest_median_and_highest() -> None:

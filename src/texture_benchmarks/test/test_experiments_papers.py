@@ -1,11 +1,12 @@
 import json
 from pathlib import Path
+from typing import Any
 
 import matplotlib.image
 import numpy as np
 import pytest
 
-from texture_benchmarks.papers import PROTOCOLS, Experiment, report, run_experiment
+from texture_benchmarks.papers import EXPERIMENTS, PROTOCOLS, Experiment, report, run_experiment
 from texture_benchmarks.papers.claim_checks import at_least, higher, lower_in, most_errors, seldom
 from texture_benchmarks.papers.interval import apart, mean, share
 from texture_benchmarks.papers.method_result import MethodResult
@@ -18,7 +19,7 @@ from texture_estimation.search.fitness import UNDECIDED
 from texture_simulation.scene import load_scene
 
 STORED = json.loads((Path(__file__).parent / 'stored_findings.json').read_text())
-LARGE = 0.15  # of the slides
+LARGE = 0.15  # of the slides, or in grades
 CODES = np.repeat([0, 1, 2], 20)
 CONDITIONS = np.where(np.arange(60) % 2 == 0, 'slow', 'fast')
 SURFACES = ('cork', 'felt', 'linen')
@@ -46,11 +47,25 @@ def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(protoc
             if method.paper.test is not None:
                 assert f'{100 * method.paper.test:.1f}' in text
     assert {finding['verdict'] for finding in result.numbers['findings']} <= {'holds', 'does not hold', 'not decided'}
-    pinned = STORED.get(protocol.name, {})
-    for finding in result.numbers['findings']:
-        value, low, high, _ = pinned.get(finding['claim'], (0.0, 0.0, 0.0, ''))
-        if min(abs(low), abs(high)) > LARGE and low * high > 0:  # a few slides show the direction of what is large
+    few_show_the_direction_of_what_is_large(protocol.name, result.numbers['findings'])
+
+
+def few_show_the_direction_of_what_is_large(name: str, findings: list[dict[str, Any]]) -> int:
+    """Assert that what is large in the stored experiment has its sign in these findings; return how many are large."""
+    large = 0
+    for finding in findings:
+        value, low, high, _ = STORED[name][finding['claim']]
+        if min(abs(low), abs(high)) > LARGE and low * high > 0:
             assert finding['interval'][0] * value > 0, finding['claim']
+            large += 1
+    return large
+
+
+@pytest.mark.benchmark
+@pytest.mark.parametrize('name', sorted(EXPERIMENTS.keys() - {protocol.name for protocol in PROTOCOLS}))
+def test_a_quick_run_of_an_experiment_without_a_protocol_shows_the_direction_too(name: str, tmp_path: Path) -> None:
+    result, _ = run_experiment(name, Experiment(tmp_path, quick=True, papers_only=True))
+    assert few_show_the_direction_of_what_is_large(name, result.numbers['findings'])
 
 
 def test_an_unknown_experiment_is_refused_with_the_nearest_name(tmp_path: Path) -> None:

@@ -189,6 +189,8 @@ class Anchor:
         Whose figure it is, if not of the same experiment.
     shortfall
         Why the figure could not be met; '' if it was.
+    parts
+        The paper's figures of the same method on parts of the same slides, by task: set along with it, no findings.
     """
 
     task: str
@@ -198,6 +200,12 @@ class Anchor:
     setting: str = 'noise of the fast channels'
     experiment: str = ''
     shortfall: str = ''
+    parts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def figures(self) -> Mapping[str, float]:
+        """All figures that are set, by task."""
+        return {self.task: self.test, **self.parts}
 
 
 @dataclass(frozen=True)

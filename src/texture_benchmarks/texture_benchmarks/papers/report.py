@@ -67,12 +67,16 @@ def _slides(outcome: MethodResult) -> int:
 def _difficulty(protocol: Protocol, found: MethodResults) -> dict[str, Any]:
     anchor = protocol.anchor
     outcome = found.get((anchor.task, anchor.method)) if not anchor.experiment else None
+    parts = {
+        task: {'paper': test, 'here': found[task, anchor.method].test.as_json()} for task, test in anchor.parts.items()
+    }
     return {
         'set_by': f'{anchor.experiment or protocol.name}: {anchor.method}, {anchor.task}: {anchor.source}',
         'paper': anchor.test,
         'here': outcome and outcome.test.as_json(),
         'setting': anchor.setting,
         'shortfall': anchor.shortfall,
+        'parts': parts,
     }
 
 
