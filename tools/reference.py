@@ -18,6 +18,7 @@ from typing import Any
 
 import yaml
 
+from texture_benchmarks.papers.recipe_digest import digest_of
 from texture_core.parameters import markdown_table
 
 ROOT = Path(__file__).parents[1]
@@ -35,6 +36,7 @@ EXPERIMENTS = (
     'kaboli',
     'kaboli-shapes',
     'hu',
+    'hu-components',
     'roughness',
 )
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
@@ -196,8 +198,14 @@ def later(root: Path) -> str:
     for name, cell in sorted(cells.items(), key=lambda item: -item[1]['window_accuracy']):
         after = cell['accuracy_at_s']['5.0']
         shares = (cell['window_accuracy'], after, cell['unclassified_windows'])
-        rows.append(f'| {name} | {" | ".join(map(percent, shares))} | {cell.get("definition", "an earlier one")} |')
+        rows.append(f'| {name} | {" | ".join(map(percent, shares))} | {_definition(name, cell)} |')
     return '\n'.join(rows) + '\n'
+
+
+def _definition(recipe: str, cell: dict[str, Any]) -> str:
+    """Return the digest of the definition that was measured, or that it was an earlier one than the present."""
+    measured = cell.get('definition')
+    return measured if measured and measured == digest_of(recipe) else 'an earlier one'
 
 
 def percent(share: float | list[float] | None) -> str:

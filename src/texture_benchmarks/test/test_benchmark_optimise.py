@@ -8,7 +8,8 @@ import pytest
 from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
 from texture_benchmarks.optimise.cases import CASES, DATA, LINEAR
 from texture_benchmarks.optimise.pairs_run import CASES as PAIR_CASES
-from texture_benchmarks.optimise.pairs_run import counts, measured, recognised
+from texture_benchmarks.optimise.pairs_run import measured, recognised
+from texture_benchmarks.optimise.pairs_seeds import counts, over_seeds
 from texture_benchmarks.papers.recipe_digest import _decisive
 from texture_benchmarks.result import BenchmarkOptions
 from texture_estimation.learners.learner import of_examples
@@ -56,6 +57,8 @@ def test_choices_of_all_pairs_are_counted_and_the_pairs_are_tested_together(tmp_
         assert sum(case['counts']['ranking'].values()) == len(case['chosen']) == 3
         for shares in case['tested'].values():
             assert 0.0 <= shares['recognised'][0] <= 1.0
+        assert case['seeds'] == [0, 1]
+        assert sum(case['counts_of_all']['ranking'].values()) == 6
     linear = result.numbers['cases']['linear, SVM']
     assert Recipe.from_mapping(linear['joined'], 'joined').learner_name == 'tuned_pairs'
 
@@ -71,6 +74,20 @@ def test_the_shipped_recipe_of_tuned_pairs_is_the_one_that_the_stored_search_fou
 def test_counts_are_of_options_and_of_numbers_lowest_median_and_highest() -> None:
     chosen = [{'ranking': 'frequency', 'peaks': peaks} for peaks in (2, 3, 15)]
     assert counts(chosen) == {'ranking': {'frequency': 3}, 'peaks': [2.0, 3.0, 15.0]}
+
+
+def test_choices_and_shares_of_several_seeds_are_put_together() -> None:
+    def case(peaks: int, before: float, after: float) -> dict:
+        tested = {'as shipped': {'recognised': [before, 0.0, 1.0]}, 'tuned by pair': {'recognised': [after, 0.0, 1.0]}}
+        return {'slides': 10, 'chosen': {'a – b': {'peaks': peaks}}, 'counts': {}, 'tested': tested}
+
+    merged = over_seeds({0: case(2, 0.5, 0.7), 1: case(4, 0.6, 0.9), 2: case(9, 0.7, 0.8)})
+    assert merged['seeds'] == [0, 1, 2]
+    assert merged['chosen'] == {'a – b': {'peaks': 2}}
+    assert merged['counts_of_all'] == {'peaks': [2.0, 4.0, 9.0]}
+    value, low, high = merged['over_seeds']['gain']
+    assert value == pytest.approx(0.2)
+    assert high - value == pytest.approx(value - low) == pytest.approx(4.303 * 0.1 / 3**0.5, rel=1e-3)
 
 
 def test_all_pairs_together_decide_as_the_one_model_that_joins_them() -> None:

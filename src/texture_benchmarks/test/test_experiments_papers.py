@@ -73,7 +73,7 @@ def test_an_unknown_experiment_is_refused_with_the_nearest_name(tmp_path: Path) 
         run_experiment('jamalli', Experiment(tmp_path))
 
 
-@pytest.mark.parametrize('name', ['jamali', 'kaboli', 'hu'])
+@pytest.mark.parametrize('name', ['jamali', 'kaboli', 'hu', 'hu-components'])
 def test_an_experiment_whose_paper_searches_for_nothing_refuses_to_tune(name: str, tmp_path: Path) -> None:
     with pytest.raises(InvalidParameter, match=f"'{name}' has nothing to tune"):
         run_experiment(name, Experiment(tmp_path, quick=True, tune=True))

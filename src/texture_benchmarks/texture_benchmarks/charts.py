@@ -11,6 +11,8 @@ import numpy as np
 from texture_core.arrays import AnyArray, Array
 from texture_evaluation.charts import COLOURS, chart, draw_confusion, line_styles, pareto_front
 
+FEW_LINES = 5  # more names than these would cover lines
+
 
 def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: str | Path) -> Path:
     """Draw a confusion table; each row is a surface and adds up to 100 %.
@@ -98,7 +100,10 @@ def line_chart(
         else:
             axes.set_xlim(left=0)
         axes.set_ylim(top=101)
-        axes.legend(loc='best')
+        if len(series) > FEW_LINES:
+            axes.legend(loc='upper center', bbox_to_anchor=(0.5, -0.14), ncols=4, fontsize=8)
+        else:
+            axes.legend(loc='best')
     return Path(path)
 
 

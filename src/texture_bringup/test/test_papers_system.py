@@ -1,118 +1,295 @@
-"""Each paper as a user repeats it on the emulator: its sensor, motion and recipe, from exploring to a live answer."""
+"""Each paper as a user repeats it on the emulator: its sensor, motion and recipes, from exploring to a live answer."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+
+from rclpy.parameter import Parameter  # noqa: E402
+from texture_msgs import msg  # noqa: E402
 
 from texture_bringup.demo.isolation import free_port  # noqa: E402
 from texture_bringup.ros.operator import Operator  # noqa: E402
 from texture_core.exploration import ExplorationRequest  # noqa: E402
 from texture_core.resources import folder  # noqa: E402
+from texture_core.ros.conversions import from_msg  # noqa: E402
+from texture_core.ros.local_graph import LocalGraph  # noqa: E402
+from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS  # noqa: E402
 from texture_estimation.classification.training import train  # noqa: E402
+from texture_estimation.nodes.classifier import Classifier  # noqa: E402
+from texture_estimation.nodes.roughness_estimator import RoughnessEstimator  # noqa: E402
 from texture_estimation.recipe import load_recipe  # noqa: E402
 from texture_estimation.roughness.grades import read_grades  # noqa: E402
 from texture_estimation.roughness.roughness_recipe import load_roughness_recipe  # noqa: E402
 from texture_estimation.roughness.training import train_grades  # noqa: E402
 from texture_exploration.presets import load_preset  # noqa: E402
 from texture_features.labelled_features import LabelledFeatures  # noqa: E402
+from texture_features.nodes.feature_extractor import FeatureExtractor  # noqa: E402
 from texture_launch.child import ChildLauncher  # noqa: E402
 
 DOMAIN = 87
 DEADLINE_S = 60.0
+SPINNING_S = 150.0  # of one exploration and all estimates of it
 SMOOTH, ROUGH = 'glass', 'ridge_2mm_deep'
+# This machine may be busy.
+PATIENT = {'estimate_timeout_s': 20.0, 'state_timeout_s': 1.5}
+ARMS = {
+    'ur': {'silence_s': 1.5, 'watchdog_hz': 1.0, 'connect_timeout_s': 30.0},
+    'rails': {},
+    'hand': {},
+    'ros_controllers': {'deadman_s': 1.5, 'connect_timeout_s': 30.0},
+}
 
 
 @dataclass(frozen=True)
 class Paper:
-    """What a paper is repeated with; so many slides over each surface are for training."""
+    """What a paper is repeated with; so many slides over each surface are for training, the last is named live.
+
+    `recipe` is computed and classifies in the launched nodes, those `beside` in nodes of this process.
+    """
 
     sensor: str
     preset: str
     recipe: str
+    beside: tuple[str, ...] = ()
     slides: int = 2
+    robot: str = 'emulator'
+    scene: str = 'twelve_textures'
+    surfaces: tuple[str, str] = (SMOOTH, ROUGH)
 
 
 PAPERS = {
-    'Roberge et al., textures': Paper('tsf85_3x4', 'ets-linear', 'ets-linear-svm'),
-    'Jamali & Sammut 2010': Paper('daq', 'jamali', 'jamali-naive-bayes-5', slides=1),
-    'Kaboli et al. 2015': Paper('biotac_hand', 'kaboli', 'kaboli-svm-two-fingers'),
-    'Hu et al. 2014': Paper('pvdf', 'hu-cross', 'hu-pca-svm-xy', slides=1),
+    'Roberge et al., linear': Paper(
+        'tsf85_3x4',
+        'ets-linear',
+        'ets-linear-svm',
+        ('ets-linear-ann', 'ets-linear-svm-vote', 'ets-linear-ann-vote'),
+    ),
+    'Roberge et al., variables for each pair': Paper(  # of the textures of their scene
+        'tsf85_3x4',
+        'ets-linear',
+        'ets-linear-svm-pairs',
+        ('ets-linear-ann-pairs',),
+        slides=4,
+        scene='ets_linear',
+        surfaces=('grid_1', 'ridge_1'),
+    ),
+    'Roberge et al., circles': Paper('tsf85_3x4', 'ets-circular', 'ets-circular-svm', ('ets-circular-ann',)),
+    'Roberge et al., ten textures': Paper('tsf85_3x4', 'ets-ten-textures', 'ets-fine-svm', ('ets-fine-ann',)),
+    'Jamali & Sammut 2010': Paper(
+        'daq',
+        'jamali',
+        'jamali-naive-bayes-5',
+        (
+            'jamali-naive-bayes-3',
+            'jamali-amplitude',
+            'jamali-amplitude-deviation',
+            'jamali-stft',
+            'jamali-wavelets',
+            'jamali-symbols',
+        ),
+        slides=1,
+    ),
+    'Kaboli et al. 2015, two fingers': Paper(
+        'biotac_hand', 'kaboli', 'kaboli-svm-two-fingers', ('kaboli-pa-two-fingers', 'kaboli-em-two-fingers')
+    ),
+    'Kaboli et al. 2015, one finger': Paper(
+        'biotac', 'kaboli', 'kaboli-svm', ('kaboli-pa', 'kaboli-pa-ovr', 'kaboli-em', 'kaboli-svm-rbf')
+    ),
+    'Kaboli et al. 2015, two fingers of the emulated hand': Paper(
+        'biotac_hand', 'kaboli', 'kaboli-svm-two-fingers', robot='hand'
+    ),
+    'Hu et al. 2014': Paper('pvdf', 'hu-cross', 'hu-pca-svm-xy', ('hu-pca-svm', 'hu-log-pca-svm'), slides=1),
 }
-ROUGHNESS = Paper('tsf85', 'ets-roughness', 'ets-roughness-ann1')
+ROUGHNESS = Paper(
+    'tsf85',
+    'ets-roughness',
+    'ets-roughness-ann1',
+    ('ets-roughness-ann5', 'ets-roughness-svm5', 'ets-roughness-ann1-sigmoid', 'ets-roughness-ann5-sigmoid'),
+)
+
+
+def recipe_file(name: str) -> Path:
+    kind = 'roughness' if name.startswith('ets-roughness') else 'recipes'
+    return folder('texture_estimation', f'config/{kind}') / f'{name}.yaml'
+
+
+@dataclass
+class Beside:
+    """A recipe whose features and estimates are computed in this process, on topics of its own."""
+
+    recipe: str
+    node: Any
+    vectors: list[Any]
+    estimates: list[Any]
+    labels: dict[str, str] = field(default_factory=dict)  # of explorations
+
+    @classmethod
+    def joining(cls, graph: LocalGraph, recipe: str, kind: Callable[..., Any] = Classifier) -> 'Beside':
+        own = recipe.replace('-', '_')
+        _, topic = kind.estimate
+        renaming = ['--ros-args', '-r', f'features:=features_{own}', '-r', f'{topic}:={topic}_{own}', '-r']
+        extractor = partial(FeatureExtractor, cli_args=[*renaming, f'__node:=features_of_{own}'])
+        graph.add(extractor, recipe=str(recipe_file(recipe)))
+        node = graph.add(partial(kind, cli_args=[*renaming, f'__node:=estimator_of_{own}']))
+        vectors = graph.listen(msg.FeatureVector, f'features_{own}', FEATURE_QOS)
+        return cls(recipe, node, vectors, graph.listen(kind.estimate[0], f'{topic}_{own}', ESTIMATE_QOS))
+
+    def has_described(self, exploration_id: str) -> bool:
+        return any(vector.last and vector.exploration_id == exploration_id for vector in self.vectors)
+
+    def examples(self) -> LabelledFeatures:
+        vectors = [from_msg(vector) for vector in self.vectors]
+        assert {vector.exploration_id for vector in vectors if not vector.last} == set(self.labels), self.recipe
+        return LabelledFeatures.from_vectors(vectors, self.labels)
+
+    def use(self, model: Path) -> None:
+        [result] = self.node.set_parameters([Parameter('model', value=str(model))])
+        assert result.successful, result.reason
+
+    def last_estimate(self, exploration_id: str) -> Any:
+        own = [one for one in self.estimates if one.exploration_id == exploration_id and one.final]
+        return from_msg(own[-1]) if own else None
 
 
 class Rig:
-    """The emulator with the sensor of a paper, in a ROS domain of its own."""
+    """The emulator, or an emulated robot, with the sensor of a paper, in a ROS domain of its own."""
 
-    def __init__(self, paper: Paper, recipe: str, out: Path) -> None:
+    def __init__(self, paper: Paper, out: Path) -> None:
         self.paper = paper
         self._out = out
         self._environment = {**os.environ, 'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_LOG_DIR': str(out)}
-        given = {'sensor': paper.sensor, 'device': out / 'sensor', 'finger_port': free_port(), 'recipe': recipe}
-        self.launcher = self.started('emulator', {**given, 'surface': SMOOTH, 'watch_signal': False})
+        parameters = out / 'patient.yaml'
+        patient = {**PATIENT, **ARMS.get(paper.robot, {})}
+        parameters.write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
+        place = {'emulator': {}, 'ur': {'ip': '127.0.0.111'}, 'ros_controllers': {}}
+        given = {
+            'sensor': paper.sensor,
+            'device': out / 'sensor',
+            'finger_port': free_port(),
+            'recipe': recipe_file(paper.recipe),
+            'scene': paper.scene,
+            'surface': paper.surfaces[0],
+            'watch_signal': False,
+            'explorer_params': parameters,
+            **place.get(paper.robot, {'robot': out / paper.robot}),
+        }
+        self.launcher = self.started(paper.robot, given)
         self.operator = Operator(domain_id=DOMAIN, guard=self.launcher.check)
+        self.graph = LocalGraph(DOMAIN, deadline_s=SPINNING_S)
+        self.beside: list[Beside] = []
 
     def started(self, name: str, given: dict[str, object]) -> ChildLauncher:
         """Return a launch file that is to be started with arguments."""
         return ChildLauncher(name, given, self._environment, self._out / f'{name}.log')
+
+    def join(self, kind: Callable[..., Any] = Classifier) -> None:
+        """Start the nodes of the recipes beside, and wait until they hear what moves and what it measures."""
+        self.beside = [Beside.joining(self.graph, recipe, kind) for recipe in self.paper.beside]
+        n_extractors = 1 + len(self.beside)
+        self.graph.until(lambda: self.graph.peer.count_subscribers('exploration') >= n_extractors)
+        self._meanwhile(self.operator.wait_for_listeners, ('exploration',), n_extractors, self.launcher.check)
 
     @property
     def request(self) -> ExplorationRequest:
         """The first motion of the preset."""
         return load_preset(self.paper.preset).requests[0]
 
+    def explore(self, surface: str = '') -> tuple[Any, list[Any]]:
+        """Explore as the paper did; return the result and the features of the launched nodes."""
+        request = replace(self.request, surface=surface)
+        explored, own = self._meanwhile(self.operator.explore_with_features, request)
+        assert explored.success, explored.message
+        assert own, f'{self.paper.recipe} has no window of {request}'
+        for one in self.beside:
+            self.graph.until(partial(one.has_described, explored.exploration_id))
+        return explored, own
+
     def examples(self) -> LabelledFeatures:
-        """Explore both surfaces as the paper did, and return the features that the running nodes made of it."""
+        """Explore both surfaces, and return the features that the launched nodes made of it."""
         vectors, surfaces = [], {}
-        for surface in (SMOOTH, ROUGH):
+        for surface in self.paper.surfaces:
             self.operator.set_parameters('emulator', {'surface': surface})
             for _ in range(self.paper.slides):
-                explored, own = self.operator.explore_with_features(replace(self.request, surface=surface))
-                assert explored.success, explored.message
-                assert own, f'{self.paper.recipe} has no window of {self.request}'
+                explored, own = self.explore(surface)
                 vectors += own
                 surfaces[explored.exploration_id] = surface
+        for one in self.beside:
+            one.labels = surfaces
         return LabelledFeatures.from_vectors(vectors, surfaces)
+
+    def _meanwhile(self, wait: Callable[..., Any], *given: Any) -> Any:
+        """Wait for the launched nodes while those of this process go on."""
+        with ThreadPoolExecutor(1) as pool:
+            waiting = pool.submit(wait, *given)
+            self.graph.until(waiting.done)
+        return waiting.result()
 
 
 @contextmanager
-def running(paper: Paper, recipe: str, out: Path) -> Iterator[Rig]:
-    rig = Rig(paper, recipe, out)
-    with rig.launcher, rig.operator:
+def running(paper: Paper, out: Path, kind: Callable[..., Any] = Classifier) -> Iterator[Rig]:
+    rig = Rig(paper, out)
+    with rig.launcher, rig.operator, rig.graph:
         rig.operator.wait_for_explorer(DEADLINE_S)
         rig.operator.wait_for_listeners(('features', 'exploration'), 1, rig.launcher.check)
-        patient = {'estimate_timeout_s': 20.0, 'state_timeout_s': 1.5}  # this machine may be busy
-        rig.operator.set_parameters('explorer', patient)
+        rig.join(kind)
         yield rig
 
 
 @pytest.mark.parametrize('paper', PAPERS.values(), ids=PAPERS)
-def test_the_recipe_of_a_paper_trains_from_its_motion_and_names_the_surface_live(paper: Paper, tmp_path: Path) -> None:
-    with running(paper, paper.recipe, tmp_path) as rig:
+def test_recipes_of_a_paper_train_from_its_motion_and_name_the_surface_live(paper: Paper, tmp_path: Path) -> None:
+    with running(paper, tmp_path) as rig:
         model = train(load_recipe(paper.recipe), rig.examples(), 'model').save(tmp_path / 'model')
         rig.operator.set_parameters('classifier', {'model': str(model)})
-        explored = rig.operator.explore(rig.request)
-    assert explored.success, explored.message
-    assert (explored.texture.label, explored.texture.final) == (ROUGH, True), explored.texture.message
-    assert explored.texture.evidence_s >= load_recipe(paper.recipe).feature_set.windows.length_s
+        for one in rig.beside:
+            one.use(train(load_recipe(one.recipe), one.examples(), 'model').save(tmp_path / one.recipe))
+        explored, _ = rig.explore()
+        rig.graph.until(lambda: all(one.last_estimate(explored.exploration_id) for one in rig.beside))
+    estimates = {one.recipe: one.last_estimate(explored.exploration_id) for one in rig.beside}
+    for recipe, estimate in {paper.recipe: explored.texture, **estimates}.items():
+        assert (estimate.label, estimate.final) == (paper.surfaces[-1], True), (recipe, estimate.message)
+        assert estimate.evidence_s >= load_recipe(recipe).feature_set.windows.length_s
 
 
-def test_the_recipe_of_rispal_et_al_trains_from_their_motion_and_grades_the_surface_live(tmp_path: Path) -> None:
-    grades = tmp_path / 'grades.csv'
-    grades.write_text(f'texture,grade\n{SMOOTH},1\n{ROUGH},5\n', encoding='utf-8')
-    recipe = load_roughness_recipe(ROUGHNESS.recipe)
-    windows = folder('texture_estimation', 'config/roughness') / f'{ROUGHNESS.recipe}.yaml'
-    with running(ROUGHNESS, str(windows), tmp_path) as rig:
-        train_grades(recipe, rig.examples(), read_grades(grades), 'grades').save(tmp_path / 'grades')
+def test_recipes_of_rispal_et_al_train_from_their_motion_and_grade_the_surface_live(tmp_path: Path) -> None:
+    table = tmp_path / 'grades.csv'
+    table.write_text(f'texture,grade\n{SMOOTH},1\n{ROUGH},5\n', encoding='utf-8')
+    grades = read_grades(table)
+    with running(ROUGHNESS, tmp_path, RoughnessEstimator) as rig:
+        recipe = load_roughness_recipe(ROUGHNESS.recipe)
+        train_grades(recipe, rig.examples(), grades, 'grades').save(tmp_path / 'grades')
+        for one in rig.beside:
+            model = train_grades(load_roughness_recipe(one.recipe), one.examples(), grades, 'grades')
+            one.use(model.save(tmp_path / one.recipe))
         with rig.started('roughness', {'roughness_model': tmp_path / 'grades.json'}) as grading:
             rig.operator.wait_for_listeners(('roughness_features', 'roughness'), 1, grading.check)
-            roughness = rig.operator.explore(rig.request).roughness
-    assert (roughness.valid, roughness.final) == (True, True), roughness
-    assert roughness.grade == pytest.approx(5.0, abs=1.0)
+            explored, _ = rig.explore()
+            rig.graph.until(lambda: all(one.last_estimate(explored.exploration_id) for one in rig.beside))
+    estimates = {one.recipe: one.last_estimate(explored.exploration_id) for one in rig.beside}
+    for name, roughness in {ROUGHNESS.recipe: explored.roughness, **estimates}.items():
+        assert (roughness.valid, roughness.final) == (True, True), (name, roughness)
+        assert roughness.grade == pytest.approx(5.0, abs=1.0), name
+
+
+@pytest.mark.parametrize('robot', [name for name in ARMS if name != 'hand'])  # which is one of the papers above
+def test_the_motion_of_kaboli_et_al_gives_two_fingers_on_an_emulated_robot_a_window(robot: str, tmp_path: Path) -> None:
+    with running(replace(PAPERS['Kaboli et al. 2015, two fingers'], robot=robot, beside=()), tmp_path) as rig:
+        _, [window, *_] = rig.explore()
+    assert len(window.values) == 16  # of two fingers, 8 each
+
+
+def test_every_recipe_of_a_paper_is_tried_above() -> None:
+    tried = {recipe for paper in (*PAPERS.values(), ROUGHNESS) for recipe in (paper.recipe, *paper.beside)}
+    files = [recipe_file('ets-linear-svm').parent, recipe_file('ets-roughness-ann1').parent]
+    shipped = {path.stem for one in files for path in one.glob('*.yaml')}
+    assert tried == {name for name in shipped if name.startswith(('ets-', 'jamali-', 'kaboli-', 'hu-'))}

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
 import numpy as np
 
+from texture_benchmarks.optimise.pairs_seeds import counts, over_seeds
 from texture_benchmarks.papers import ets_circular, ets_fine, ets_linear
 from texture_benchmarks.papers.interval import share
 from texture_benchmarks.papers.protocol import Mask, Protocol, RecognitionTask
@@ -37,6 +37,7 @@ NAME = 'optimise-pairs'
 SMALL = SearchParams(population=13, generations=10, halves=6, finalists=1)
 QUICK = SearchParams(population=4, generations=2, halves=2, finalists=1)
 QUICK_SLIDES, QUICK_SURFACES = 24, 3
+SEEDS, QUICK_SEEDS = 5, 2
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,14 @@ CASES: Mapping[str, PairCase] = {
 
 
 def run(options: BenchmarkOptions) -> BenchmarkResult:
-    """Search for each pair of each experiment, count what was chosen, and test all pairs together."""
-    return result_of({name: run_case(case, options) for name, case in CASES.items()})
+    """Search for each pair of each experiment with several seeds, count the choices, and test all pairs together."""
+    seeds = range(options.seed, options.seed + (QUICK_SEEDS if options.quick else SEEDS))
+    return result_of(
+        {
+            name: over_seeds({seed: run_case(case, replace(options, seed=seed)) for seed in seeds})
+            for name, case in CASES.items()
+        }
+    )
 
 
 def result_of(cases: Mapping[str, Any]) -> BenchmarkResult:
@@ -75,7 +82,7 @@ def result_of(cases: Mapping[str, Any]) -> BenchmarkResult:
     Parameters
     ----------
     cases
-        What `run_case` returns, by name.
+        What `over_seeds` returns, by name.
 
     Returns
     -------
@@ -164,34 +171,6 @@ def measured(case: PairCase, options: BenchmarkOptions) -> tuple[SlideArrays, Ma
     slides = gather(scene, task, options.seed, slow=False)
     rng = np.random.default_rng(options.seed)
     return slides.views[0], case.protocol.divide(slides.codes, slides.conditions, rng, options.quick)[0]
-
-
-def counts(chosen: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return how often each option was chosen, and of numbers the lowest, the median and the highest.
-
-    Parameters
-    ----------
-    chosen
-        Variables of each pair.
-
-    Returns
-    -------
-    dict
-        By variable: counts by option, or [lowest, median, highest].
-
-    Examples
-    --------
-    >>> counts([{'force': 'yes', 'peaks': 3}, {'force': 'no', 'peaks': 9}, {'force': 'yes', 'peaks': 4}])
-    {'force': {'no': 1, 'yes': 2}, 'peaks': [3.0, 4.0, 9.0]}
-    """
-    summary: dict[str, Any] = {}
-    for name in chosen[0]:
-        values = [choice[name] for choice in chosen]
-        if isinstance(values[0], str):
-            summary[name] = dict(sorted(Counter(values).items()))
-        else:
-            summary[name] = [float(np.min(values)), float(np.median(values)), float(np.max(values))]
-    return summary
 
 
 def recognised(recipes: Mapping[Pair, Recipe], slides: SlideArrays, trained_on: Mask) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from texture_benchmarks.papers import (
     ets_linear,
     friction,
     hu,
+    hu_components,
     jamali,
     kaboli,
     kaboli_shapes,
@@ -27,6 +28,7 @@ PROTOCOLS = tuple(paper.PROTOCOL for paper in (ets_linear, ets_circular, ets_fin
 EXPERIMENTS: Mapping[str, Run] = {
     **{protocol.name: partial(run, protocol) for protocol in PROTOCOLS},
     'friction': friction.run,  # the further question of Roberge et al.
+    'hu-components': hu_components.run,  # how many components one linen takes
     'roughness': roughness.run,  # Rispal et al.: grades of textures never touched
 }
 
