@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -40,6 +41,7 @@ from texture_launch.child import ChildLauncher  # noqa: E402
 DOMAIN = 87
 DEADLINE_S = 60.0
 SPINNING_S = 150.0  # of one exploration and all estimates of it
+TRIES = 3  # a sample that a busy machine loses costs the only window of a slide
 SMOOTH, ROUGH = 'glass', 'ridge_2mm_deep'
 # This machine may be busy.
 PATIENT = {'estimate_timeout_s': 20.0, 'state_timeout_s': 1.5}
@@ -53,9 +55,10 @@ ARMS = {
 
 @dataclass(frozen=True)
 class Paper:
-    """What a paper is repeated with; so many slides over each surface are for training, the last is named live.
+    """What a paper is repeated with; so many slides over each surface are for training.
 
-    `recipe` is computed and classifies in the launched nodes, those `beside` in nodes of this process.
+    Most of the slides over the last surface that follow, so many, are named right live. `recipe` is computed and
+    classifies in the launched nodes, those `beside` in nodes of this process.
     """
 
     sensor: str
@@ -63,6 +66,7 @@ class Paper:
     recipe: str
     beside: tuple[str, ...] = ()
     slides: int = 2
+    live: int = 1
     robot: str = 'emulator'
     scene: str = 'twelve_textures'
     surfaces: tuple[str, str] = (SMOOTH, ROUGH)
@@ -80,9 +84,10 @@ PAPERS = {
         'ets-linear',
         'ets-linear-svm-pairs',
         ('ets-linear-ann-pairs',),
-        slides=4,
+        slides=8,
+        live=3,
         scene='ets_linear',
-        surfaces=('grid_1', 'ridge_1'),
+        surfaces=('ridge_1', 'ridge_2a'),
     ),
     'Roberge et al., circles': Paper('tsf85_3x4', 'ets-circular', 'ets-circular-svm', ('ets-circular-ann',)),
     'Roberge et al., ten textures': Paper('tsf85_3x4', 'ets-ten-textures', 'ets-fine-svm', ('ets-fine-ann',)),
@@ -104,7 +109,7 @@ PAPERS = {
         'biotac_hand', 'kaboli', 'kaboli-svm-two-fingers', ('kaboli-pa-two-fingers', 'kaboli-em-two-fingers')
     ),
     'Kaboli et al. 2015, one finger': Paper(
-        'biotac', 'kaboli', 'kaboli-svm', ('kaboli-pa', 'kaboli-pa-ovr', 'kaboli-em', 'kaboli-svm-rbf')
+        'biotac', 'kaboli', 'kaboli-svm', ('kaboli-pa', 'kaboli-pa-ovr', 'kaboli-em', 'kaboli-svm-rbf'), slides=5
     ),
     'Kaboli et al. 2015, two fingers of the emulated hand': Paper(
         'biotac_hand', 'kaboli', 'kaboli-svm-two-fingers', robot='hand'
@@ -116,6 +121,7 @@ ROUGHNESS = Paper(
     'ets-roughness',
     'ets-roughness-ann1',
     ('ets-roughness-ann5', 'ets-roughness-svm5', 'ets-roughness-ann1-sigmoid', 'ets-roughness-ann5-sigmoid'),
+    slides=6,
 )
 
 
@@ -150,8 +156,9 @@ class Beside:
 
     def examples(self) -> LabelledFeatures:
         vectors = [from_msg(vector) for vector in self.vectors]
-        assert {vector.exploration_id for vector in vectors if not vector.last} == set(self.labels), self.recipe
-        return LabelledFeatures.from_vectors(vectors, self.labels)
+        examples = LabelledFeatures.from_vectors(vectors, self.labels)
+        assert set(examples.labels) == set(self.labels.values()), self.recipe
+        return examples
 
     def use(self, model: Path) -> None:
         [result] = self.node.set_parameters([Parameter('model', value=str(model))])
@@ -208,8 +215,11 @@ class Rig:
     def explore(self, surface: str = '') -> tuple[Any, list[Any]]:
         """Explore as the paper did; return the result and the features of the launched nodes."""
         request = replace(self.request, surface=surface)
-        explored, own = self._meanwhile(self.operator.explore_with_features, request)
-        assert explored.success, explored.message
+        for _ in range(TRIES):
+            explored, own = self._meanwhile(self.operator.explore_with_features, request)
+            assert explored.success, explored.message
+            if own:
+                break
         assert own, f'{self.paper.recipe} has no window of {request}'
         for one in self.beside:
             self.graph.until(partial(one.has_described, explored.exploration_id))
@@ -227,6 +237,13 @@ class Rig:
         for one in self.beside:
             one.labels = surfaces
         return LabelledFeatures.from_vectors(vectors, surfaces)
+
+    def named(self, kind: str = 'texture') -> dict[str, Any]:
+        """Explore, and return the final estimate of each recipe, texture or roughness."""
+        explored, _ = self.explore()
+        self.graph.until(lambda: all(one.last_estimate(explored.exploration_id) for one in self.beside))
+        beside = {one.recipe: one.last_estimate(explored.exploration_id) for one in self.beside}
+        return {self.paper.recipe: getattr(explored, kind), **beside}
 
     def _meanwhile(self, wait: Callable[..., Any], *given: Any) -> Any:
         """Wait for the launched nodes while those of this process go on."""
@@ -253,12 +270,12 @@ def test_recipes_of_a_paper_train_from_its_motion_and_name_the_surface_live(pape
         rig.operator.set_parameters('classifier', {'model': str(model)})
         for one in rig.beside:
             one.use(train(load_recipe(one.recipe), one.examples(), 'model').save(tmp_path / one.recipe))
-        explored, _ = rig.explore()
-        rig.graph.until(lambda: all(one.last_estimate(explored.exploration_id) for one in rig.beside))
-    estimates = {one.recipe: one.last_estimate(explored.exploration_id) for one in rig.beside}
-    for recipe, estimate in {paper.recipe: explored.texture, **estimates}.items():
-        assert (estimate.label, estimate.final) == (paper.surfaces[-1], True), (recipe, estimate.message)
-        assert estimate.evidence_s >= load_recipe(recipe).feature_set.windows.length_s
+        named = [rig.named() for _ in range(paper.live)]
+    for recipe in (paper.recipe, *paper.beside):
+        estimates = [one[recipe] for one in named]
+        assert all(estimate.final for estimate in estimates), recipe
+        assert np.mean([estimate.label == paper.surfaces[-1] for estimate in estimates]) > 0.5, (recipe, estimates)
+        assert estimates[0].evidence_s >= load_recipe(recipe).feature_set.windows.length_s
 
 
 def test_recipes_of_rispal_et_al_train_from_their_motion_and_grade_the_surface_live(tmp_path: Path) -> None:
@@ -273,10 +290,8 @@ def test_recipes_of_rispal_et_al_train_from_their_motion_and_grade_the_surface_l
             one.use(model.save(tmp_path / one.recipe))
         with rig.started('roughness', {'roughness_model': tmp_path / 'grades.json'}) as grading:
             rig.operator.wait_for_listeners(('roughness_features', 'roughness'), 1, grading.check)
-            explored, _ = rig.explore()
-            rig.graph.until(lambda: all(one.last_estimate(explored.exploration_id) for one in rig.beside))
-    estimates = {one.recipe: one.last_estimate(explored.exploration_id) for one in rig.beside}
-    for name, roughness in {ROUGHNESS.recipe: explored.roughness, **estimates}.items():
+            graded = rig.named('roughness')
+    for name, roughness in graded.items():
         assert (roughness.valid, roughness.final) == (True, True), (name, roughness)
         assert roughness.grade == pytest.approx(5.0, abs=1.0), name
 
