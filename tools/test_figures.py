@@ -53,6 +53,12 @@ def test_a_number_that_disagrees_with_its_source_is_a_fault(page: Path) -> None:
     assert fault == 'README.md:1: 82.0 stands for speed/default/accuracy, which is 81.1'
 
 
+def test_an_example_in_code_is_left_as_it_is(page: Path) -> None:
+    page.write_text('Write\n\n    Here ?<!--=speed/default/accuracy;.1%--> %\n\nand run it.')
+    assert figures.write(page.parent) == []
+    assert figures.check(page.parent) == []
+
+
 @pytest.mark.parametrize('source', ['speed/default/gone', 'speed/rows/7/ms', 'gone/default/accuracy'])
 def test_a_source_that_is_gone_is_a_fault(page: Path, source: str) -> None:
     page.write_text(f'Of the windows 81.1<!--={source};.1%--> % were right.')
