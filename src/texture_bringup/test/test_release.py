@@ -34,6 +34,12 @@ def test_what_ubuntu_lacks_is_locked_in_versions_that_are_tested() -> None:
     assert wanted <= locked
 
 
+def test_a_container_is_stopped_by_the_signal_on_which_launch_ends_its_nodes() -> None:
+    dockerfile = (ROOT / 'docker' / 'Dockerfile').read_text()
+    assert re.search(r'^CMD \["ros2", "launch"', dockerfile, re.M)
+    assert re.findall(r'^STOPSIGNAL (\w+)$', dockerfile, re.M) == ['SIGINT']
+
+
 def test_an_image_holds_only_what_is_let_through() -> None:
     ignored = (ROOT / 'docker' / 'Dockerfile.dockerignore').read_text().split('\n')
     let_through = {line[1:] for line in ignored if line.startswith('!')}
@@ -54,7 +60,7 @@ def test_a_workflow_ends_and_may_not_write_the_repository(workflow: Path) -> Non
 
 
 def test_there_are_workflows() -> None:
-    assert {path.stem for path in ROOT.glob('.github/workflows/*.yaml')} == {'checks', 'colcon', 'image', 'nightly'}
+    assert {path.stem for path in ROOT.glob('.github/workflows/*.yaml')} == {'checks', 'colcon', 'image', 'nightly', 'pages'}
 
 
 def test_the_profile_for_loopback_knows_no_other_address() -> None:
