@@ -60,7 +60,8 @@ def test_a_workflow_ends_and_may_not_write_the_repository(workflow: Path) -> Non
 
 
 def test_there_are_workflows() -> None:
-    assert {path.stem for path in ROOT.glob('.github/workflows/*.yaml')} == {'checks', 'colcon', 'image', 'nightly', 'pages'}
+    names = {path.stem for path in ROOT.glob('.github/workflows/*.yaml')}
+    assert names == {'checks', 'colcon', 'image', 'nightly', 'pages'}
 
 
 def test_the_profile_for_loopback_knows_no_other_address() -> None:
