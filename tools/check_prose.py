@@ -130,16 +130,6 @@ UNCONVERTED: frozenset[str] = frozenset(
         'docs/sensors/tsf85.md',
         'docs/taxels.md',
         'docs/troubleshooting.md',
-        'src/texture_benchmarks/README.md',
-        'src/texture_bringup/README.md',
-        'src/texture_core/README.md',
-        'src/texture_estimation/README.md',
-        'src/texture_evaluation/README.md',
-        'src/texture_exploration/README.md',
-        'src/texture_features/README.md',
-        'src/texture_launch/README.md',
-        'src/texture_recordings/README.md',
-        'src/texture_simulation/README.md',
     }
 )
 

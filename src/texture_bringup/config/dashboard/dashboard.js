@@ -4,6 +4,7 @@ const RETRY_MS = 1000;
 const SILENT_MS = 3000;
 const FRAME_MS = 100;
 const BARS = 8;
+const AXIS = { left: 48, bottom: 18, top: 14 };
 const ENDED = ['idle', 'done', 'aborted'];
 const at = (id) => document.getElementById(id);
 let replaying = null;
@@ -50,58 +51,100 @@ const drawing = (id) => {
   return { pen, width, height };
 };
 
+// A value of 1, 2 or 5 times a power of ten that divides a span into a handful of ticks.
+const tickStep = (span) => {
+  const power = 10 ** Math.floor(Math.log10(span / 4));
+  return [1, 2, 5, 10].map((factor) => factor * power).find((step) => span / step <= 5);
+};
+
+const ticks = (low, high) => {
+  const step = tickStep(high - low || 1);
+  const first = Math.ceil(low / step);
+  return Array.from({ length: Math.floor(high / step) - first + 1 }, (_, k) => (first + k) * step);
+};
+
+// Lines and numbers of both axes around a plot; `x` and `y` turn values into pixels.
+function drawAxes({ pen, width, height }, { x, y, xTicks, yTicks, xUnit, yUnit }) {
+  pen.strokeStyle = colour('--line');
+  pen.lineWidth = 1;
+  pen.beginPath();
+  pen.textAlign = 'right';
+  pen.textBaseline = 'middle';
+  yTicks.forEach((value) => {
+    pen.moveTo(AXIS.left, y(value));
+    pen.lineTo(width, y(value));
+    pen.fillText(`${Number(value.toPrecision(3))}`, AXIS.left - 6, y(value));
+  });
+  pen.textBaseline = 'alphabetic';
+  xTicks.forEach((value, k) => {
+    pen.textAlign = k === xTicks.length - 1 ? 'right' : 'center';
+    pen.fillText(`${Number(value.toPrecision(3))}${k === xTicks.length - 1 ? ` ${xUnit}` : ''}`, x(value), height - 3);
+  });
+  pen.stroke();
+  pen.textAlign = 'left';
+  pen.fillText(yUnit, 0, 10);
+}
+
+// Range of the middle 96 % of the values with some room: a touch or a lift-off does not flatten the slide.
+const robustRange = (values) => {
+  const sorted = [...values].sort((one, other) => one - other);
+  const low = sorted[Math.floor(0.02 * (sorted.length - 1))];
+  const high = sorted[Math.ceil(0.98 * (sorted.length - 1))];
+  const room = 0.15 * (high - low) || 1;
+  return [low - room, high + room];
+};
+
 function drawSignal(signal) {
-  const { pen, width, height } = drawing('signal');
-  at('signal-name').textContent = signal.sensor ? `${signal.sensor} ${signal.channel}, ${signal.unit}, last ${signal.length_s} s` : 'no samples yet';
+  const plot = drawing('signal');
+  const { pen, width, height } = plot;
+  at('signal-name').textContent = signal.sensor ? `${signal.sensor} ${signal.channel}` : 'no samples yet';
   const known = [...signal.low, ...signal.high].filter((value) => value !== null);
   if (!known.length) return;
-  const low = Math.min(...known);
-  const span = Math.max(...known) - low || 1;
-  const y = (value) => height - 8 - ((value - low) / span) * (height - 16);
+  const [low, high] = robustRange(known);
+  const base = height - AXIS.bottom;
+  const y = (value) => base - ((Math.min(high, Math.max(low, value)) - low) / (high - low)) * (base - AXIS.top);
+  const x = (seconds) => width + (seconds / signal.length_s) * (width - AXIS.left);
+  const xTicks = ticks(-signal.length_s, 0);
+  drawAxes(plot, { x, y, xTicks, yTicks: ticks(low, high), xUnit: 's', yUnit: signal.unit });
   pen.strokeStyle = colour('--accent');
-  pen.lineWidth = Math.max(1, width / signal.low.length);
+  pen.lineWidth = Math.max(1, (width - AXIS.left) / signal.low.length);
   pen.beginPath();
   signal.low.forEach((value, k) => {
     if (value === null) return;
-    const x = ((k + 0.5) / signal.low.length) * width;
-    pen.moveTo(x, y(value) + 0.5);
-    pen.lineTo(x, y(signal.high[k]) - 0.5);
+    const place = x(-signal.length_s * (1 - (k + 0.5) / signal.low.length));
+    pen.moveTo(place, y(value) + 0.5);
+    pen.lineTo(place, y(signal.high[k]) - 0.5);
   });
   pen.stroke();
-  pen.fillText((low + span).toPrecision(4), 2, 12);
-  pen.fillText(low.toPrecision(4), 2, height - 2);
 }
 
 function drawSpectrum(spectrum) {
-  const { pen, width, height } = drawing('spectrum');
-  at('spectrum-name').textContent = spectrum.db.length ? `0 to ${spectrum.high_hz} Hz, dB` : '';
+  const plot = drawing('spectrum');
+  const { pen, width, height } = plot;
+  at('spectrum-name').textContent = spectrum.db.length ? 'amplitude of the newest half second' : '';
   if (!spectrum.db.length) return;
-  const base = height - 16;
+  const base = height - AXIS.bottom;
   const high = Math.max(...spectrum.db, -20);
   const low = high - 70;
-  const step = width / spectrum.db.length;
+  const y = (value) => base - (Math.max(0, value - low) / (high - low)) * (base - AXIS.top);
+  const x = (hertz) => AXIS.left + (hertz / spectrum.high_hz) * (width - AXIS.left);
+  drawAxes(plot, { x, y, xTicks: ticks(0, spectrum.high_hz), yTicks: ticks(low, high), xUnit: 'Hz', yUnit: 'dB' });
+  const step = (width - AXIS.left) / spectrum.db.length;
   pen.fillStyle = colour('--accent');
   spectrum.db.forEach((value, k) => {
-    const tall = Math.max(0, ((value - low) / (high - low)) * base);
-    pen.fillRect(k * step, base - tall, Math.max(1, step - 1), tall);
+    pen.fillRect(AXIS.left + k * step, y(value), Math.max(1, step - 1), base - y(value));
   });
-  pen.fillStyle = colour('--soft');
-  [0, 0.25, 0.5, 0.75, 1].forEach((share) => {
-    pen.textAlign = share === 0 ? 'left' : share === 1 ? 'right' : 'center';
-    pen.fillText(`${Math.round(share * spectrum.high_hz)}`, share * width, height - 3);
-  });
-  pen.textAlign = 'left';
 }
 
 function drawTaxels(taxels) {
   const { pen, width, height } = drawing('taxels');
   const { values, places, unit } = taxels;
   if (!values.length) {
-    at('taxel-range').textContent = 'this sensor has none';
+    at('taxel-range').textContent = 'this sensor has no slow channels';
     return;
   }
   const most = Math.max(1e-9, ...values.map((value) => Math.abs(value ?? 0)));
-  at('taxel-range').textContent = `from rest, ±${most.toPrecision(3)} ${unit}`;
+  at('taxel-range').textContent = `relative to the level before contact, ±${most.toPrecision(3)} ${unit}`;
   const rows = 1 + Math.max(...places.map((place) => place[0]));
   const columns = 1 + Math.max(...places.map((place) => place[1]));
   const side = Math.min(width / columns, height / rows);
@@ -127,8 +170,9 @@ function showTexture(texture) {
   at('label').dataset.final = texture.final;
   const seen = texture.windows ? `${texture.windows} windows, ${texture.evidence_s.toFixed(1)} s` : '';
   const sure = texture.label && texture.confidence !== null ? `confidence ${texture.confidence.toFixed(2)}` : '';
-  const strange = texture.label && !texture.known ? 'resembles none of the known textures' : '';
-  at('estimate-note').textContent = [sure, seen, strange, texture.message].filter(Boolean).join(' · ');
+  const strange = texture.label && !texture.known ? 'unknown: it resembles no trained texture' : '';
+  const missing = texture.label || texture.message ? '' : 'no estimate yet; without a model nothing is recognised';
+  at('estimate-note').textContent = [sure, seen, strange, texture.message, missing].filter(Boolean).join(' · ');
   const bars = texture.labels.slice(0, BARS).map((label, k) => [label, texture.probabilities[k]]);
   fill(at('evidence'), bars, ([label, probability]) => {
     const bar = element('div', '', 'bar');
@@ -143,7 +187,7 @@ function showRoughness(roughness) {
   const share = roughness.valid ? Math.min(1, Math.max(0, (roughness.grade - 1) / 4)) : 0;
   at('gauge-arc').style.strokeDasharray = `${100 * share} 100`;
   at('grade').textContent = roughness.valid ? roughness.grade.toFixed(1) : '–';
-  at('roughness-note').textContent = roughness.valid ? `± ${roughness.grade_std === null ? '?' : roughness.grade_std.toFixed(1)}` : roughness.message;
+  at('roughness-note').textContent = roughness.valid ? `± ${roughness.grade_std === null ? '?' : roughness.grade_std.toFixed(1)}` : roughness.message || 'no roughness model loaded';
 }
 
 function showFrame(frame) {
@@ -200,8 +244,8 @@ async function ask(name, body) {
     const answer = await fetch(`api/${name}`, {
       method: 'POST', headers: { 'Content-Type': 'application/json' }, body: JSON.stringify(body),
     });
-    const told = await answer.json();
-    say(told.message, !told.success);
+    const reply = await answer.json();
+    say(reply.message, !reply.success);
   } catch (error) {
     say(`'${name}' was not answered: ${error.message}`, true);
   }
@@ -218,7 +262,7 @@ async function loadMotions() {
 }
 
 function numberField(number) {
-  const label = element('label', `${[...new Set([number.name.split('_')[0], number.unit])].join(', ')} (${number.low} to ${number.high})`);
+  const label = element('label', `${number.name.split('_')[0]}${number.unit && number.unit !== number.name ? ` (${number.unit})` : ''}, ${number.low} to ${number.high}`);
   const input = document.createElement('input');
   Object.assign(input, { type: 'number', step: 'any', min: number.low, max: number.high, value: number.default, required: true, name: number.name });
   label.append(input);

@@ -44,8 +44,8 @@ class TouchParams:
     )
     unheard_force_share: float = param(
         1.5,
-        'Sets the largest force, as a share of the wanted one, that the approach may reach on an arm that goes on '
-        'until its watchdog stops it; a smaller share comes down more slowly.',
+        'Sets the highest force of the approach, as a share of the wanted one, on an arm that only its watchdog stops; '
+        'a smaller share lowers the approach speed.',
         low=0.2,
         high=10.0,
     )
