@@ -86,6 +86,17 @@ def test_malformed_rows_are_counted_and_named_by_file_row_and_column(tmp_path: P
     assert np.isnan(samples[0]).any(axis=1).nonzero()[0].tolist() == [10, 20]
 
 
+def test_a_row_of_names_or_units_within_a_slide_is_malformed_and_ends_none(tmp_path: Path) -> None:
+    broken = {
+        FIRST_STROKE + 100: 't;phase;acc_x;acc_y;acc_z;grip',  # the logger wrote its head again
+        FIRST_STROKE + 101: 'ms;;mg;mg;mg;gf',
+    }
+    any_phase = mapping_of(tmp_path, ('values: [stroke 1, stroke 2, stroke 3]', "values: ['[!r]*', '']"))
+    report = run(tmp_path, any_phase, broken)
+    assert report.slides == {'linen': 6, 'oak board': 6, 'cork_thick': 6}
+    assert report.malformed_rows == 2 * 6
+
+
 def test_short_holes_are_interpolated_if_wanted(tmp_path: Path) -> None:
     mapping = mapping_of(tmp_path, ('unit: g\n', 'unit: g\n    repair_s: 0.02\n'))
     report = run(

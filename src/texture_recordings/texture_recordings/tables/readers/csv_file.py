@@ -85,8 +85,22 @@ class _Block:
         block = cls(rows, form.delimiter, width)
         for name, place in numbers.items():
             block.numbers[name] = block._parsed(name, place, form.decimal)
+        block._blank_headings(tuple(numbers.values()))
         block.malformed.sort(key=lambda row: row.row)
         return block
+
+    def _blank_headings(self, places: Sequence[int]) -> None:
+        """Leave the texts of rows out that hold words alone where numbers belong: names or units, written again.
+
+        Their texts are none of a sample, and a slide must not end at them.
+        """
+        if not self.numbers:
+            return
+        wordy = np.logical_and.reduce([np.isnan(values) for values in self.numbers.values()])
+        for index in np.flatnonzero(wordy).tolist():
+            cells = self.cells[index]
+            if cells is not None and all(_is_word(cells[place]) for place in places):
+                self.cells[index] = None
 
     def column(self, place: int) -> AnyArray:
         """Return the texts of a column, None for malformed rows."""
@@ -112,6 +126,15 @@ class _Block:
     def _note(self, row: int, column: str, reason: str) -> None:
         if len(self.malformed) < BLOCK_ROWS // 100:
             self.malformed.append(MalformedRow(row, column, reason))
+
+
+def _is_word(cell: str) -> bool:
+    """Return whether a cell is neither empty nor a number, which NaN is, too."""
+    try:
+        float(cell)
+    except ValueError:
+        return bool(cell)
+    return False
 
 
 def _number(cell: str) -> float:
