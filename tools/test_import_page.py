@@ -19,8 +19,8 @@ from texture_bringup.command import main
 from texture_recordings.tables.mapping import mapping_from
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = (ROOT / 'docs' / 'import.md').read_text()
-TUTORIAL, REFERENCE = PAGE.split('## The mapping')
+PAGE = (ROOT / 'docs' / 'recordings.md').read_text()
+_, TUTORIAL, REFERENCE, _ = re.split('## From a CSV to a figure|## The mapping|## Cross-validation', PAGE)
 NAMED = re.compile(r'```yaml\n# (\S+\.yaml)\n(.*?)```', re.DOTALL)
 BLOCK = re.compile(r'```yaml\n(.*?)```', re.DOTALL)
 PYTHON = re.compile(r'```python\n(.*?)```', re.DOTALL)
@@ -46,7 +46,7 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
                 )  # `default` alone beside the reader's
                 assert main([*shlex.split(line)[1:], *quick]) == 0, line
             for block in PYTHON.findall(TUTORIAL):
-                exec(compile(block, 'docs/import.md', 'exec'), {})
+                exec(compile(block, 'docs/recordings.md', 'exec'), {})
         yield printed.getvalue()
     finally:
         os.chdir(before)
@@ -60,7 +60,7 @@ def test_the_page_shows_the_file_that_its_script_writes(said: str) -> None:
 
 @pytest.mark.benchmark
 def test_the_page_shows_what_the_import_prints(said: str) -> None:
-    shown = PAGE.split('```text\n')[2].split('```')[0]
+    shown = TUTORIAL.split('```text\n')[2].split('```')[0]
     assert shown in said
     assert 'signal: 9000 samples at 100 Hz; jitter 1.22 ms rms' in said
 
