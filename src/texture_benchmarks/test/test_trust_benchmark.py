@@ -8,11 +8,13 @@ from texture_benchmarks.result import BenchmarkOptions
 from texture_benchmarks.robustness.scenes import FORCE_N, SCENE, SLIDE_S, SPEED_M_S, TouchConditions
 from texture_benchmarks.robustness.scenes import simulate_slide_signals as simulate
 from texture_benchmarks.trust.chart import UNDISTURBED_SIMULATED, grid_panels, trust_table
-from texture_benchmarks.trust.run import run
-from texture_benchmarks.trust.simulated import SIMULATED
+from texture_benchmarks.trust.run import RECIPES, run
+from texture_benchmarks.trust.simulated import SIMULATED, TRAINED_SLIDES
 from texture_benchmarks.trust.simulated import simulate as simulate_row
 from texture_benchmarks.trust.trial import ROWS, UNDISTURBED, Outcome, Row, disturbed
 from texture_core.estimates import TextureEstimate
+from texture_estimation.open_set.error_bound import ErrorBound
+from texture_estimation.recipe import load_recipe
 from texture_evaluation.metrics import SlideResult
 from texture_recordings.labelled_slide import LabelledSlide
 from texture_simulation.scene import load_scene
@@ -113,6 +115,12 @@ def test_the_grid_shows_undisturbed_slides_where_no_change_lies() -> None:
 def test_the_grid_shows_every_disturbance_once() -> None:
     shown = [name for ticks in grid_panels([*EVERY_ROW, *SIMULATED]).values() for _, name in ticks]
     assert sorted({*shown} - {UNDISTURBED, UNDISTURBED_SIMULATED}) == sorted([*EVERY_ROW, *SIMULATED])
+
+
+@pytest.mark.parametrize('name', RECIPES)
+def test_so_many_slides_are_simulated_that_each_recipe_may_be_certain(name: str) -> None:
+    slides = TRAINED_SLIDES * len(load_scene(SCENE).surfaces)
+    assert ErrorBound(slides, load_recipe(name).training.max_error_rate).shown
 
 
 def test_simulated_slides_tell_their_conditions_only_if_asked_to() -> None:

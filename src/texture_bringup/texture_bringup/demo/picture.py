@@ -31,7 +31,7 @@ def draw(bag: Path, surface: str, report: EvaluationReport, source: str, path: P
     source
         Where the signal comes from, in words.
     note
-        One sentence below the panels.
+        Lines below the panels.
     path
         File that is written.
 

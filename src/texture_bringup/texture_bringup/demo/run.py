@@ -147,8 +147,6 @@ def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressL
                 rows.append(Row(surface, explored.texture))
                 progress.part(f'{", " if number else "recognised as "}{explored.texture.label or "nothing"}')
             progress.part('', last=True)
-    for sentence in filter(None, rows[-1].estimate.message.split('; ')):
-        progress.line(f'the estimates say: {sentence}')
     return rows
 
 
@@ -172,12 +170,14 @@ def _report(
     right = sum(row.right for row in rows)
     progress.line(f'{right} of {len(rows)} slides over simulated surfaces recognised')
     progress.line('latency: from the last sample of a window to its estimate at another process')
-    report = evaluate(load_model(places.model), [places.recognition_bag])
+    model = load_model(places.model)
+    report = evaluate(model, [places.recognition_bag])
     figures = {**report.as_json(), 'untrained_speed': untrained_figures(untrained, plan.untrained_speed_m_s)}
     write_json(figures, places.figures)
     windows = percent(report.as_json()['window_accuracy'])
     progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
-    note = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
+    refusal = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
+    note = '\n'.join(filter(None, [model.error_bound.reason, refusal]))
     draw(places.recognition_bag, plan.shown, report, SOURCE, places.picture, note=note)
     progress.section(f'Done. Look at {places.picture}')
     progress.line(f'recordings, model, figures and the log of the nodes are in {places.folder}/')

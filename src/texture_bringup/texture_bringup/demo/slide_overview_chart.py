@@ -1,4 +1,4 @@
-"""One slide in one picture: signal, spectrum, growing evidence, and how often such decisions are right."""
+"""One slide in one picture: signal, spectrum, evidence, and how often such decisions are right."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class SlideOverview:
     others
         Slides over other surfaces, (n_samples,) each, whose spectra are drawn beside for comparison.
     note
-        One sentence below the panels; '' for none.
+        Lines below the panels; '' for none.
     """
 
     source: str
@@ -99,5 +99,5 @@ def _evidence(axes: Any, overview: SlideOverview) -> None:
         axes.plot(seconds, probabilities[:, column], marker='.', label=labels[column], **style)
     axes.set(xlabel='sliding time used (s)', ylabel='probability (%)', ylim=(-3, 103))
     axes.set_xlim(left=0)
-    axes.set_title(f'3. Evidence grows until it says: {overview.estimates[-1].label}')
+    axes.set_title(f'3. Evidence after each window, at the end: {overview.estimates[-1].label}')
     axes.legend(loc='center right', title='surface')
