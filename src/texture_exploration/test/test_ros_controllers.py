@@ -393,6 +393,19 @@ def test_touches_that_are_forgotten_are_made_again(robot):
     assert 'touch 1 taken' in explorer.touch_surface()
 
 
+def test_a_touch_without_force_is_taken_with_a_doubt(robot):
+    touch = TouchParams()
+    explorer = Explorer(robot.driven, touch, LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    explorer.connect()
+    robot.zero_force()
+    assert f'(less than {touch.contact_force_n:g} N: see that the finger touches)' in explorer.touch_surface()
+    explorer.forget_touches()
+    depth_m = 2 * touch.contact_force_n / robot.arm.params.stiffness_n_m
+    robot.arm.position = robot.arm._origin + robot.arm._axes @ [0.0, 0.0, -depth_m]
+    robot.pass_time(0.05)
+    assert 'less than' not in explorer.touch_surface()
+
+
 def test_a_check_commands_nothing_and_leaves_the_topics():
     robot = Robot(connect_timeout_s=0.1)
     explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)

@@ -246,7 +246,7 @@ class Explorer:
                 )
             except InvalidData as error:
                 raise MotionRefused(f'the touch was not taken: {error}') from error
-            count = f'touch {len(self._touches)} taken with {state.force_n:.2f} N'
+            count = f'touch {len(self._touches)} taken with {state.force_n:.2f} N{self._doubt(state.force_n)}'
             if fit is None:
                 return f'{count}; touch the surface at {TOUCHES - len(self._touches)} more places'
             arm.move_surface(fit.pose)
@@ -256,6 +256,11 @@ class Explorer:
                 f'{count}; the surface is {values}; residual {1e3 * fit.residual_m:.2f} mm rms, largest '
                 f'{1e3 * fit.largest_m:.2f} mm. Write these into your parameter file, and lift the finger by 10 mm'
             )
+
+    def _doubt(self, force_n: float) -> str:
+        """Return what speaks against a touch; it is no reason to refuse one, as the force sensor may not be zeroed."""
+        least_n = self.touch.contact_force_n
+        return '' if force_n >= least_n else f' (less than {least_n:g} N: see that the finger touches)'
 
     def forget_touches(self) -> None:
         """Begin the touches of the surface again; the surface stays as it is.
