@@ -100,25 +100,8 @@ CODE_BLOCK = re.compile(r'```.*?```|^(?: {4}|\t)(?! *(?:[-*|]|\d+\.) ).*?$', re.
 INLINE_CODE = re.compile(r'`[^`\n]*`')
 LINK = re.compile(r'!?\[([^]]*)\]\([^)]*\)')
 ITEM = re.compile(r'^ *(?:[-*+]|\d+\.) ')
-# Pages that are not rewritten yet. The list only shrinks.
-UNCONVERTED: frozenset[str] = frozenset(
-    {
-        'docs/architecture.md',
-        'docs/colcon.md',
-        'docs/deployment.md',
-        'docs/endurance.md',
-        'docs/extending.md',
-        'docs/integrate.md',
-        'docs/motion.md',
-        'docs/robot.md',
-        'docs/robots/hand.md',
-        'docs/robots/rails.md',
-        'docs/robots/ros_controllers.md',
-        'docs/robots/ur.md',
-        'docs/safety.md',
-        'docs/troubleshooting.md',
-    }
-)
+# Pages that are left out; none is.
+UNCONVERTED: frozenset[str] = frozenset()
 
 
 def blank(found: re.Match[str]) -> str:

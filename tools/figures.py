@@ -42,24 +42,8 @@ UNIT = re.compile(
 MARKER = re.compile(r'<!-- (?:constants|measured once)(?P<extent>: section|: page)? -->')
 CODE = re.compile(r'```.*?```|^(?: {4}|\t)(?![ -]*[-*|\d]).*?$|`[^`\n]*`|\]\([^)]*\)', re.DOTALL | re.MULTILINE)
 COMMENT_OR_CODE = re.compile(f'({COMMENT.pattern})|(?:{CODE.pattern})', CODE.flags)
-# Pages that are not converted yet: numbers in them are not asked for a source. The list only shrinks.
-UNCONVERTED: frozenset[str] = frozenset(
-    {
-        'docs/architecture.md',
-        'docs/deployment.md',
-        'docs/endurance.md',
-        'docs/extending.md',
-        'docs/integrate.md',
-        'docs/motion.md',
-        'docs/robot.md',
-        'docs/robots/hand.md',
-        'docs/robots/rails.md',
-        'docs/robots/ros_controllers.md',
-        'docs/robots/ur.md',
-        'docs/safety.md',
-        'docs/troubleshooting.md',
-    }
-)
+# Pages whose numbers are not asked for a source; none is.
+UNCONVERTED: frozenset[str] = frozenset()
 
 
 class BadFigure(ValueError):

@@ -39,7 +39,7 @@ def test_every_name_and_value_is_taken_by_the_explorer(path):
 
 def test_the_first_contact_is_the_same_with_and_without_the_driver_and_in_the_page():
     direct = values_of((PRESETS[0].parent / 'ur5e.yaml').read_text())
-    [example] = re.findall(r'```yaml\n(.*?)```', (ROOT / 'docs' / 'robot.md').read_text(), re.DOTALL)
+    [example] = re.findall(r'```yaml\n(.*?)```', (ROOT / 'docs' / 'robots.md').read_text(), re.DOTALL)
     lines = [line[3:] for line in example.splitlines()]
     page = values_of('\n'.join(lines))
     driven = values_of((PRESETS[0].parent / 'ur5e_ur_robot_driver.yaml').read_text())

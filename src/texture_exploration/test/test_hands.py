@@ -115,7 +115,7 @@ def test_a_broken_profile_is_reported(tmp_path):
 
 
 def test_the_page_lists_the_parameters_as_they_are():
-    page = Path(__file__).parents[3] / 'docs' / 'robots' / 'hand.md'
+    page = Path(__file__).parents[3] / 'docs' / 'reference' / 'parameters.md'
     assert markdown_table(InHandParams) in page.read_text()
 
 

@@ -66,7 +66,7 @@ def test_a_move_is_these_bytes():
 
 
 def test_the_page_lists_the_parameters_as_they_are():
-    page = Path(__file__).parents[3] / 'docs' / 'robots' / 'rails.md'
+    page = Path(__file__).parents[3] / 'docs' / 'reference' / 'parameters.md'
     assert markdown_table(RailsParams) in page.read_text()
 
 

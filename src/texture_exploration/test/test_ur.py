@@ -36,7 +36,7 @@ from texture_simulation.devices.ur.process import ControllerProcess
 
 pytestmark = pytest.mark.realtime
 
-PAGE = Path(__file__).parents[3] / 'docs' / 'robots' / 'ur.md'
+PAGE = Path(__file__).parents[3] / 'docs' / 'reference' / 'parameters.md'
 PARENT = Path(__file__).with_name('ur_parent.py')
 DEADLINE_S = 20.0
 SLIDING = ArmCommand(tangential_m_s=(0.02, 0.0))
