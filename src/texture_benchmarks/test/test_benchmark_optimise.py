@@ -11,6 +11,7 @@ from texture_benchmarks.optimise.pairs_run import CASES as PAIR_CASES
 from texture_benchmarks.optimise.pairs_run import measured, recognised
 from texture_benchmarks.optimise.pairs_seeds import counts, over_seeds
 from texture_benchmarks.papers.recipe_digest import _decisive
+from texture_benchmarks.papers.seeds import mean_over_seeds
 from texture_benchmarks.result import BenchmarkOptions
 from texture_estimation.learners.learner import of_examples
 from texture_estimation.recipe import Recipe, load_recipe
@@ -69,6 +70,16 @@ def test_the_shipped_recipe_of_tuned_pairs_is_the_one_that_the_stored_search_fou
     found = Recipe.from_mapping(stored['joined'], 'joined').as_mapping()
     shipped = load_recipe(f'ets-linear-{kind.lower()}-pairs').as_mapping()
     assert _decisive(shipped) == _decisive(found)  # all but descriptions and rules that end a slide early
+
+
+def test_stored_searches_have_means_over_their_seeds_and_count_every_pair_of_each() -> None:
+    cases = json.loads(STORED.read_text(encoding='utf-8'))['numbers']['cases']
+    assert len(cases['linear, SVM']['seeds']) >= 5
+    for case in cases.values():
+        assert len(case['seeds']) == len(case['by_seed']) >= 2
+        assert sum(case['counts_of_all']['ranking'].values()) == len(case['chosen']) * len(case['seeds'])
+        tuned = [one['tested']['tuned by pair']['recognised'][0] for one in case['by_seed']]
+        assert case['over_seeds']['tuned by pair'] == pytest.approx(mean_over_seeds(tuned).as_json(), abs=2e-4)
 
 
 def test_counts_are_of_options_and_of_numbers_lowest_median_and_highest() -> None:

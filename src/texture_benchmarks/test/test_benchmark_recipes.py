@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import BENCHMARKS
-from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION
+from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION, Setting
 from texture_benchmarks.recipes.trial import at_rate, comparable, figures_of, in_random_folds, trained_every
 from texture_benchmarks.result import BenchmarkOptions
 from texture_core.errors import InvalidData, ModelMismatch
@@ -78,6 +78,22 @@ def test_recipes_are_compared_on_windows_of_one_length_without_what_the_session_
     assert vote.feature_set.as_mapping()['inputs']['signal']['stretch_to_m_s'] == 0.15
     spectrum = comparable(load_recipe('hu-log-pca-svm'), 1000.0, of_motion=False).feature_set
     assert (spectrum.windows.length_s, spectrum.inputs[0].features[0][1].points) == (0.5, 250)
+
+
+@pytest.mark.parametrize(
+    ('name', 'voters', 'length_s'),
+    [
+        ('ets-linear-svm-vote', 5, 0.1),
+        ('ets-linear-ann-vote', 5, 0.1),
+        ('ets-circular-svm', 7, 0.07),
+        ('ets-circular-ann', 7, 0.07),
+    ],
+)
+def test_recipes_that_vote_are_compared_with_the_vote_they_ship_with(name: str, voters: int, length_s: float) -> None:
+    setting = Setting(SlideDataset((slide_signals(),)), [], 1000.0, of_motion=False)
+    tried = setting.recipe(name)
+    assert tried.evidence == load_recipe(name).evidence
+    assert (tried.evidence.group, tried.feature_set.windows.length_s) == (voters, length_s)
 
 
 def test_a_missing_input_is_named() -> None:
