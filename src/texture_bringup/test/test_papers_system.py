@@ -34,6 +34,7 @@ from texture_estimation.roughness.grades import read_grades  # noqa: E402
 from texture_estimation.roughness.roughness_recipe import load_roughness_recipe  # noqa: E402
 from texture_estimation.roughness.training import train_grades  # noqa: E402
 from texture_exploration.presets import load_preset  # noqa: E402
+from texture_features.feature_set import FeatureSet  # noqa: E402
 from texture_features.labelled_features import LabelledFeatures  # noqa: E402
 from texture_features.nodes.feature_extractor import FeatureExtractor  # noqa: E402
 from texture_launch.child import ChildLauncher  # noqa: E402
@@ -133,6 +134,11 @@ def recipe_file(name: str) -> Path:
     return folder('texture_estimation', f'config/{kind}') / f'{name}.yaml'
 
 
+def described_alike(*recipes: str) -> bool:
+    one, other = (FeatureSet.load(str(recipe_file(recipe))).as_mapping() for recipe in recipes)
+    return one == other
+
+
 @dataclass
 class Beside:
     """A recipe whose features and estimates are computed in this process, on topics of its own."""
@@ -144,14 +150,17 @@ class Beside:
     labels: dict[str, str] = field(default_factory=dict)  # of explorations
 
     @classmethod
-    def joining(cls, graph: LocalGraph, recipe: str, kind: Callable[..., Any] = Classifier) -> 'Beside':
+    def joining(cls, graph: LocalGraph, recipe: str, main: str, kind: Callable[..., Any] = Classifier) -> 'Beside':
+        """Start the nodes of a recipe; features that the main recipe has too are those of the launched node."""
         own = recipe.replace('-', '_')
         _, topic = kind.estimate
-        renaming = ['--ros-args', '-r', f'features:=features_{own}', '-r', f'{topic}:={topic}_{own}', '-r']
-        extractor = partial(FeatureExtractor, cli_args=[*renaming, f'__node:=features_of_{own}'])
-        graph.add(extractor, recipe=str(recipe_file(recipe)))
+        features = 'features' if described_alike(recipe, main) else f'features_{own}'
+        renaming = ['--ros-args', '-r', f'features:={features}', '-r', f'{topic}:={topic}_{own}', '-r']
+        if features != 'features':
+            extractor = partial(FeatureExtractor, cli_args=[*renaming, f'__node:=features_of_{own}'])
+            graph.add(extractor, recipe=str(recipe_file(recipe)))
         node = graph.add(partial(kind, cli_args=[*renaming, f'__node:=estimator_of_{own}']))
-        vectors = graph.listen(msg.FeatureVector, f'features_{own}', FEATURE_QOS)
+        vectors = graph.listen(msg.FeatureVector, features, FEATURE_QOS)
         return cls(recipe, node, vectors, graph.listen(kind.estimate[0], f'{topic}_{own}', ESTIMATE_QOS))
 
     def has_described(self, exploration_id: str) -> bool:
@@ -206,8 +215,9 @@ class Rig:
 
     def join(self, kind: Callable[..., Any] = Classifier) -> None:
         """Start the nodes of the recipes beside, and wait until they hear what moves and what it measures."""
-        self.beside = [Beside.joining(self.graph, recipe, kind) for recipe in self.paper.beside]
-        n_extractors = 1 + len(self.beside)
+        main = self.paper.recipe
+        self.beside = [Beside.joining(self.graph, recipe, main, kind) for recipe in self.paper.beside]
+        n_extractors = 1 + sum(not described_alike(recipe, main) for recipe in self.paper.beside)
         self.graph.until(lambda: self.graph.peer.count_subscribers('exploration') >= n_extractors)
         self._meanwhile(self.operator.wait_for_listeners, ('exploration',), n_extractors, self.launcher.check)
 
