@@ -83,9 +83,15 @@ def test_a_vote_of_groups_counts_every_window_alike():
     np.testing.assert_array_equal(MajorityVote().window_weights(np.array([1.0, 5.0, 50.0])), 1.0)
 
 
+@pytest.mark.parametrize('rule', [SoftVote(late_weight=0.25), MajorityVote()])
+def test_one_window_weighs_what_it_weighs_among_many(rule):
+    counts = np.array([1.0, 4.8, 5.0, 5.0 + 1e-12, 5.2, 9.0])
+    assert [rule.window_weight(count) for count in counts.tolist()] == rule.window_weights(counts).tolist()
+
+
 def test_evidence_gathered_window_by_window_has_the_same_mean_as_all_at_once():
     rule, grouped = SoftVote(late_weight=0.25), GroupedEvidence(n_labels=3)
     evidence, counts = np.random.default_rng(0).normal(size=(9, 3)), np.linspace(1.0, 9.0, 9)
     for row, count, mean in zip(evidence, counts, running_means(rule, evidence, counts), strict=True):
-        grouped.add(row, new_s=0.5, weight=float(rule.window_weights(count)))
+        grouped.add(row, new_s=0.5, weight=rule.window_weight(float(count)))
         np.testing.assert_allclose(grouped.mean, mean)

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from sklearn.neural_network import MLPClassifier
 
+from texture_estimation import log_probabilities
+from texture_estimation.learners import mlp
 from texture_estimation.learners.mlp import Mlp, _first_weights, _slopes
 from texture_estimation.log_probabilities import log_loss, log_softmax
 
@@ -64,3 +66,28 @@ def test_the_array_form_decides_every_window_as_scikit_learn_with_the_same_weigh
     answers = Mlp.predictor(parameters)(fresh)
     np.testing.assert_array_equal(answers.argmax(axis=1), network.predict(fresh))
     np.testing.assert_allclose(log_softmax(answers), network.predict_log_proba(fresh), atol=1e-9)
+
+
+def test_a_training_in_small_pieces_gives_the_same_network(examples, monkeypatch):
+    codes, groups = (np.unique(of, return_inverse=True)[1] for of in (examples.labels, examples.groups))
+    whole = Mlp(epochs=2).fit(examples.values, codes, groups)
+    monkeypatch.setattr(log_probabilities, 'CHUNK', 40)
+    pieces = Mlp(epochs=2).fit(examples.values, codes, groups)
+    np.testing.assert_array_equal(pieces.parameters['hidden'], whole.parameters['hidden'])
+    np.testing.assert_allclose(pieces.parameters['output'], whole.parameters['output'], rtol=1e-4)  # the temperature
+    np.testing.assert_allclose(pieces.held_out, whole.held_out, rtol=1e-4)
+
+
+def test_a_training_that_would_take_too_long_makes_fewer_steps(examples, monkeypatch):
+    codes, groups = (np.unique(of, return_inverse=True)[1] for of in (examples.labels, examples.groups))
+    counts = []
+    step = mlp._Adam.step
+    monkeypatch.setattr(mlp._Adam, 'step', lambda self, *args: (counts.append(1), step(self, *args))[1])
+    Mlp(hidden=4, epochs=500).fit(examples.values, codes, groups)
+    without_limit = len(counts)
+    monkeypatch.setattr(mlp, 'MAX_WORK', 450 * (examples.values.shape[1] + 4))
+    Mlp(hidden=4, epochs=500).fit(examples.values, codes, groups)
+    assert (without_limit, len(counts) - without_limit) == (
+        5 * 500,
+        5 * 450,
+    )  # four slides of each: four folds, and all

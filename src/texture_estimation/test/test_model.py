@@ -26,6 +26,17 @@ def test_a_model_predicts_the_same_after_it_was_saved(saved, model, examples, en
     assert loaded.card == model.card
 
 
+def test_scores_and_hidden_layer_together_are_those_of_each_alone(model, examples):
+    values = examples.values[:3]
+    scores, activations = model.predict_with_activations(values)
+    np.testing.assert_array_equal(scores, model.predictor(values))
+    np.testing.assert_array_equal(activations, model.activations(values))
+    without = train(load_recipe('peaks-naive-bayes'), examples)
+    scores, activations = without.predict_with_activations(values)
+    np.testing.assert_array_equal(scores, without.predictor(values))
+    assert activations is None
+
+
 def test_the_card_holds_recipe_labels_and_facts(saved):
     card = json.loads(saved.with_suffix('.json').read_text())
     assert card['labels'] == ['cork', 'felt', 'slate', 'wood']

@@ -50,6 +50,18 @@ def test_the_distance_is_that_to_the_three_nearest_slides_less_that_to_the_centr
     assert distance.score(centres[2], 2) == pytest.approx(expected)
 
 
+def test_scores_kept_between_windows_are_those_of_the_means_so_far(trained):
+    distance, centres, rng = trained
+    distances, overlap = {FEATURES: distance, ONSET: distance}, 0.2
+    novelty, windows = SlideNovelty(distances, CLASSES), centres[3] + 0.3 * rng.normal(size=(30, FEATURE_COUNT))
+    for number, values in enumerate(windows):
+        novelty.add(values, None, 3, 1.0 + overlap * number)
+        means = space_means(windows[: number + 1], None, overlap)
+        for label in (3, 4):  # what is kept for one label must not be taken for another
+            expected = [distance.score(means[space], label) for space in distances]
+            assert novelty.scores(label, 1.0)[:2] == pytest.approx(expected, rel=1e-9)
+
+
 def test_a_constant_feature_does_not_count_and_units_do_not_matter(trained):
     distance, centres, _ = trained
     moved = centres[1] + 1e6 * np.eye(FEATURE_COUNT)[0]

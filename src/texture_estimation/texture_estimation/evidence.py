@@ -127,19 +127,20 @@ class EvidenceAccumulator:
             return
         self._conditions.update(vector)
         self._deviation = model.active_domain.deviation(self._conditions.get())
-        window_evidence = model.recipe.evidence.window_evidence(model.predictor(vector.values))
+        scores, activations = model.predict_with_activations(vector.values)
+        window_evidence = model.recipe.evidence.window_evidence(scores)
         self._windows += 1
         self._window_ns = round(vector.window_s * NANOSECONDS)
         end = vector.start_ns + self._window_ns
         new_ns = max(0, end - max(vector.start_ns, self._end_ns))
         self._evidence_ns += new_ns
         effective_windows = self._evidence_ns / self._window_ns
-        weight = float(model.recipe.evidence.window_weights(effective_windows))
+        weight = model.recipe.evidence.window_weight(effective_windows)
         self._evidence.add(window_evidence, new_ns / NANOSECONDS, weight)
         self._end_ns = max(end, self._end_ns)
         if self._novelty is not None:
             best = int(window_evidence.argmax())
-            self._novelty.add(vector.values, model.activations(vector.values), best, effective_windows)
+            self._novelty.add(vector.values, activations, best, effective_windows)
 
     def _estimate(self, vector: FeatureVector, final: bool) -> TextureEstimate:
         model = self.model
@@ -196,8 +197,9 @@ class EvidenceAccumulator:
         if self._novelty is None or detector is None:
             return 0.0, True
         second, first = np.partition(mean, -2)[-2:].tolist()
-        novelty_score = detector.novelty_score(self._novelty.scores(best, first - second), effective_windows)
-        return novelty_score, novelty_score <= detector.threshold(effective_windows)
+        scores = self._novelty.scores(best, first - second)
+        novelty_score, threshold = detector.score_and_threshold(scores, effective_windows)
+        return novelty_score, novelty_score <= threshold
 
     @staticmethod
     def _candidates(model: TextureModel, probabilities: Array, effective_windows: float) -> tuple[str, ...]:

@@ -2,10 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
+
+CHUNK = 1 << 21  # numbers, 16 MiB
+
+
+def chunks(n_rows: int, n_columns: int) -> Iterator[slice]:
+    """Yield slices of rows that hold at most CHUNK numbers together, so that intermediate results stay small.
+
+    Parameters
+    ----------
+    n_rows, n_columns
+        Shape of an array.
+
+    Examples
+    --------
+    >>> list(chunks(5, CHUNK // 2))
+    [slice(0, 2, None), slice(2, 4, None), slice(4, 5, None)]
+    """
+    size = max(1, CHUNK // max(1, n_columns))
+    for start in range(0, n_rows, size):
+        yield slice(start, min(start + size, n_rows))
 
 
 def log_softmax(scores: Array) -> Array:

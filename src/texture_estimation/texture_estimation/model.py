@@ -20,6 +20,7 @@ from texture_estimation.incremental.added_slides import AddedSlide, read_added_s
 from texture_estimation.incremental.ridge_classifier import RidgeClassifier
 from texture_estimation.incremental.training_examples import TrainingExamples
 from texture_estimation.learners.learner import Predictor, hidden_layer
+from texture_estimation.learners.mlp_predictor import MlpPredictor
 from texture_estimation.log_probabilities import is_tied, log_softmax
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
 from texture_estimation.open_set.domain import Domain
@@ -159,6 +160,25 @@ class TextureModel:
     def activations(self, X: Array) -> Array | None:
         """Return the outputs of the trained hidden layer, (..., n_hidden); None if the classifier has none."""
         return self._hidden_layer(X) if self._hidden_layer is not None else None
+
+    def predict_with_activations(self, X: Array) -> tuple[Array, Array | None]:
+        """Return what `predictor` and `activations` give, with the hidden layer computed once where both have it.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n_labels)
+            Log-probabilities up to a constant of the window.
+        (..., n_hidden) or None
+            Outputs of the trained hidden layer; None if the classifier has none.
+        """
+        if self.incremental_predictor is None and isinstance(self.predictor, MlpPredictor):
+            activations = self.predictor.activations(X)
+            return self.predictor.scores(activations), activations
+        return self.predictor(X), self.activations(X)
 
     def predict_log_proba(self, X: Array) -> Array:
         """Return the log-probability of each label, (..., n_labels) of (..., n_features).

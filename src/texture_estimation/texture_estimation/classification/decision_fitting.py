@@ -159,8 +159,7 @@ def _course(
 ) -> stopping_rule.SlideCourse:
     posterior = rule.log_posterior(trace.means, trace.effective_windows[:, None], tempering_exponent)
     steps = list(zip(trace.scores.tolist(), trace.effective_windows.tolist(), strict=True))
-    novelty_scores = np.array([detector.novelty_score(scores, windows) for scores, windows in steps])
-    thresholds = np.array([detector.threshold(windows) for _, windows in steps])
+    novelty_scores, thresholds = np.array([detector.score_and_threshold(*step) for step in steps]).T
     return stopping_rule.SlideCourse(
         confidences=np.exp(posterior.max(axis=1)),
         right=(posterior.argmax(axis=1) == trace.truth) & ~is_tied(posterior),

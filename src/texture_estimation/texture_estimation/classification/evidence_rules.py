@@ -60,6 +60,9 @@ class EvidenceRule(Protocol):
             1 for a window that counts fully.
         """
 
+    def window_weight(self, effective_windows: float) -> float:
+        """Return the weight of one window, as `window_weights` does; without an array it costs a tenth."""
+
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the log-probability of each texture given all windows so far, (..., n_labels).
 
@@ -127,6 +130,10 @@ class SoftVote:
         """Return 1 for the first FULL_WINDOWS effective windows, and `late_weight` for those after them."""
         return np.where(np.asarray(effective_windows) > FULL_WINDOWS + ROUNDING, self.late_weight, 1.0)
 
+    def window_weight(self, effective_windows: float) -> float:
+        """Return 1 for one of the first FULL_WINDOWS effective windows, and `late_weight` for one after them."""
+        return self.late_weight if effective_windows > FULL_WINDOWS + ROUNDING else 1.0
+
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return log softmax(n^tempering_exponent · mean log p), the last axis being the textures."""
         return log_softmax(mean_evidence * effective_windows**tempering_exponent)
@@ -184,6 +191,10 @@ class MajorityVote:
     def window_weights(self, effective_windows: float | Array) -> Array:
         """Return 1 for each window: votes are counted."""
         return np.ones(np.shape(effective_windows))
+
+    def window_weight(self, effective_windows: float) -> float:
+        """Return 1: votes are counted."""
+        return 1.0
 
     def log_posterior(self, mean_evidence: Array, effective_windows: float | Array, tempering_exponent: float) -> Array:
         """Return the logarithm of the shares of the votes; equal ones for all labels where the majority is lacking.

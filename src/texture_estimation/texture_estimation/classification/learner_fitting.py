@@ -104,7 +104,7 @@ def _augmented_examples(
     classes = codes[first]
     centres = np.stack([means[classes == code].mean(axis=0) for code in range(int(codes.max()) + 1)])
     return AugmentedExamples(
-        values=copies.values[own],
+        values=copies.values if own.all() else copies.values[own],  # a copy of all takes as much memory again
         codes=classes[copied],
         groups=copied,
         rows=np.repeat(np.arange(len(copied)), _times(runs, examples, recipe.training.start_weight)),

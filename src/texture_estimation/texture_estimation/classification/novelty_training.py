@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from texture_core.arrays import Array
+from texture_core.arrays import AnyArray, Array
 from texture_estimation.classification.evidence_rules import EvidenceRule, running_means
 from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted, Learner, Predictor, hidden_layer
@@ -61,10 +61,35 @@ class SlideTrace:
 
 @dataclass(frozen=True, eq=False)
 class _Slide:
+    """A slide or a copy of one, whose windows are rows of examples; only as numbers of double precision when asked for.
+
+    Parameters
+    ----------
+    group, truth
+        Number of the slide, and of its label.
+    examples : (n, n_features)
+        Of all slides.
+    rows
+        Those of this slide.
+    shift : (n_features,) or a number
+        Added to the features.
+    disturbance
+        Kind of the disturbance; '' for none.
+    """
+
     group: int
     truth: int
-    values: Array
+    examples: AnyArray
+    rows: slice | Codes
+    shift: Array | float = 0.0
     disturbance: str = ''
+
+    @property
+    def values(self) -> Array:
+        """Features of the windows, (n_windows, n_features)."""
+        values: Array = self.examples[self.rows].astype(np.float64)
+        values += self.shift
+        return values
 
 
 def fit_novelty(
@@ -108,7 +133,8 @@ def fit_novelty(
         return None
     overlap = min(examples.hop_s / examples.window_s, 1.0)
     slides = [
-        _Slide(number, int(classes[first[number]]), examples.values[groups == number]) for number in range(len(names))
+        _Slide(number, int(classes[first[number]]), examples.values, np.flatnonzero(groups == number))
+        for number in range(len(names))
     ]
     disturbed = _disturbed_slides(examples, names, classes[first])
     copies = _reference_copies(examples, names, classes[first], gain_range)
@@ -121,8 +147,9 @@ def fit_novelty(
             overlap,
         )
         for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
+            values = slide.values
             if predictor is not None:
-                log_probabilities = predictor(slide.values)
+                log_probabilities = predictor(values)
             elif not slide.disturbance:
                 log_probabilities = fitted.held_out[groups == slide.group]
             else:
@@ -131,7 +158,7 @@ def fit_novelty(
             effective_windows = 1.0 + np.arange(len(evidence), dtype=np.float64) * overlap
             means = running_means(rule, evidence, effective_windows)
             followed = SlideTrace(slide.truth, means, effective_windows, np.zeros((0, 0)), slide.disturbance)
-            traces.append(_with_scores(followed, slide, evidence, predictor, distances))
+            traces.append(_with_scores(followed, values, evidence, predictor, distances))
     final = learner.predictor(fitted.parameters)
     distances = _fit_distances(slides, copies, final if hidden_layer(final) else None, overlap)
     held_out_scores = [_scores_at(traces, level) for level in EFFECTIVE_WINDOWS]
@@ -166,7 +193,7 @@ def _reference_copies(examples: LabelledFeatures, names: Any, classes: Codes, ga
     widest, copies = math.log(gain_range), examples.augmented.copies
     quiet = (copies.copies < REFERENCE_COPIES) & (copies.kinds != NOISE)
     return [
-        replace(copy, values=copy.values + rng.uniform(-widest, widest) * examples.augmented.gain_response)
+        replace(copy, shift=rng.uniform(-widest, widest) * examples.augmented.gain_response)
         for copy in _copied_slides(copies.select(quiet), names, classes)
     ]
 
@@ -178,8 +205,8 @@ def _copied_slides(copies: FeatureCopies, names: Any, classes: Codes) -> Iterato
     for start, stop in pairwise(starts.tolist()):
         group = number.get(str(copies.groups[start])) if stop > start else None
         if group is not None:
-            values = copies.values[start:stop].astype(np.float64)
-            yield _Slide(group, int(classes[group]), values, str(copies.kinds[start]))
+            kind = str(copies.kinds[start])
+            yield _Slide(group, int(classes[group]), copies.values, slice(start, stop), disturbance=kind)
 
 
 def _fit_distances(
@@ -187,10 +214,7 @@ def _fit_distances(
 ) -> Mapping[str, ClassDistance]:
     """Return the distances, with the metric of undisturbed slides and references among the copies, too."""
     hidden = hidden_layer(predictor) if predictor is not None else None
-    means, more = (
-        [space_means(slide.values, hidden(slide.values) if hidden else None, overlap) for slide in those]
-        for those in (slides, copies)
-    )
+    means, more = ([_space_means(slide.values, hidden, overlap) for slide in those] for those in (slides, copies))
     classes, more_classes = (np.array([slide.truth for slide in those]) for those in (slides, copies))
     found = {space: ClassDistance.fit(np.stack([own[space] for own in means]), classes) for space in means[0]}
     if not more:
@@ -201,22 +225,26 @@ def _fit_distances(
     }
 
 
+def _space_means(values: Array, hidden: Callable[[Array], Array] | None, overlap: float) -> dict[str, Array]:
+    return space_means(values, hidden(values) if hidden else None, overlap)
+
+
 def _with_scores(
     trace: SlideTrace,
-    slide: _Slide,
+    values: Array,
     evidence: Array,
     predictor: Predictor | None,
     distances: Mapping[str, ClassDistance],
 ) -> SlideTrace:
-    """Return the trace of a slide, whose windows gave this evidence, with the scores of its novelty."""
+    """Return the trace of a slide, whose windows have these features and gave this evidence, with its scores."""
     hidden = hidden_layer(predictor) if predictor is not None else None
-    activations = hidden(slide.values) if hidden else [None] * len(slide.values)
+    activations = hidden(values) if hidden else [None] * len(values)
     highest = np.sort(trace.means, axis=1)[:, -2:]
     novelty = SlideNovelty(distances, evidence.shape[1])
     scores = []
     for number, label in enumerate(trace.means.argmax(axis=1).tolist()):
         effective_windows = float(trace.effective_windows[number])
-        novelty.add(slide.values[number], activations[number], int(evidence[number].argmax()), effective_windows)
+        novelty.add(values[number], activations[number], int(evidence[number].argmax()), effective_windows)
         scores.append(novelty.scores(label, float(highest[number, 1] - highest[number, 0])))
     return replace(trace, scores=np.array(scores))
 

@@ -18,7 +18,7 @@ from texture_estimation.learners.augmented_examples import AugmentedBatches, Aug
 from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted, FoldFit
 from texture_estimation.learners.mlp_predictor import MlpPredictor
-from texture_estimation.log_probabilities import log_loss, log_softmax
+from texture_estimation.log_probabilities import chunks, log_loss, log_softmax
 
 Weights = list[NDArray[np.float32]]  # hidden: (n_features, hidden), (hidden,); output: (hidden, n_labels), (n_labels,)
 BATCH = 128
@@ -26,6 +26,9 @@ MIN_STEPS = 400
 RATE = 2e-3
 MEAN_DECAY, SQUARE_DECAY = 0.9, 0.999  # Kingma & Ba's
 TINY = np.float32(1e-8)
+# Of one network, steps times features and labels: larger trainings make fewer passes, so that they end within minutes.
+# The shipped recipes come to 3 to 5 millions with 20 textures of 40 slides.
+MAX_WORK = 10e6
 
 
 @dataclass(frozen=True)
@@ -118,13 +121,13 @@ class Mlp:
             rest = augmented.without(slides) if augmented else None
             folds.append(FoldFit(slides, short._fit(X[~held], y[~held], n_labels, rest)))
             scores[held] = self.predictor(folds[-1].parameters)(X[held])
-        best = minimize_scalar(
-            lambda log_t: log_loss(log_softmax(scores / math.exp(log_t)), y), bounds=(-2.0, 4.0), method='bounded'
-        )
+        best = minimize_scalar(lambda log_t: _loss_at(scores, y, math.exp(log_t)), bounds=(-2.0, 4.0), method='bounded')
         temperature = math.exp(best.x)
         fitted = _calibrated(self._fit(X, y, n_labels, augmented), temperature)
         folds = [FoldFit(fold.held_out, _calibrated(fold.parameters, temperature)) for fold in folds]
-        return Fitted(fitted, log_softmax(scores / temperature), note, folds)
+        for rows in chunks(*scores.shape):
+            scores[rows] = log_softmax(scores[rows] / temperature)
+        return Fitted(fitted, scores, note, folds)
 
     @staticmethod
     def predictor(folds_of: Mapping[str, Any]) -> MlpPredictor:
@@ -137,7 +140,9 @@ class Mlp:
         """Return the layers, with the standardisation worked into them."""
         mean, scale = X.mean(axis=0), X.std(axis=0)
         scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # what is constant tells nothing
-        inputs, rng = ((X - mean) / scale).astype(np.float32), np.random.default_rng(self.seed)
+        inputs, rng = np.empty(X.shape, np.float32), np.random.default_rng(self.seed)
+        for rows in chunks(*X.shape):
+            inputs[rows] = (X[rows] - mean) / scale
         drawn: _Draws = (
             AugmentedBatches(inputs, y, augmented, rng, mean=mean, scale=scale)
             if augmented
@@ -159,6 +164,7 @@ class Mlp:
         weights = _first_weights(n_features, self.hidden, n_labels, rng)
         truth = np.eye(n_labels, dtype=np.float32)
         steps = max(self.epochs * -(-n_examples // BATCH), MIN_STEPS)
+        steps = min(steps, max(round(MAX_WORK / (n_features + n_labels)), MIN_STEPS))
         adam = _Adam(weights)
         for step in range(steps):
             inputs, codes = drawn.draw(min(BATCH, n_examples))
@@ -190,6 +196,13 @@ class _Batches:
         rows = self._order[self._drawn % self._count :: self._count]
         self._drawn += 1
         return self._inputs[rows], self._codes[rows]
+
+
+def _loss_at(scores: Array, y: Codes, temperature: float) -> float:
+    """Return the mean negative log-probability of the true labels at a temperature; few rows at once take memory."""
+    parts = list(chunks(*scores.shape))
+    losses = [log_loss(log_softmax(scores[rows] / temperature), y[rows]) for rows in parts]
+    return float(np.average(losses, weights=[rows.stop - rows.start for rows in parts])) if losses[1:] else losses[0]
 
 
 def _calibrated(parameters: Mapping[str, Array], temperature: float) -> dict[str, Array]:

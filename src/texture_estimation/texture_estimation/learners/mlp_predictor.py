@@ -41,6 +41,19 @@ class MlpPredictor:
 
     def __call__(self, X: Array) -> Array:
         """Return log-probabilities up to a constant of the window, (..., n_labels) of (..., n_features)."""
-        scores: Array = self.activations(X) @ self.output
+        return self.scores(self.activations(X))
+
+    def scores(self, activations: Array) -> Array:
+        """Return the same, (..., n_labels), from the outputs of the hidden layer, (..., n_hidden).
+
+        Parameters
+        ----------
+        activations : (..., n_hidden)
+
+        Returns
+        -------
+        (..., n_labels)
+        """
+        scores: Array = activations @ self.output
         scores += self.output_offset
         return scores

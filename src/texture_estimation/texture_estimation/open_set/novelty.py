@@ -112,15 +112,33 @@ class NoveltyDetector:
 
     def novelty_score(self, scores: Sequence[float], effective_windows: float) -> float:
         """Return the novelty score from the scores of a slide after this effective window count."""
-        row = self._row(effective_windows)
-        count = len(row) // 2
-        medians, spreads = row[1 : 1 + count], row[1 + count :]
-        tails = zip(scores, medians, spreads, strict=False)
-        return sum((score - median) / spread for score, median, spread in tails if score > median)
+        return self.score_and_threshold(scores, effective_windows)[0]
 
     def threshold(self, effective_windows: float) -> float:
         """Return the largest novelty score of a known surface after this effective window count."""
         return self._row(effective_windows)[0]
+
+    def score_and_threshold(self, scores: Sequence[float], effective_windows: float) -> tuple[float, float]:
+        """Return the novelty score, and the largest one of a known surface.
+
+        Parameters
+        ----------
+        scores
+            Of a slide, as `SlideNovelty.scores` returns them.
+        effective_windows
+            Effective window count of the slide.
+
+        Returns
+        -------
+        float
+            Sum of the tails.
+        float
+            Threshold.
+        """
+        row = self._row(effective_windows)
+        count = len(row) // 2
+        tails = zip(scores, row[1 : 1 + count], row[1 + count :], strict=False)
+        return sum((score - median) / spread for score, median, spread in tails if score > median), row[0]
 
     def _row(self, effective_windows: float) -> list[float]:
         """Return the row of `_levels`, linear between two levels."""
@@ -213,8 +231,8 @@ class SlideNovelty:
         self._counts = dict.fromkeys(distances, 0)
         self._votes = [0] * n_labels
         self._windows = 0
-        # Sums stop changing after a few windows, and the label rarely changes.
-        self._found: dict[tuple[str, int], float] = {}
+        # Sums stop changing after a few windows, that of the onset first, and the label rarely changes.
+        self._found: dict[str, dict[int, float]] = {space: {} for space in distances}
 
     def add(self, values: Array, hidden: Array | None, label: int, effective_windows: float) -> None:
         """Add a window.
@@ -233,13 +251,13 @@ class SlideNovelty:
         self._votes[label] += 1
         if effective_windows > EFFECTIVE_WINDOWS[-1] + 1e-9 and self._sums:
             return
-        self._found.clear()
         for space in self._distances:
             if effective_windows > SPACES[space] + 1e-9 and self._counts[space]:
                 continue
             own = hidden if space == HIDDEN and hidden is not None else values
             self._sums[space] = self._sums[space] + own if self._counts[space] else own
             self._counts[space] += 1
+            self._found[space].clear()
 
     def scores(self, label: int, log_odds: float) -> list[float]:
         """Return the scores for a label: distances, then what `OTHER_SCORES` counts; larger ones are rarer.
@@ -255,11 +273,10 @@ class SlideNovelty:
         return [*distances, -log_odds, -self._votes[label] / self._windows]
 
     def _distance(self, space: str, label: int) -> float:
-        found = self._found.get((space, label))
-        if found is None:
-            found = self._distances[space].score(self._sums[space] / self._counts[space], label)
-            self._found[space, label] = found
-        return found
+        found = self._found[space]
+        if label not in found:
+            found[label] = self._distances[space].score(self._sums[space] / self._counts[space], label)
+        return found[label]
 
 
 def space_means(values: Array, hidden: Array | None, overlap: float) -> dict[str, Array]:
