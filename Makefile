@@ -11,7 +11,7 @@ ALONE = { echo 'Tests against the clock failed beside others; they run again, al
 # Public recordings for evaluation, if they lie beside the repository or where the user says.
 export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
-.PHONY: setup demo test test-benchmarks lint benchmark docs clean
+.PHONY: setup demo test test-benchmarks lint benchmark peers docs clean
 
 setup:
 	@$(PYTHON) tools/workspace.py
@@ -39,6 +39,13 @@ test-benchmarks: setup
 
 benchmark: setup
 	@.venv/bin/texture benchmark all
+
+# General classifiers of time series, in packages of their own, on the slides on which the recipes are compared.
+peers: setup
+	@test -d out/peers || .venv/bin/python -m venv out/peers
+	@out/peers/bin/pip install --quiet aeon torch
+	@TEXTURE_PEERS=$$(out/peers/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') \
+		.venv/bin/texture benchmark peers
 
 docs: setup
 	@$(RUN) python docs/build.py out/site

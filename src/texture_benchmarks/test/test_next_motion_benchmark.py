@@ -29,7 +29,7 @@ def test_trials_are_recognised_once_a_motion_reports_the_textures_apart() -> Non
     known = training(scene, motions, values)
     for way in CHOICES.values():
         choose = way(known, motions, np.random.default_rng(0))
-        trials = explored(scene, known, motions, values, choose=choose, n_slides=2)
+        trials = explored(list(scene.surfaces), known, motions, values, choose=choose, n_slides=2)
         assert trials.right.shape == trials.probability.shape == (2 * len(scene.surfaces), 2)
         assert trials.right.all()
     one = extracted(scene, motions, 1, features, np.random.default_rng(0))

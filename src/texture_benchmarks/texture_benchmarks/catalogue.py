@@ -15,13 +15,17 @@ from texture_benchmarks.latency import run as latency
 from texture_benchmarks.learning import run as learning
 from texture_benchmarks.load import run as load
 from texture_benchmarks.motion import run as motion
+from texture_benchmarks.next_motion import recorded as next_motion_recorded
 from texture_benchmarks.next_motion import run as next_motion
 from texture_benchmarks.optimise import pairs_run as optimise_pairs
 from texture_benchmarks.optimise import run as optimise
+from texture_benchmarks.overview import run as overview
+from texture_benchmarks.peers import run as peers
 from texture_benchmarks.recipes import run as recipes
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_benchmarks.robustness import run as robustness
 from texture_benchmarks.roughness import run as roughness
+from texture_benchmarks.scale import run as scale
 from texture_benchmarks.scenes import run as scenes
 from texture_benchmarks.segmentation import run as segmentation
 from texture_benchmarks.sensors import run as sensors
@@ -35,7 +39,9 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
     'recipes_later': recipes.run_later,  # the same on the vibration of slides of a later time alone
+    'peers': peers.run,  # general classifiers of time series on the same later slides; in packages of their own
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
+    'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
     'ablation': ablation.run,  # which features, numbers, units and channels contribute their time, recorded
     'decisions': decisions.run,  # early decisions, calibration, candidates and unknown surfaces, recorded
     'trust': trust.run,  # slides wrong and known under disturbances, early and at the end
@@ -53,8 +59,10 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'segmentation': segmentation.run,  # start and end of sliding, found from the signals alone
     'motion': motion.run,  # force, speed and circle by robot and surface; where force control is stable
     'next_motion': next_motion.run,  # slides needed with motions chosen for what they tell, simulated
+    'next_motion_recorded': next_motion_recorded.run,  # the same among recorded speeds and forces
     'scenes': scenes.run,  # cost of simulated slides and devices; what each term of a scene contributes
     'stick_slip': stick_slip.run,  # cost, error and longest step of simulated friction
+    'overview': overview.run,  # accuracy against time in one picture, from the stored figures of others
 }
 
 

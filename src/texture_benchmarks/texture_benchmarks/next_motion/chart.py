@@ -11,7 +11,9 @@ from texture_core.arrays import Array
 from texture_evaluation.charts import COLOURS, chart
 
 
-def slides_chart(right: Mapping[str, Array], wanted: Sequence[float], path: str | Path) -> Path:
+def slides_chart(
+    right: Mapping[str, Array], wanted: Sequence[float], path: str | Path, slides: str = 'simulated'
+) -> Path:
     """Draw the accuracy against the number of slides; shaded is one standard deviation between seeds.
 
     Parameters
@@ -22,20 +24,22 @@ def slides_chart(right: Mapping[str, Array], wanted: Sequence[float], path: str 
         Shares that are drawn as lines.
     path
         File that is written.
+    slides
+        What the slides are, for the title.
 
     Returns
     -------
     Path
         Of the file.
     """
-    with chart(path, (6.4, 4.0), 'Textures recognised after several slides (simulated)') as figure:
+    with chart(path, (6.4, 4.0), f'Textures recognised after several slides ({slides})') as figure:
         axes = figure.subplots()
         for colour, marker, (name, shares) in zip(COLOURS, 'osvDP', right.items(), strict=False):
-            slides, mean, off = np.arange(1, shares.shape[1] + 1), shares.mean(axis=0), shares.std(axis=0)
-            axes.plot(slides, 100 * mean, color=colour, marker=marker, markersize=5, label=name)
-            axes.fill_between(slides, 100 * (mean - off), 100 * (mean + off), color=colour, alpha=0.2, linewidth=0)
+            numbers, mean, off = np.arange(1, shares.shape[1] + 1), shares.mean(axis=0), shares.std(axis=0)
+            axes.plot(numbers, 100 * mean, color=colour, marker=marker, markersize=5, label=name)
+            axes.fill_between(numbers, 100 * (mean - off), 100 * (mean + off), color=colour, alpha=0.2, linewidth=0)
         for share in wanted:
             axes.axhline(100 * share, color='k', linewidth=1, linestyle='--')
-        axes.set(xlabel='slides', ylabel='trials with the right texture (%)', xticks=slides, ylim=(None, 101))
+        axes.set(xlabel='slides', ylabel='trials with the right texture (%)', xticks=numbers, ylim=(None, 101))
         axes.legend(loc='lower right', title='next motion')
     return Path(path)

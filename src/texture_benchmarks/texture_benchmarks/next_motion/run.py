@@ -77,7 +77,7 @@ def _trials(seed: Sequence[int], motions: Sequence[SlideMotion], trials: int) ->
     known = training(scene, motions, extracted(scene, motions, TRAINED, features, rng))
     tests = extracted(scene, motions, trials * SLIDES, features, rng)
     done = {
-        name: explored(scene, known, motions, tests, choose=way(known, motions, rng), n_slides=SLIDES)
+        name: explored(list(scene.surfaces), known, motions, tests, choose=way(known, motions, rng), n_slides=SLIDES)
         for name, way in CHOICES.items()
     }
     return done, _choosing_us(known, motions)

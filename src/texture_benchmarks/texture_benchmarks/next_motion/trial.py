@@ -135,7 +135,7 @@ class Trials:
 
 
 def explored(
-    scene: Scene,
+    textures: Sequence[str],
     known: NextTouchModel,
     motions: Sequence[SlideMotion],
     values: Array,
@@ -147,7 +147,7 @@ def explored(
 
     Parameters
     ----------
-    scene, known, motions
+    textures, known, motions
         What is explored, what is known of it, and what may be done.
     values : (n_motions, n_textures, n_trials * n_slides, n_features)
         Test slides: a trial over a texture has `n_slides` of its own for each motion, the same for any choice.
@@ -163,7 +163,7 @@ def explored(
     """
     places = {motion: number for number, motion in enumerate(motions)}
     right, probability = [], []
-    for number, texture in enumerate(scene.surfaces):
+    for number, texture in enumerate(textures):
         truth = known.textures.index(texture)
         for first in range(0, values.shape[2] - n_slides + 1, n_slides):
             posteriors = [known.uniform_log_prior]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from texture_benchmarks.recipes.raw_windows import Predict, figures_of_windows
+from texture_benchmarks.recipes.raw_windows import Vote, figures_of_windows, one_vote
 from texture_benchmarks.recipes.trial import LENGTH_S
 from texture_core.arrays import AnyArray, Array
 from texture_evaluation.cross_validation.splits import Split
@@ -33,7 +33,7 @@ def installed() -> bool:
 def try_minirocket(
     dataset: SlideDataset, split: Split, seed: int, length_s: float = LENGTH_S, every: int = 1
 ) -> dict[str, Any]:
-    """Return the figures of MiniRocket on the vibration, the vote being one window, one vote.
+    """Return the figures of MiniRocket on the vibration, one window, one vote.
 
     Parameters
     ----------
@@ -54,10 +54,10 @@ def try_minirocket(
     """
     transform = import_module('aeon.transformations.collection.convolution_based').MiniRocket
 
-    def fit(samples: AnyArray, labels: AnyArray, slides: AnyArray) -> Predict:
+    def fit(samples: AnyArray, labels: AnyArray, slides: AnyArray) -> Vote:
         rocket = transform(random_state=seed).fit(samples)
         ridge = _Ridge.fit(rocket.transform(samples), labels, slides)
-        return lambda windows: ridge(rocket.transform(windows))
+        return one_vote(lambda windows: ridge(rocket.transform(windows)), ridge.labels)
 
     return figures_of_windows(dataset, split, fit, length_s, every)
 

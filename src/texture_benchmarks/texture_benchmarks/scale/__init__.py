@@ -1,0 +1,1 @@
+"""Benchmark: what trainings and windows cost with many textures and many windows."""
