@@ -23,7 +23,7 @@ from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.slide_samples import SlideSamples
 
 RECIPE = 'fast'
-TRIALS, SLIDES, SEEDS = 20, 4, 3
+TRIALS, SLIDES, SEEDS = 20, 4, 1
 SHOWN = 'touches of 6 mm, every other one trained on'
 QUICK_TEXTURES = 4
 WAYS = {name: CHOICES[name] for name in ('informed', 'fixed order, planned', 'random')}

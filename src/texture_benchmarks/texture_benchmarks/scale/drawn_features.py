@@ -11,8 +11,9 @@ from scipy.linalg import eigh
 
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.group_means import group_means
-from texture_features.augmentation.augmented_features import NOISE, AugmentedFeatures, FeatureCopies
+from texture_features.augmentation.augmented_features import NOISE
 from texture_features.augmentation.disturbances import KINDS
+from texture_features.augmentation.feature_copies import AugmentedFeatures, FeatureCopies
 from texture_features.labelled_features import LabelledFeatures
 
 GAIN_RESPONSES = {'log_bands': 2.0, 'log_power': 2.0, 'log_amplitude': 1.0}  # per natural logarithm of the gain
