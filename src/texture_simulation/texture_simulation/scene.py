@@ -97,6 +97,14 @@ def load_scene(name_or_path: str) -> Scene:
     return scene_from(path.stem, load_yaml(path, 'scene'))
 
 
+def _check_sections(content: Any, where: str) -> None:
+    if not isinstance(content, Mapping) or not isinstance(content.get('surfaces'), Mapping):
+        raise InvalidParameter(f'{where} has no mapping `surfaces` of names to lists of terms; add one')
+    unexpected = set(content) - set(SECTIONS)
+    if unexpected:
+        raise InvalidParameter(f'{where} has the sections {sorted(unexpected)}; allowed are {", ".join(SECTIONS)}')
+
+
 def scene_from(name: str, content: Any) -> Scene:
     """Return the scene that a mapping with `surfaces`, and if wanted `sensor`, `contact` and `effects`, describes.
 
@@ -106,11 +114,7 @@ def scene_from(name: str, content: Any) -> Scene:
         If a section is missing, unknown or impossible.
     """
     where = f"scene '{name}'"
-    if not isinstance(content, Mapping) or not isinstance(content.get('surfaces'), Mapping):
-        raise InvalidParameter(f'{where} has no mapping `surfaces` of names to lists of terms; add one')
-    unexpected = set(content) - set(SECTIONS)
-    if unexpected:
-        raise InvalidParameter(f'{where} has the sections {sorted(unexpected)}; allowed are {", ".join(SECTIONS)}')
+    _check_sections(content, where)
     return Scene(
         name=name,
         surfaces={str(key): _surface(str(key), terms, where) for key, terms in content['surfaces'].items()},

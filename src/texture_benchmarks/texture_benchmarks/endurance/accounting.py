@@ -76,9 +76,7 @@ class SampleAccount:
             Sampling rate.
         """
         if self._first is not None and first_sample < self._next_sample:
-            self.restarts += 1
-            self.away_s += (stamp_ns - self._end_ns) / NANOSECONDS
-            self._first = None
+            self._note_restart(stamp_ns)
         if self._first is None:
             self._first = first_sample, stamp_ns
         else:
@@ -89,6 +87,11 @@ class SampleAccount:
         self.samples += count
         self._next_sample = first_sample + count
         self._end_ns = stamp_ns + round(count / rate_hz * NANOSECONDS)
+
+    def _note_restart(self, stamp_ns: int) -> None:
+        self.restarts += 1
+        self.away_s += (stamp_ns - self._end_ns) / NANOSECONDS
+        self._first = None
 
 
 class AnswerAccount:

@@ -139,9 +139,7 @@ def try_estimator(dataset: SlideDataset, split: Split, name: str, seed: int) -> 
     """
     cls: Any = find({}, name, 'estimator')
     if not all(hasattr(cls, method) for method in ('fit', 'predict')):
-        raise InvalidParameter(
-            f"'{name}' has no methods fit and predict; name a class of aeon or one of your own like it"
-        )
+        raise InvalidParameter(f"'{name}' has no methods fit and predict; name a class of aeon or your own like it")
 
     def fit(samples: AnyArray, labels: AnyArray, _: AnyArray) -> Vote:
         estimator = cls()

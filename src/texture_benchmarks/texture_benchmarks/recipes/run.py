@@ -389,7 +389,11 @@ def _jobs(settings: Mapping[str, Setting], names: Sequence[str], options: Benchm
     jobs = [_RecipeJob(setting, tuple(group)) for (setting, *_), group in groups.items()]
     if not options.quick and minirocket.installed() and VIBRATION in settings:
         jobs.append(_RecipeJob(VIBRATION, (MINIROCKET,)))
-    # What takes long first, so that no core waits at the end.
+    return _slowest_first(jobs, settings)
+
+
+def _slowest_first(jobs: Sequence[_RecipeJob], settings: Mapping[str, Setting]) -> list[_RecipeJob]:
+    """Return the jobs in an order in which no core waits at the end."""
     trainings = {name: sum(_count(setting, split) for split in setting.splits) for name, setting in settings.items()}
     return sorted(jobs, key=lambda job: (not any(map(SLOW.search, job.recipes)), -trainings[job.setting]))
 

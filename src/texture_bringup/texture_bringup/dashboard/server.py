@@ -132,6 +132,10 @@ def _guard(access: Access) -> Any:
     return guard
 
 
+def _token_of(request: web.Request) -> str:
+    return request.cookies.get(COOKIE, '') or request.headers.get('Authorization', '').removeprefix('Bearer ')
+
+
 def _refusal(access: Access, request: web.Request) -> web.StreamResponse | None:
     """Return why a request is refused, or the answer that turns a token in the address into a cookie."""
     if not access.is_our_host(request.headers.get('Host', '')):
@@ -144,8 +148,7 @@ def _refusal(access: Access, request: web.Request) -> web.StreamResponse | None:
         answer = web.Response(status=303, headers={'Location': '/'})
         answer.set_cookie(COOKIE, given, httponly=True, samesite='Strict')
         return answer
-    bearer = request.headers.get('Authorization', '').removeprefix('Bearer ')
-    if not access.knows(request.cookies.get(COOKIE, '') or bearer):
+    if not access.knows(_token_of(request)):
         return _said(401, 'this page needs its token: open the address that the dashboard printed, with ?token=')
     return None
 

@@ -56,8 +56,7 @@ def within_class_whitening(X: Array, y: Codes, groups: Codes, ridge: float, diff
     if mean_power <= 0.0:
         return np.eye(X.shape[1])
     strengths, directions = np.linalg.eigh(covariance / mean_power)
-    whitening: Array = (directions / np.sqrt(np.maximum(strengths, 0.0) + ridge)) @ directions.T
-    return whitening
+    return np.asarray((directions / np.sqrt(np.maximum(strengths, 0.0) + ridge)) @ directions.T)
 
 
 def _mean_square(deviations: Array) -> Array:

@@ -93,9 +93,8 @@ class StagedMotion:
         try:
             command = stage.step(time_ns, arm)
             if command is not None and stage.elapsed_s(time_ns) > stage.timeout_s:
-                raise MotionAborted(
-                    f'waited {stage.timeout_s:.1f} s for {stage.goal}; the force is {arm.force_n:.2f} N'
-                )
+                waited = f'waited {stage.timeout_s:.1f} s for {stage.goal}'
+                raise MotionAborted(f'{waited}; the force is {arm.force_n:.2f} N')
         except MotionAborted as error:
             if not self._sought(error, stage):
                 self.abort(str(error))

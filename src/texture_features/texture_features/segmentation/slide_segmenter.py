@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from texture_core.arrays import Array
+from texture_core.arrays import Array, Samples
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_features.segmentation.cell_power import baseline_power, cell_power
@@ -122,12 +122,16 @@ class SlideSegmenter:
         first, rate_hz = buffer.first_sample, buffer.rate_hz
         return [(buffer.time_of(first + a * rate_hz), buffer.time_of(first + b * rate_hz)) for a, b in spans]
 
-    def _find(self, buffer: SampleBuffer, begin_ns: int) -> list[SlidingInterval]:
-        fast = buffer.take(buffer.first_sample, buffer.next_sample - buffer.first_sample)
-        _, powers = cell_power(fast, buffer.rate_hz, self._params.cell_s, self._params.smooth_s)
+    def _watch_rest(self, fast: Samples, rate_hz: float) -> None:
+        """Keep the lowest power of each channel as that at rest."""
+        _, powers = cell_power(fast, rate_hz, self._params.cell_s, self._params.smooth_s)
         if len(powers):
             quiet = baseline_power(powers)
             self._rest = np.minimum(self._rest, quiet) if quiet.shape == self._rest.shape else quiet
+
+    def _find(self, buffer: SampleBuffer, begin_ns: int) -> list[SlidingInterval]:
+        fast = buffer.take(buffer.first_sample, buffer.next_sample - buffer.first_sample)
+        self._watch_rest(fast, buffer.rate_hz)
         slow = self._streams[self._slow].buffers
         if not slow:
             return find_sliding(fast, buffer.rate_hz, self._params, rest=self._rest)

@@ -332,11 +332,9 @@ class _TableSlides:
             raise InvalidData(f"'{self._table.place}': column '{name}' has no value during a slide; name another")
         other = np.flatnonzero(own != own[0])
         if len(other):
-            raise InvalidData(
-                f"'{self._table.place}', row {self._columns.row(rows.start + int(other[0]))}, column '{name}': the "
-                f"{kind} changes from '{own[0]}' to '{own[other[0]]}' within a slide; let slides end "
-                f"where '{name}' changes (`slides: {{by: column}}`)"
-            )
+            place = f"'{self._table.place}', row {self._columns.row(rows.start + int(other[0]))}, column '{name}'"
+            change = f"the {kind} changes from '{own[0]}' to '{own[other[0]]}' within a slide"
+            raise InvalidData(f"{place}: {change}; let slides end where '{name}' changes (`slides: {{by: column}}`)")
         return str(own[0])
 
     def _times_of(self, name: str, length: int) -> Array:
