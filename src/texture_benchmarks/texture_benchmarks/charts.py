@@ -12,6 +12,8 @@ from texture_core.arrays import AnyArray, Array
 from texture_evaluation.charts import COLOURS, chart, draw_confusion, line_styles, pareto_front
 
 FEW_LINES = 5  # more names than these would cover lines
+DIRECT_LABELS = 10  # names in a chart of many methods
+LABEL_DECADES, LABEL_SHARE = 0.4, 0.035  # room of a name, on the axes of cost and share
 
 
 def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: str | Path) -> Path:
@@ -198,16 +200,12 @@ def front_chart(
     Path
         Of the file.
     """
-    names = list(dict.fromkeys(name for points in panels.values() for name in points))
-    with chart(path, (4.2 * len(panels) + 2.0, 4.8), title) as figure:
-        rows = figure.subplots(1, len(panels) + 1, squeeze=False, width_ratios=[4.2] * len(panels) + [2.0])[0]
-        for axes, (name, points) in zip(rows, panels.items(), strict=False):
-            _front(axes, points, names)
+    with chart(path, (5.6 * len(panels) + 0.6, 4.8), title) as figure:
+        rows = figure.subplots(1, len(panels), squeeze=False)[0]
+        for axes, (name, points) in zip(rows, panels.items(), strict=True):
             axes.set(xlabel=axis_labels[0], title=name, xscale='log', ylim=(0, 101))
+            _front(axes, points)
         rows[0].set_ylabel(axis_labels[1])
-        listed = '\n'.join(f'{number}  {name}' for number, name in enumerate(names, 1))
-        rows[-1].text(0.0, 1.0, listed, va='top', fontsize=8)
-        rows[-1].axis('off')
     return Path(path)
 
 
@@ -244,16 +242,44 @@ def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, pa
     return Path(path)
 
 
-def _front(axes: Any, points: Mapping[str, tuple[float, float]], names: Sequence[str]) -> None:
+def _front(axes: Any, points: Mapping[str, tuple[float, float]]) -> None:
     values = list(points.values())
     best = pareto_front(values)
     axes.step(
         [values[index][0] for index in best], [100 * values[index][1] for index in best],
         where='post', color=COLOURS[5], linewidth=1,
     )  # fmt: skip
-    for index, (name, (cost, share)) in enumerate(points.items()):
+    for index, (cost, share) in enumerate(values):
         axes.plot(cost, 100 * share, '.', color=COLOURS[5 if index in best else 0])
+    costs = [cost for cost, _ in values]
+    axes.set_xlim(min(costs) / 2, 3.5 * max(costs))  # room for the names at both ends
+    names = list(points)
+    for index, (start, height) in _named(values, best).items():
+        left = start < np.log10(values[index][0])
         axes.annotate(
-            str(names.index(name) + 1), (cost, 100 * share), xytext=(3, 3), textcoords='offset points',
-            fontsize=8, fontweight='bold' if index in best else 'normal',
+            names[index], (values[index][0], 100 * height), xytext=(-5 if left else 5, 0), textcoords='offset points',
+            va='center', ha='right' if left else 'left', fontsize=8, fontweight='bold' if index in best else 'normal',
         )  # fmt: skip
+
+
+def _named(values: Sequence[tuple[float, float]], best: Sequence[int]) -> dict[int, tuple[float, float]]:
+    """Return where names stand, in decades and as a share: of the front, then of the best that cover nothing."""
+    points = [(float(np.log10(cost)), share) for cost, share in values]
+    others = sorted(set(range(len(points))) - set(best), key=lambda index: -points[index][1])
+    places: dict[int, tuple[float, float]] = {}
+    for index in [*sorted(best, key=lambda index: -points[index][1]), *others]:
+        (x, y), up = points[index], LABEL_SHARE / 2
+        free = [
+            place
+            for place in ((x, y + up), (x - LABEL_DECADES, y + up), (x, y - up))
+            if not any(_covers(place, other, LABEL_DECADES) for other in places.values())
+            and not any(_covers(place, point, 0.0) for point in points if point != points[index])
+        ]
+        if free and len(places) < DIRECT_LABELS:
+            places[index] = free[0]
+    return places
+
+
+def _covers(place: tuple[float, float], other: tuple[float, float], length: float) -> bool:
+    """Return whether a name that starts at a place lies on another one of a length in decades, or on a point (0)."""
+    return -length < other[0] - place[0] < LABEL_DECADES and abs(place[1] - other[1]) < LABEL_SHARE

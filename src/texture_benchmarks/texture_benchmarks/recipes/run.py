@@ -439,5 +439,5 @@ def _chart(numbers: Mapping[str, Any], path: Path) -> Path:
         for name, of_setting in numbers.items()
         for split, of_split in list(of_setting.items())[-1:]
     }
-    title = 'All recipes on recorded slides: single windows or votes that are right, and time from window to estimate'
+    title = 'Accuracy over computing time of all recipes'
     return front_chart(panels, title, ('time of a window (µs)', 'single windows, or votes, recognised (%)'), path)
