@@ -71,9 +71,13 @@ def methods_of(stored: Mapping[str, Mapping[str, Any]]) -> list[Method]:
 def _of_cell(title: str, kind: str, cell: Mapping[str, Any]) -> Method:
     """Return what a cell of a table holds: all decisions, or those after some times where an older run has no more."""
     computing_s = 1e-6 * cell['latency_us']['median']
-    at_s = {float(seconds): share for seconds, share in cell['accuracy_at_s'].items() if share is not None}
-    found = cell.get('decisions') or {'s': [*at_s], 'share': [*at_s.values()]}
+    found = cell.get('decisions') or _after_some_times(cell['accuracy_at_s'])
     return Method(title, kind, [seconds + computing_s for seconds in found['s']], found['share'])
+
+
+def _after_some_times(accuracy_at_s: Mapping[str, float | None]) -> dict[str, list[float]]:
+    known = {float(seconds): share for seconds, share in accuracy_at_s.items() if share is not None}
+    return {'s': [*known], 'share': [*known.values()]}
 
 
 def _stored(folder: Path, name: str, *, needed: bool) -> Mapping[str, Any]:
