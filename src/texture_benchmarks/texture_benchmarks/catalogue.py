@@ -17,6 +17,7 @@ from texture_benchmarks.load import run as load
 from texture_benchmarks.motion import run as motion
 from texture_benchmarks.next_motion import recorded as next_motion_recorded
 from texture_benchmarks.next_motion import run as next_motion
+from texture_benchmarks.onset import run as onset
 from texture_benchmarks.optimise import pairs_run as optimise_pairs
 from texture_benchmarks.optimise import run as optimise
 from texture_benchmarks.overview import run as overview
@@ -42,6 +43,7 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'peers': peers.run,  # general classifiers of time series on the same later slides; in packages of their own
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
     'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
+    'onset': onset.run,  # recipes with a discriminant of their own for the first window, on later slides
     'ablation': ablation.run,  # which features, numbers, units and channels contribute their time, recorded
     'decisions': decisions.run,  # early decisions, calibration, candidates and unknown surfaces, recorded
     'trust': trust.run,  # slides wrong and known under disturbances, early and at the end

@@ -22,6 +22,7 @@ SIDE_BY_SIDE = (
     'ablation',
     'learning',
     'biotac20',
+    'onset',
     'next_motion',
     'next_motion_recorded',
     'sensors',

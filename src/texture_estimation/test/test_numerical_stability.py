@@ -24,7 +24,7 @@ SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/reci
 # Linear machines take their time; their features are those of the others, their learner is tried above.
 SHIPPED = [name for name in SHIPPED if load_recipe(name).learner_name != 'svm_linear']
 # Where nothing distinguishs surfaces, these find all equally probable; votes between pairs go to one of them.
-EVEN = frozenset({'mlp', 'svm_rbf', 'naive_bayes'})
+EVEN = frozenset({'mlp', 'onset_mlp', 'svm_rbf', 'naive_bayes'})
 FLOORED = frozenset({'any-speed'})
 RATES_HZ = {'signal': 1000.0, 'signal_static': 100.0}
 

@@ -66,6 +66,7 @@ SCALING = {
     'ordinal_patterns': SAME,
     'speed': SAME,
     'force': SAME,
+    'slide_onset': SAME,
 }
 
 

@@ -30,6 +30,7 @@ from texture_features.features.region_peaks import RegionPeaks
 from texture_features.features.relative_changes import RelativeChanges
 from texture_features.features.short_time_fourier import ShortTimeFourier
 from texture_features.features.signal_energy import SignalEnergy
+from texture_features.features.slide_onset import SlideOnset
 from texture_features.features.spatial_band_power import SpatialBandPower
 from texture_features.features.spatial_bands import SpatialBands
 from texture_features.features.spatial_variation import SpatialVariation
@@ -75,4 +76,5 @@ FEATURES: Mapping[str, type[Feature]] = {
     'relative_changes': RelativeChanges,
     'speed': Speed,
     'force': Force,
+    'slide_onset': SlideOnset,
 }

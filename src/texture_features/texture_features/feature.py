@@ -27,6 +27,8 @@ class WindowBatch:
         Sampling rate, > 0.
     speed_m_s, force_n : (...)
         Mean speed and normal force in each window; NaN if unknown.
+    elapsed_s : (...)
+        From the start of the slide to that of each window; infinite if unknown.
     joined
         The same stretches of time of other inputs, for features that join several; of the same leading axes.
     channels
@@ -45,6 +47,7 @@ class WindowBatch:
     force_n: Array = field(default_factory=lambda: np.array(np.nan))
     joined: tuple[WindowBatch, ...] = ()
     channels: tuple[str, ...] = ()
+    elapsed_s: Array = field(default_factory=lambda: np.array(np.inf))
     _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

@@ -18,6 +18,7 @@ from texture_estimation.open_set.class_distance import ClassDistance
 from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, NoveltyDetector, SlideNovelty, space_means
 from texture_features.augmentation.augmented_features import NOISE
 from texture_features.augmentation.feature_copies import FeatureCopies
+from texture_features.features import slide_onset
 from texture_features.labelled_features import LabelledFeatures
 
 MIN_SLIDES = 3  # of a class: with one held out, two tell how much slides differ
@@ -138,6 +139,7 @@ def fit_novelty(
     ]
     disturbed = _disturbed_slides(examples, names, classes[first])
     copies = _reference_copies(examples, names, classes[first], gain_range)
+    compared = np.array([name.rsplit('/', 1)[-1] != slide_onset.NAME for name in examples.names], dtype=np.float64)
     traces: list[SlideTrace] = []
     for held_out, predictor in _folds(learner, fitted, classes, groups):
         distances = _fit_distances(
@@ -145,6 +147,7 @@ def fit_novelty(
             [copy for copy in copies if copy.group not in held_out],
             predictor,
             overlap,
+            compared,
         )
         for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
             values = slide.values
@@ -160,7 +163,7 @@ def fit_novelty(
             followed = SlideTrace(slide.truth, means, effective_windows, np.zeros((0, 0)), slide.disturbance)
             traces.append(_with_scores(followed, values, evidence, predictor, distances))
     final = learner.predictor(fitted.parameters)
-    distances = _fit_distances(slides, copies, final if hidden_layer(final) else None, overlap)
+    distances = _fit_distances(slides, copies, final if hidden_layer(final) else None, overlap, compared)
     held_out_scores = [_scores_at(traces, level) for level in EFFECTIVE_WINDOWS]
     if min(map(len, held_out_scores)) < MIN_SLIDES:
         return None
@@ -210,11 +213,16 @@ def _copied_slides(copies: FeatureCopies, names: Any, classes: Codes) -> Iterato
 
 
 def _fit_distances(
-    slides: Sequence[_Slide], copies: Sequence[_Slide], predictor: Predictor | None, overlap: float
+    slides: Sequence[_Slide], copies: Sequence[_Slide], predictor: Predictor | None, overlap: float, compared: Array
 ) -> Mapping[str, ClassDistance]:
-    """Return the distances, with the metric of undisturbed slides and references among the copies, too."""
+    """Return the distances, with the metric of undisturbed slides and references among the copies, too.
+
+    `compared` is 0 for features that only say when a window was, which slides cut in another way have otherwise.
+    """
     hidden = hidden_layer(predictor) if predictor is not None else None
-    means, more = ([_space_means(slide.values, hidden, overlap) for slide in those] for those in (slides, copies))
+    means, more = (
+        [_space_means(slide.values, hidden, overlap, compared) for slide in those] for those in (slides, copies)
+    )
     classes, more_classes = (np.array([slide.truth for slide in those]) for those in (slides, copies))
     found = {space: ClassDistance.fit(np.stack([own[space] for own in means]), classes) for space in means[0]}
     if not more:
@@ -225,8 +233,10 @@ def _fit_distances(
     }
 
 
-def _space_means(values: Array, hidden: Callable[[Array], Array] | None, overlap: float) -> dict[str, Array]:
-    return space_means(values, hidden(values) if hidden else None, overlap)
+def _space_means(
+    values: Array, hidden: Callable[[Array], Array] | None, overlap: float, compared: Array
+) -> dict[str, Array]:
+    return space_means(compared * values, hidden(values) if hidden else None, overlap)
 
 
 def _with_scores(

@@ -9,6 +9,7 @@ from texture_estimation.learners.em_mixture import EmMixture
 from texture_estimation.learners.learner import Learner
 from texture_estimation.learners.mlp import Mlp
 from texture_estimation.learners.naive_bayes import NaiveBayes
+from texture_estimation.learners.onset_mlp import OnsetMlp
 from texture_estimation.learners.passive_aggressive import PassiveAggressive
 from texture_estimation.learners.sklearn_learner import SklearnLearner
 from texture_estimation.learners.svm_linear import SvmLinear
@@ -19,6 +20,7 @@ from texture_estimation.learners.tuned_pairs import TunedPairs
 
 LEARNERS: Mapping[str, type[Learner]] = {
     'mlp': Mlp,  # one hidden layer, softmax, calibrated
+    'onset_mlp': OnsetMlp,  # and linear discriminant analysis of first windows
     'svm_rbf': SvmRbf,  # Cortes & Vapnik 1995, one against one, calibrated
     'ann_pairs': AnnPairs,  # Roberge et al.
     'svm_pairs': SvmPairs,  # Roberge et al.

@@ -29,6 +29,8 @@ TINY = np.float32(1e-8)
 # Of one network, steps times features and labels: larger trainings make fewer passes, so that they end within minutes.
 # The shipped recipes come to 3 to 5 millions with 20 textures of 40 slides.
 MAX_WORK = 10e6
+# Parameters of which the scores are linear functions; the last two are those of a learner with a layer for the onset.
+TEMPERED = ('output', 'output_offset', 'onset', 'onset_offset')
 
 
 @dataclass(frozen=True)
@@ -207,7 +209,7 @@ def _loss_at(scores: Array, y: Codes, temperature: float) -> float:
 
 def _calibrated(parameters: Mapping[str, Array], temperature: float) -> dict[str, Array]:
     """Return the layers with the temperature worked into them."""
-    output = {name: parameters[name] / temperature for name in ('output', 'output_offset')}
+    output = {name: parameters[name] / temperature for name in TEMPERED if name in parameters}
     return {**parameters, **output}
 
 

@@ -75,6 +75,7 @@ class CutWindow:
     skipped: int = 0
     motion: str = ''
     direction_rad: float = math.nan
+    elapsed_s: float = math.inf  # from the start of the slide to that of the window; infinite where nobody says
 
 
 @dataclass(frozen=True)
@@ -306,6 +307,7 @@ class WindowCutter:
             skipped=slide.skipped,
             motion=slide.motion,
             direction_rad=span.direction_rad,
+            elapsed_s=(span.start_ns - slide.start_ns) / NANOSECONDS,
         )
 
     def _skip(self, slide: SlideCoverage, count: int) -> None:

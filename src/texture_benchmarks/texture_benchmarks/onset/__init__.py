@@ -1,0 +1,1 @@
+"""Benchmark: the recipe with a discriminant of its own for the first window of a slide."""
