@@ -82,7 +82,8 @@ class OnsetMlp(Mlp):
 
     def _fit(self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None) -> dict[str, Array]:
         """Return the layers of the network and that of the onset."""
-        blind, first = X.copy(), np.zeros(0, dtype=np.intp)
+        blind = X.copy()
+        first: Codes = np.zeros(0, dtype=np.intp)
         if self.column != UNBOUND:
             first = np.flatnonzero(X[:, self.column] > 0.0)
             blind[:, self.column] = 0.0  # what is constant tells nothing
