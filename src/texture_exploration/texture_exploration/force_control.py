@@ -38,7 +38,7 @@ NEAR_M = 0.001  # above a surface whose height is known, the finger slows down t
 
 @dataclass(frozen=True)
 class ForceLoopParams:
-    """Force control by an arm without a force mode."""
+    """Parameters of the force control of an arm without a force mode."""
 
     loop_delay_s: float = param(
         0.008,

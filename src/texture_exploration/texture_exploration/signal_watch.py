@@ -11,7 +11,7 @@ from texture_core.parameters import param
 
 @dataclass(frozen=True)
 class SignalWatchParams:
-    """Whether to end an exploration when the sensor falls silent."""
+    """Parameters that end an exploration when the sensor falls silent."""
 
     watch_signal: bool = param(True, "Aborts an exploration when no samples arrive on the topics of 'signal_topics'.")
     signal_topics: str = param(

@@ -29,7 +29,7 @@ STEPS = {
 
 @dataclass(frozen=True)
 class BringUpParams:
-    """Which nodes are waited for, in which order."""
+    """Parameters of the node that waits for all others in order."""
 
     nodes: str = param(
         'sensor feature_extractor classifier explorer',

@@ -45,7 +45,7 @@ LEVEL_NAMES = {value: name for name, value in LEVELS.items()}
 
 @dataclass(frozen=True)
 class DashboardParams:
-    """Where the page is, and where recordings go."""
+    """Parameters of the web page and of its recordings."""
 
     host: str = param('127.0.0.1', 'Address to listen on; beyond loopback the page needs its token.')
     port: int = param(8085, 'Sets the TCP port to listen on; 0 takes any free port.', low=0, high=65535)

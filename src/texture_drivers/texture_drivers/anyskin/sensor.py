@@ -26,7 +26,7 @@ Topics = dict[str, list[TactileSignal]]
 
 @dataclass(frozen=True)
 class AnySkinSettings:
-    """The board under the skin."""
+    """Parameters of the AnySkin or ReSkin board."""
 
     magnetometers: int = param(
         tables.MAGNETOMETERS, 'Sets the number of magnetometers on the board; it must equal that of the device.',

@@ -19,7 +19,7 @@ from texture_drivers.biotac.tables import FULL_SCALE, PAC, UNIT
 
 @dataclass(frozen=True)
 class BioTacScales:
-    """Size of a count, and the count that means zero."""
+    """Parameters that convert the counts of a BioTac to units."""
 
     pac_pa: float = param(
         0.37,

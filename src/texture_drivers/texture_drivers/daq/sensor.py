@@ -33,7 +33,7 @@ class DaqChannel:
 
 @dataclass(frozen=True)
 class DaqSettings:
-    """The converter; its channels stand beside it in the file."""
+    """Parameters of the analogue-to-digital converter."""
 
     baud: int = param(
         tables.BAUD,

@@ -25,7 +25,7 @@ TOPICS = ('signal', 'signal_static')
 
 @dataclass(frozen=True)
 class BiotacAdaptorParams:
-    """Which messages are converted."""
+    """Parameters that select which BioTac messages are converted."""
 
     message_type: str = param(
         'biotac_sensors/msg/BioTacHand', 'Sets the type of the subscribed messages, written as package/msg/Type.'

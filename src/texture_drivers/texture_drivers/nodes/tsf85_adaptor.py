@@ -27,7 +27,7 @@ INERTIAL = ('Accelerometer', 'Gyroscope')
 
 @dataclass(frozen=True)
 class Tsf85AdaptorParams:
-    """Which messages are converted."""
+    """Parameters that select which TSF-85 messages are converted."""
 
     package: str = param('robotiq_tsf', "Sets the package that defines the messages of the vendor's driver.")
     prefix: str = param('TactileSensor', 'Sets the first part of the names of the subscribed topics.')

@@ -29,7 +29,7 @@ Topics = dict[str, list[TactileSignal]]
 
 @dataclass(frozen=True)
 class PapillArraySettings:
-    """The hub."""
+    """Parameters of the PapillArray hub."""
 
     rate_hz: int = param(
         500,

@@ -16,7 +16,7 @@ COULOMB_PC = 1e12
 
 @dataclass(frozen=True)
 class PvdfSettings:
-    """The film, its amplifier and the force sensor."""
+    """Parameters of the PVDF film, its amplifier and the force sensor."""
 
     baud: int = param(
         tables.BAUD,

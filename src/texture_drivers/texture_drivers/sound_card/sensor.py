@@ -23,7 +23,7 @@ SILENCE_S = 1.0
 
 @dataclass(frozen=True)
 class SoundCardSettings:
-    """The card, and what hangs on it."""
+    """Parameters of the sound card and of the sensor on its input."""
 
     rate_hz: int = param(
         tables.RATE_HZ,

@@ -27,7 +27,7 @@ STEEPEST = 1.0  # slope that the arm's own force mode follows
 
 @dataclass(frozen=True)
 class SimulatedArmParams(SimulatedSurfaceParams, ForceLoopParams, CommandLimits):
-    """The simulated arm and the surface under it."""
+    """Parameters of the simulated arm and of the surface under it."""
 
     force_mode: bool = param(
         True,

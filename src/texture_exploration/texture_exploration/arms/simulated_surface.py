@@ -12,7 +12,7 @@ STICK_M = 0.002  # way from slip to slip
 
 @dataclass(frozen=True)
 class SimulatedSurfaceParams:
-    """Shape, layers and stickiness of the surface under a simulated finger."""
+    """Parameters of the surface under a simulated finger: shape, layers, stickiness."""
 
     tilt_rad: float = param(
         0.0,

@@ -15,7 +15,7 @@ HARMLESS_N = 0.5  # a smaller force is not approached more slowly for what an ar
 
 @dataclass(frozen=True)
 class TouchParams:
-    """How the finger comes to the surface, presses, gains speed and leaves."""
+    """Parameters of approach, contact, acceleration and lift."""
 
     travel_speed_m_s: float = param(
         0.2, 'Sets the speed above the surface on the way back to the start.', unit='m/s', low=0.01, high=1.0

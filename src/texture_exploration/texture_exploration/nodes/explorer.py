@@ -46,7 +46,7 @@ RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds o
 
 @dataclass(frozen=True)
 class ArmParams:
-    """Which arm carries the finger."""
+    """Parameters that select the arm of the explorer."""
 
     arm: str = param(
         'simulated', "Sets the arm that carries the finger: a name of the catalogue, or 'module:Class' of your own."

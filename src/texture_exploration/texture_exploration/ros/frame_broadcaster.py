@@ -23,7 +23,7 @@ MOVING_QOS = QoSProfile(depth=100)
 
 @dataclass(frozen=True)
 class FrameParams:
-    """The frames of what is published."""
+    """Parameters of the frames in published messages."""
 
     surface_frame_id: str = param(
         'surface',

@@ -31,7 +31,7 @@ DISCOVERY_S = 0.5  # how often it is asked what else is published
 
 @dataclass(frozen=True)
 class RecordParams:
-    """Where to record."""
+    """Parameters of the recorder."""
 
     out: str = param('', 'Folder of the new bag; nothing may exist there.')
 

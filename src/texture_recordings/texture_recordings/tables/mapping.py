@@ -44,7 +44,7 @@ class SlideConditions:
 
 @dataclass(frozen=True)
 class TableMapping:
-    """What becomes of the columns of tables.
+    """Parameters that map the columns of tables to signals and slides.
 
     Examples
     --------

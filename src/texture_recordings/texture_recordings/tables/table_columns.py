@@ -118,7 +118,7 @@ class LabelColumn:
 
 @dataclass(frozen=True)
 class SlideBorders:
-    """Where slides begin and end.
+    """Parameters that say where slides begin and end.
 
     Examples
     --------

@@ -31,7 +31,7 @@ class ByteFaults:
 
 @dataclass(frozen=True)
 class FrameFaults:
-    """What goes wrong with whole frames or packets."""
+    """Parameters of the faults that are injected in frames or packets."""
 
     skip: float = param(0.0, 'Sets the probability that a frame is numbered and not sent.', low=0.0, high=1.0)
     duplicate: float = param(0.0, 'Sets the probability that a frame is sent twice.', low=0.0, high=1.0)

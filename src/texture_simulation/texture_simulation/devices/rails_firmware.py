@@ -29,7 +29,7 @@ LIFT_SPEED_M_S = 0.05
 
 @dataclass(frozen=True)
 class RailsMachine:
-    """The mechanics, and what lies under the finger."""
+    """Parameters of the emulated rails and of the surface under the finger."""
 
     start_height_m: float = param(
         0.01, 'Sets the height of the finger above the surface at the start.', unit='m', low=0.0
