@@ -262,19 +262,26 @@ def _front(axes: Any, points: Mapping[str, tuple[float, float]]) -> None:
         )  # fmt: skip
 
 
+def _free_places(
+    points: Sequence[tuple[float, float]], index: int, places: Mapping[int, tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """Return where the name of a point covers no other point and no name."""
+    (x, y), up = points[index], LABEL_SHARE / 2
+    return [
+        place
+        for place in ((x, y + up), (x - LABEL_DECADES, y + up), (x, y - up))
+        if not any(_covers(place, other, LABEL_DECADES) for other in places.values())
+        and not any(_covers(place, point, 0.0) for point in points if point != points[index])
+    ]
+
+
 def _named(values: Sequence[tuple[float, float]], best: Sequence[int]) -> dict[int, tuple[float, float]]:
     """Return where names stand, in decades and as a share: of the front, then of the best that cover nothing."""
     points = [(float(np.log10(cost)), share) for cost, share in values]
     others = sorted(set(range(len(points))) - set(best), key=lambda index: -points[index][1])
     places: dict[int, tuple[float, float]] = {}
     for index in [*sorted(best, key=lambda index: -points[index][1]), *others]:
-        (x, y), up = points[index], LABEL_SHARE / 2
-        free = [
-            place
-            for place in ((x, y + up), (x - LABEL_DECADES, y + up), (x, y - up))
-            if not any(_covers(place, other, LABEL_DECADES) for other in places.values())
-            and not any(_covers(place, point, 0.0) for point in points if point != points[index])
-        ]
+        free = _free_places(points, index, places)
         if free and len(places) < DIRECT_LABELS:
             places[index] = free[0]
     return places

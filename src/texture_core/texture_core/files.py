@@ -288,9 +288,7 @@ class Archive:
 
     def _of_member(self, name: str, use: Callable[[_Counted], T]) -> T:
         info = self._zip.getinfo(name)
-        # Others take gigabytes for a few bytes, and no file of this suite has them.
-        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise FileRefused(f"its member '{name}' is compressed by method {info.compress_type}; use 'deflate'")
+        _check_compression(info)
         try:
             with self._zip.open(info) as opened:
                 member = _Counted(opened)
@@ -301,6 +299,12 @@ class Archive:
         if rest or member.count != info.file_size:
             raise FileRefused(f"its member '{name}' has not the {info.file_size} bytes that its directory states")
         return result
+
+
+def _check_compression(info: zipfile.ZipInfo) -> None:
+    # Other methods take gigabytes for a few bytes, and no file of this suite has them.
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise FileRefused(f"its member '{info.filename}' is compressed by method {info.compress_type}; use 'deflate'")
 
 
 class _Counted:

@@ -160,13 +160,16 @@ class Mlp:
             'output_offset': output_offset,
         }
 
+    def _steps(self, n_examples: int, work: int) -> int:
+        """Return the number of batches, fewer where each costs much: with so many features and labels."""
+        return min(max(self.epochs * -(-n_examples // BATCH), MIN_STEPS), max(round(MAX_WORK / work), MIN_STEPS))
+
     def _descend(self, drawn: _Draws, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator) -> Weights:
         """Return the weights after all passes over so many examples, (n, n_features)."""
         n_examples, n_features = shape
         weights = _first_weights(n_features, self.hidden, n_labels, rng)
         truth = np.eye(n_labels, dtype=np.float32)
-        steps = max(self.epochs * -(-n_examples // BATCH), MIN_STEPS)
-        steps = min(steps, max(round(MAX_WORK / (n_features + n_labels)), MIN_STEPS))
+        steps = self._steps(n_examples, n_features + n_labels)
         adam = _Adam(weights)
         for step in range(steps):
             inputs, codes = drawn.draw(min(BATCH, n_examples))

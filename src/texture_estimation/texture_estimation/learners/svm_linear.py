@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,10 +76,7 @@ class SvmLinear:
         rows = _evenly(y, self.examples)
         rng = np.random.default_rng(self.seed)
         assignments = [_divide(y[rows], groups[rows], self.folds, rng) for _ in range(self.repeats)]
-        splits = [
-            (rows[folds_of != part], rows[folds_of == part]) for folds_of in assignments for part in np.unique(folds_of)
-        ]
-        splits = [(training, held) for training, held in splits if len(np.unique(y[training])) > 1]
+        splits = [split for folds_of in assignments for split in _splits(rows, folds_of, y)]
         if not splits:
             return float(tried[len(tried) // 2])
         right = [
@@ -154,6 +151,14 @@ def _evenly(y: Codes, count: int) -> NDArray[np.intp]:
         rows = np.flatnonzero(y == label)
         chosen.append(rows[np.unique(np.linspace(0, len(rows) - 1, min(each, len(rows))).astype(np.intp))])
     return np.sort(np.concatenate(chosen))
+
+
+def _splits(rows: Codes, folds_of: Codes, y: Codes) -> Iterator[tuple[Codes, Codes]]:
+    """Yield the rows for training and those held out of each fold that leaves two labels for the training."""
+    for part in np.unique(folds_of):
+        training, held = rows[folds_of != part], rows[folds_of == part]
+        if len(np.unique(y[training])) > 1:
+            yield training, held
 
 
 def _divide(y: Codes, groups: Codes, folds: int, rng: np.random.Generator) -> Codes:

@@ -57,16 +57,19 @@ class EstimatorNode(Node):
         """Return how many vectors could not be used, by reason."""
         raise NotImplementedError
 
-    def _on_features(self, message: msg.FeatureVector) -> None:
-        began = time.perf_counter()
-        self._count_lost(message.sequence)
+    def _vector_of(self, message: msg.FeatureVector) -> FeatureVector | None:
         try:
-            vector = from_msg(message)
+            return from_msg(message)
         except TextureError as error:
             self._invalid += 1
             self.get_logger().warning(str(error), throttle_duration_sec=1.0)
-            return
-        estimate = self._predict(vector)
+            return None
+
+    def _on_features(self, message: msg.FeatureVector) -> None:
+        began = time.perf_counter()
+        self._count_lost(message.sequence)
+        vector = self._vector_of(message)
+        estimate = self._predict(vector) if vector is not None else None
         if estimate is None:
             return
         self._processing_s = time.perf_counter() - began
