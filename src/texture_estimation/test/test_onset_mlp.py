@@ -89,6 +89,13 @@ def test_when_a_window_was_is_no_novelty():
     assert model.novelty_detector.distances['features'].projection[0].any()
 
 
+def test_a_first_window_is_estimated_live_by_the_discriminant_too():
+    model = model_of({'onset_mlp': {'hidden': 4, 'epochs': 5}})
+    first = examples_with_onset(seed=1).values[0]
+    assert first[2] == 1.0
+    np.testing.assert_allclose(model.predict_with_activations(first)[0], model.predictor(first))
+
+
 def test_without_the_feature_it_is_the_network():
     examples = dataclasses.replace(examples_with_onset(), names=('signal/a', 'signal/b', 'signal/c'))
     recipe = {'inputs': {'signal': {'features': ['hjorth']}}}

@@ -175,7 +175,8 @@ class TextureModel:
         (..., n_hidden) or None
             Outputs of the trained hidden layer; None if the classifier has none.
         """
-        if self.incremental_predictor is None and isinstance(self.predictor, MlpPredictor):
+        # A predictor derived from it may add to what the hidden layer gives, as that of `onset_mlp` does.
+        if self.incremental_predictor is None and type(self.predictor) is MlpPredictor:
             activations = self.predictor.activations(X)
             return self.predictor.scores(activations), activations
         return self.predictor(X), self.activations(X)
