@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import BENCHMARKS
-from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION, Setting
+from texture_benchmarks.recipes.run import QUICK_RECIPES, VIBRATION, Setting, _jobs, _shipped
 from texture_benchmarks.recipes.trial import at_rate, comparable, figures_of, in_random_folds, trained_every
 from texture_benchmarks.result import BenchmarkOptions
 from texture_core.errors import InvalidData, ModelMismatch
@@ -160,6 +160,14 @@ def test_the_shorter_run_tries_the_vibration_of_later_slides(tmp_path: Path) -> 
     assert set(result.numbers[VIBRATION]) == {'by time'}
     assert result.split == 'by time: trained on slides 1-30 of each surface, tested on the later ones'
     assert [chart.name for chart in result.charts] == ['recipes_later.png', 'recipes_later_sliding.png']
+
+
+def test_recipes_without_vibration_are_not_tried_on_vibration_alone(tmp_path: Path) -> None:
+    options = BenchmarkOptions(tmp_path, DATA)
+    vibration = Setting(SlideDataset((at_rate(slide_signals(), 'signal', 1000.0),)), [], 1000.0, of_motion=False)
+    tried = {name for job in _jobs({VIBRATION: vibration}, _shipped(options), options) for name in job.recipes}
+    assert {'default', 'fast', 'hu-pca-svm'} <= tried
+    assert not any(name.startswith('taxels') for name in tried)
 
 
 class NearestMean:

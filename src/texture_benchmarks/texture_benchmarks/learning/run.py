@@ -136,7 +136,7 @@ def _chart(incremental_runs: Sequence[IncrementalRun], stages: Sequence[int], ne
         f'{how}: {what}': (x, percent(field, what))
         for what in ('slides', 'windows')
         for how, field in (
-            ('trained one slide at a time', 'incremental'),
+            ('added one slide at a time', 'incremental'),
             ('trained again on the same slides', 'retrained'),
         )
     }

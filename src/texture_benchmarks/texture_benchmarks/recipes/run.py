@@ -382,7 +382,7 @@ def _jobs(settings: Mapping[str, Setting], names: Sequence[str], options: Benchm
     for setting, name in product(settings, names):
         if takes_windows(name):
             groups.setdefault((setting, name, 0.0, Augmentation()), []).append(name)
-        elif setting in (PLACES.get(name, setting), OWN_DATA):
+        elif setting in (PLACES.get(name, setting), OWN_DATA) and _fits(name, settings[setting]):
             recipe = settings[setting].recipe(name)
             key = (setting, recipe.feature_set, recipe.training.hop_s, recipe.augmentation)
             groups.setdefault(key, []).append(name)
