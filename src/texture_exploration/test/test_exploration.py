@@ -68,6 +68,31 @@ def test_a_machine_that_slept_does_not_take_the_arm_for_dead(table):
     assert table.exploration.gaps == 1
 
 
+def late_every(table, steps):
+    """Make every such step of the loop late by 60 ms, as on a busy machine."""
+    in_time, steps_done = table.pace, []
+
+    def pace():
+        steps_done.append(0)
+        if len(steps_done) % steps == 0:
+            table.asleep_ns = 60_000_000
+        in_time()
+
+    table.pace = pace
+
+
+def test_steps_that_are_late_again_and_again_do_not_hide_an_arm_that_hangs(table):
+    late_every(table, 8)
+    table.when[Phase.SLIDE] = table.arm.freeze
+    assert 'has not answered for' in table.explore().message
+
+
+def test_steps_that_are_late_again_and_again_do_not_hide_a_sensor_that_is_silent(table):
+    late_every(table, 8)
+    table.signal_fault = SignalWatch(0.5, lambda: table.now_ns).signal_fault
+    assert table.explore().message.startswith("no samples have come on 'signal'")
+
+
 def test_a_slide_that_was_over_before_it_was_seen_is_no_success(table):
     table.late_ns = 100_000_000
     outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.1, distance_m=0.005))
@@ -157,8 +182,8 @@ def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase)
 def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):
     watch = SignalWatch(0.12, lambda: table.now_ns)
 
-    def signal_fault(awake_ns):
-        told = watch.signal_fault(awake_ns)
+    def signal_fault(listening):
+        told = watch.signal_fault(listening)
         watch.on_samples()
         return told
 

@@ -11,6 +11,7 @@ from texture_core.errors import DeviceError
 from texture_core.exploration import ENDED, ExplorationRequest, ExplorationState, Phase
 from texture_exploration.arms.protocol import Arm, ArmCommand, ArmState, ForceReading
 from texture_exploration.force_watch import ForceWatch
+from texture_exploration.listening import WITHOUT_GAPS, Listening
 from texture_exploration.motions.protocol import Motion, MotionStep
 from texture_exploration.safety import SafetyLimits
 
@@ -34,7 +35,7 @@ class ExplorationOutcome:
     slid: bool
 
 
-def no_signal_watch(_awake_ns: int) -> str:
+def no_signal_watch(_listening: Listening) -> str:
     """Return '': the sensor is not watched."""
     return ''
 
@@ -51,8 +52,7 @@ class Exploration:
     clock
         CLOCK_MONOTONIC in ns.
     signal_fault
-        Returns in a sentence why the sensor delivers no samples, '' if it does; it is given since when we are awake, in
-        ns.
+        Returns in a sentence why the sensor delivers no samples, '' if it does; it is told since when the loop listens.
     on_state
         Called in the thread of `run` with each new phase and 50 times a second; stamps are of `clock`.
 
@@ -76,7 +76,7 @@ class Exploration:
         limits: SafetyLimits,
         clock: Callable[[], int],
         on_state: Callable[[ExplorationState], None],
-        signal_fault: Callable[[int], str] = no_signal_watch,
+        signal_fault: Callable[[Listening], str] = no_signal_watch,
     ) -> None:
         self.exploration_id = exploration_id
         self.request = request
@@ -98,7 +98,8 @@ class Exploration:
         self._slid = False
         self._entered = False  # the workspace
         self._next_state_ns = 0
-        self._begin_ns = self._last_ns = self._awake_ns = clock()
+        self._begin_ns = self._last_ns = clock()
+        self._listening = Listening(self._begin_ns)
 
     def run(self, pace: Callable[[], None]) -> ExplorationOutcome:
         """Go through the whole motion; `pace` returns when the next step is due."""
@@ -125,12 +126,12 @@ class Exploration:
         """Do one step; return whether the exploration has ended."""
         arm, now_ns = self._arm.state(), self._clock()
         self._detect_gap(now_ns)
-        fault = arm_fault(arm, now_ns, self._limits, self._awake_ns)
+        fault = arm_fault(arm, now_ns, self._limits, self._listening)
         if fault:
             self._give_up(f'{fault}; the finger was not lifted')
             return True
         reason = (
-            self._stop_reason or self._violation(arm) or self._signal_fault(self._awake_ns) or self._overdue(now_ns)
+            self._stop_reason or self._violation(arm) or self._signal_fault(self._listening) or self._overdue(now_ns)
         )
         if reason:
             self._motion.abort(reason)
@@ -158,7 +159,7 @@ class Exploration:
 
     def _detect_gap(self, now_ns: int) -> None:
         if now_ns - self._last_ns > GAP_NS:
-            self._awake_ns = now_ns
+            self._listening = Listening(self._begin_ns, self._last_ns, now_ns)
             self.gaps += 1
         self._last_ns = now_ns
 
@@ -218,10 +219,8 @@ class Exploration:
         self._on_state(state)
 
 
-def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, awake_ns: int = 0) -> str:
+def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, listening: Listening = WITHOUT_GAPS) -> str:
     """Return in words why the arm would not follow a command, '' if it would.
-
-    Silence of the arm counts from `awake_ns` on at the earliest: before, nobody listened.
 
     Parameters
     ----------
@@ -231,15 +230,15 @@ def arm_fault(arm: ArmState, now_ns: int, limits: SafetyLimits, awake_ns: int = 
         Time of the same clock, ns.
     limits
         Longest allowed silence of the arm.
-    awake_ns
-        When the caller began to listen, ns.
+    listening
+        Since when the caller listens, and its newest gap.
 
     Returns
     -------
     str
         A sentence without a full stop, or ''.
     """
-    age_s = (now_ns - max(arm.time_ns, awake_ns)) * 1e-9
+    age_s = listening.silence_s(arm.time_ns, now_ns)
     if arm.fault:
         return f'the arm reports a fault: {arm.fault}'
     if age_s > limits.state_timeout_s:

@@ -25,6 +25,7 @@ from texture_exploration.arms.protocol import (
 )
 from texture_exploration.arms.surface_frame import SurfaceFrame
 from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
+from texture_exploration.listening import Listening
 from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import TouchParams
@@ -60,7 +61,7 @@ class Explorer:
         on_state: Callable[[ExplorationState], None],
         clock: Callable[[], int] = time.monotonic_ns,
         *,
-        signal_fault: Callable[[int], str] = no_signal_watch,
+        signal_fault: Callable[[Listening], str] = no_signal_watch,
     ) -> None:
         self.arm = arm
         self.touch, self.limits = touch, limits  # may be replaced; a running exploration keeps its own

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
+from texture_exploration.listening import Listening
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class SignalWatch:
     --------
     >>> watch = SignalWatch(0.5, lambda: 2_000_000_000, ('finger0/signal', 'finger1/signal'))
     >>> watch.on_samples('finger0/signal')
-    >>> print(watch.signal_fault(awake_ns=0).partition(';')[0])
+    >>> print(watch.signal_fault(Listening()).partition(';')[0])
     no samples have come on 'finger1/signal' for 2000 ms
     """
 
@@ -66,10 +67,10 @@ class SignalWatch:
         """Take note that samples have come."""
         self._last_samples_ns[topic] = self._clock()
 
-    def signal_fault(self, awake_ns: int) -> str:
-        """Return in a sentence which streams are silent, '' if none is; before `awake_ns` nobody listened."""
+    def signal_fault(self, listening: Listening) -> str:
+        """Return in a sentence which streams are silent while the loop listens, '' if none is."""
         now_ns = self._clock()
-        ages_s = {topic: (now_ns - max(last, awake_ns)) * 1e-9 for topic, last in self._last_samples_ns.items()}
+        ages_s = {topic: listening.silence_s(last, now_ns) for topic, last in self._last_samples_ns.items()}
         silent = {topic: age_s for topic, age_s in ages_s.items() if age_s > self._timeout_s}
         if not silent:
             return ''

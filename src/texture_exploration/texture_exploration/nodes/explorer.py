@@ -34,6 +34,7 @@ from texture_exploration.estimates import EarlyStoppingParams, ExplorationEstima
 from texture_exploration.exploration import Exploration, no_signal_watch
 from texture_exploration.exploration_ids import ExplorationIds
 from texture_exploration.explorer import Explorer
+from texture_exploration.listening import Listening
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.ros.frame_broadcaster import FrameBroadcaster, FrameParams
 from texture_exploration.safety import SafetyLimits
@@ -177,7 +178,7 @@ class ExplorerNode(LifecycleNode):
         limits = declare(self, SafetyLimits, changeable=True)
         return Explorer(arm, touch, limits, self._on_state, signal_fault=self._watch_signal())
 
-    def _watch_signal(self) -> Callable[[int], str]:
+    def _watch_signal(self) -> Callable[[Listening], str]:
         params = declare(self, SignalWatchParams)
         if not params.watch_signal:
             return no_signal_watch
