@@ -42,8 +42,8 @@ BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'recipes_later': recipes.run_later,  # the same on the vibration of slides of a later time alone
     'peers': peers.run,  # general classifiers of time series on the same later slides; in packages of their own
     'frontier': frontier.run,  # accuracy by window length and sliding time, what trainings cost by their size
-    'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
     'onset': onset.run,  # recipes with a discriminant of their own for the first window, on later slides
+    'scale': scale.run,  # trainings and windows with up to 1000 textures and 100 000 windows, drawn features
     'ablation': ablation.run,  # which features, numbers, units and channels contribute their time, recorded
     'decisions': decisions.run,  # early decisions, calibration, candidates and unknown surfaces, recorded
     'trust': trust.run,  # slides wrong and known under disturbances, early and at the end

@@ -7,12 +7,12 @@ from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, Stratif
 
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_estimation.recipe import Recipe
-from texture_evaluation.commands.evaluation_text import table
 from texture_evaluation.cross_validation.accuracy_figures import interval, slide_counts
 from texture_evaluation.cross_validation.chronological_split import ChronologicalSplit
 from texture_evaluation.cross_validation.cross_validate import cross_validate
 from texture_evaluation.cross_validation.splits import parse_split
 from texture_evaluation.evaluate import evaluate_dataset
+from texture_evaluation.evaluation_text import table
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import train_from_bags
 from texture_recordings.slide_dataset import SlideDataset

@@ -36,7 +36,7 @@ from texture_benchmarks.robustness.scenes import (
 )
 from texture_benchmarks.robustness.trial import TOPIC, Count, TrainedModels, degraded
 from texture_core.resources import folder
-from texture_estimation.channels import with_channels
+from texture_estimation.channels import FAST_TOPIC, with_channels
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.slide_dataset import SlideDataset
@@ -46,7 +46,9 @@ SLOW = ('-ann', 'kaboli-svm.yaml')
 RECIPES = of_one_finger(
     path.stem
     for path in folder('texture_estimation', 'config/recipes').glob('*.yaml')
-    if path.stem not in NEEDS_ARRAY and not any(part in path.name for part in SLOW)
+    if path.stem not in NEEDS_ARRAY
+    and not any(part in path.name for part in SLOW)
+    and FAST_TOPIC in load_recipe(path.stem).feature_set.topics
 )
 LATER = 'later in the session'
 Score = Callable[[float], Mapping[str, Count]]

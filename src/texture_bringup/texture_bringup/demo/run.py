@@ -18,8 +18,8 @@ from texture_core.estimates import TextureEstimate
 from texture_core.plain_data import write_json
 from texture_estimation.model import load_model
 from texture_evaluation.commands import train as training
-from texture_evaluation.commands.evaluation_text import percent
 from texture_evaluation.evaluate import EvaluationReport, evaluate
+from texture_evaluation.evaluation_text import percent
 from texture_evaluation.train import train_from_bags
 
 SOURCE = 'simulated Robotiq TSF-85'

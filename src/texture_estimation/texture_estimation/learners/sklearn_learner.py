@@ -56,7 +56,7 @@ class SklearnLearner:
 
         learner: {sklearn: {estimator: 'sklearn.ensemble:ExtraTreesClassifier', n_estimators: 200}}
 
-    >>> SklearnLearner.from_recipe({'estimator': DEFAULT}).as_recipe()['estimator'] == DEFAULT
+    >>> SklearnLearner.from_recipe({'estimator': DEFAULT}, 'learner').as_recipe()['estimator'] == DEFAULT
     True
     """
 

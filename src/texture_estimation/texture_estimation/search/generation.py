@@ -47,9 +47,7 @@ class ScoredIndividual:
 
     Examples
     --------
-    >>> best = ScoredIndividual((3, 'svm'), fitness=0.9, cost=1e4, halves=20)
-    >>> generation = Generation(1, of=30, best=best, evaluated=20, cache_hits=0, halves=20)
-    >>> SearchOutcome((best,), (best,), (generation,)).ranked[0].individual
+    >>> ScoredIndividual((3, 'svm'), fitness=0.9, cost=1e4, halves=20).individual
     (3, 'svm')
     """
 

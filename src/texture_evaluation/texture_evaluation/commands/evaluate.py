@@ -15,13 +15,13 @@ from texture_estimation.channels import FAST_TOPIC, with_channels
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search.parallel import dask_backend
-from texture_evaluation.commands.evaluation_text import sentence, summary, table
 from texture_evaluation.cross_validation.comparison import PairedComparison, compare_all
 from texture_evaluation.cross_validation.comparison_chart import comparison_chart
 from texture_evaluation.cross_validation.cross_validate import cross_validate
 from texture_evaluation.cross_validation.cross_validation import CrossValidation
 from texture_evaluation.cross_validation.splits import parse_split
 from texture_evaluation.evaluate import evaluate
+from texture_evaluation.evaluation_text import sentence, summary, table
 from texture_recordings.slide_dataset import SlideDataset
 
 

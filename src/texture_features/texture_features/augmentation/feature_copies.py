@@ -65,7 +65,7 @@ class AugmentedFeatures:
     --------
     >>> nothing = FeatureCopies(np.zeros((0, 1), np.float32), np.array(['']), np.arange(0), np.array(['']))
     >>> features = AugmentedFeatures(nothing, nothing, gain_response=np.array([2.0]))  # of a logarithm of a power
-    >>> bool(np.isclose(np.log(3.0**2), features.gain_response[0] * math.log(3.0)))
+    >>> bool(np.isclose(np.log(3.0**2), features.gain_response[0] * np.log(3.0)))
     True
     """
 

@@ -53,7 +53,7 @@ class TableMapping:
     ('file', ['ax'])
     >>> mapping.format == FileFormat(), mapping.label == LabelColumn('material'), mapping.slides == SlideBorders()
     (True, True, True)
-    >>> mapping.streams['signal'] == StreamColumns(['ax'], time=TimeColumn())
+    >>> mapping.streams['signal'] == StreamColumns(['ax'])
     True
     >>> mapping.conditions == SlideConditions(speed=Quantity())  # unknown
     True
