@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 
 from texture_benchmarks import charts
@@ -19,6 +20,12 @@ def test_no_name_lies_on_another_or_on_a_point() -> None:
     places = charts._named(VALUES, FRONT)
     assert 5 in places  # far from all others
     assert not any(charts._covers(one, other, charts.LABEL_DECADES) for one, other in combinations(places.values(), 2))
+
+
+def test_no_name_leaves_the_chart_on_the_left() -> None:
+    crowded = [(50.0, 0.17), (55.0, 0.18), (72.0, 0.20), (80.0, 0.15)]
+    starts = [start for start, _ in charts._named(crowded, [0]).values()]
+    assert min(starts) >= math.log10(50.0) - charts.ROOM_DECADES
 
 
 def test_at_most_ten_methods_are_named() -> None:

@@ -14,6 +14,7 @@ from texture_evaluation.charts import COLOURS, chart, draw_confusion, line_style
 FEW_LINES = 5  # more names than these would cover lines
 DIRECT_LABELS = 10  # names in a chart of many methods
 LABEL_DECADES, LABEL_SHARE = 0.4, 0.035  # room of a name, on the axes of cost and share
+ROOM_DECADES = 0.3  # left of the cheapest point
 
 
 def confusion_chart(labels: Sequence[str], table: AnyArray, title: str, path: str | Path) -> Path:
@@ -252,7 +253,7 @@ def _front(axes: Any, points: Mapping[str, tuple[float, float]]) -> None:
     for index, (cost, share) in enumerate(values):
         axes.plot(cost, 100 * share, '.', color=COLOURS[5 if index in best else 0])
     costs = [cost for cost, _ in values]
-    axes.set_xlim(min(costs) / 2, 3.5 * max(costs))  # room for the names at both ends
+    axes.set_xlim(min(costs) / 10**ROOM_DECADES, 3.5 * max(costs))  # room for the names at both ends
     names = list(points)
     for index, (start, height) in _named(values, best).items():
         left = start < np.log10(values[index][0])
@@ -265,12 +266,14 @@ def _front(axes: Any, points: Mapping[str, tuple[float, float]]) -> None:
 def _free_places(
     points: Sequence[tuple[float, float]], index: int, places: Mapping[int, tuple[float, float]]
 ) -> list[tuple[float, float]]:
-    """Return where the name of a point covers no other point and no name."""
+    """Return where the name of a point covers no other point and no name, and does not leave the chart on the left."""
     (x, y), up = points[index], LABEL_SHARE / 2
+    edge = min(point[0] for point in points) - ROOM_DECADES
     return [
         place
         for place in ((x, y + up), (x - LABEL_DECADES, y + up), (x, y - up))
-        if not any(_covers(place, other, LABEL_DECADES) for other in places.values())
+        if place[0] >= edge
+        and not any(_covers(place, other, LABEL_DECADES) for other in places.values())
         and not any(_covers(place, point, 0.0) for point in points if point != points[index])
     ]
 
