@@ -73,6 +73,12 @@ class Generation:
         How often one was met again.
     halves
         Evaluated so far: `evaluated` times the number of halves, had none been given up early.
+
+    Examples
+    --------
+    >>> best = ScoredIndividual((3, 'svm'), fitness=0.9, cost=1e4, halves=20)
+    >>> Generation(1, of=30, best=best, evaluated=20, cache_hits=0, halves=400).best.individual
+    (3, 'svm')
     """
 
     number: int
