@@ -126,7 +126,7 @@ def test_a_tare_without_a_sensor_is_refused(graph: LocalGraph, tmp_path: Path) -
     node = graph.add(SensorNode, sensor='daq', device=str(tmp_path / 'missing'))
     response = node._on_tare(Trigger.Request(), Trigger.Response())
     assert not response.success
-    assert 'delivers no samples' in response.message
+    assert response.message == 'the sensor delivers no samples; see its message on /diagnostics'
 
 
 def test_a_recording_is_played_as_a_sensor(graph: LocalGraph, tmp_path: Path) -> None:

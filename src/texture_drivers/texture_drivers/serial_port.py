@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import termios
 import time
 from collections.abc import Iterator
@@ -68,6 +69,12 @@ class SerialPort:
             yield
         except PORT_ERRORS as error:
             raise DeviceError(
-                f"device '{self._device}' cannot be used ({error}); check that it is plugged in, that you may open it, "
-                'and that no other program has it open'
+                f"device '{self._device}' cannot be used ({reason_of(error)}); check that it is plugged in, "
+                'that you may open it, and that no other program has it open'
             ) from error
+
+
+def reason_of(error: Exception) -> str:
+    """Return what the operating system says of a fault, without the path that pyserial repeats in its own text."""
+    code = error.args[0] if len(error.args) > 1 else None  # termios.error has no errno
+    return os.strerror(code) if isinstance(code, int) else str(error)

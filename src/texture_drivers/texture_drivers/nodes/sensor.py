@@ -140,8 +140,11 @@ class SensorNode(LifecycleNode):
 
     def _on_tare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Start a tare: its result comes on the topics of the baselines, a refusal on /diagnostics."""
-        if self._reader is None or self._reader.fault:
-            response.message = 'the sensor delivers no samples; activate it, and see /diagnostics'
+        if self._reader is None:
+            response.message = 'the sensor node is not active; activate it'
+            return response
+        if self._reader.fault:
+            response.message = 'the sensor delivers no samples; see its message on /diagnostics'
             return response
         self._start_tare()
         response.success = True
