@@ -1,0 +1,13 @@
+import re
+from pathlib import Path
+
+from texture_features.catalogue import FEATURES
+
+README = (Path(__file__).parent.parent / 'README.md').read_text()
+
+
+def test_the_table_of_the_readme_names_the_features_of_the_catalogue_and_no_others():
+    table = README.split('| feature |')[1].split('\n## ')[0]
+    first_cells = re.findall(r'^\| (`[^|]+) \|', table, re.MULTILINE)
+    named = [name for cell in first_cells for name in re.findall(r'`(\w+)`', cell)]
+    assert sorted(named) == sorted(FEATURES)
