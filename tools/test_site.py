@@ -185,6 +185,30 @@ def test_the_recipe_of_the_page_learns_and_recognises(examples: Path, tmp_path: 
     assert report.as_json()['window_accuracy'] == 1.0
 
 
+def test_the_learner_of_the_page_learns_and_recognises(examples: Path, tmp_path: Path) -> None:
+    text = (examples / 'my-recipe.yaml').read_text()
+    (entry,) = re.findall(r'^    learner: (.*nearest_mean.*)$', (DOCS / 'extending.md').read_text(), re.MULTILINE)
+    recipe = tmp_path / 'own.yaml'
+    recipe.write_text(text.replace('learner: naive_bayes', f'learner: {entry}'))
+    plan = SlidePlan(slides=4, slide_s=1.0)
+    bags = write_simulated(tmp_path, plan, np.random.default_rng(0), surfaces=('leather', 'ridge_2mm_deep'))
+    train_from_bags(str(recipe), bags, '1-3', tmp_path / 'model')
+    model = load_model(str(tmp_path / 'model'))
+    assert model.parameters['sharpness'] == 2.0
+    assert model.training['held_out_window_accuracy'] == 1.0
+    assert evaluate(model, bags, slides='4').as_json()['window_accuracy'] == 1.0
+
+
+def test_the_learner_of_the_page_holds_nothing_out_where_a_label_has_a_single_window(examples: Path) -> None:
+    learner = importlib.import_module('my_textures.nearest_mean').NearestMean()
+    values, codes = np.array([[0.0], [0.1], [1.0]]), np.array([0, 0, 1])
+    fitted = learner.fit(values, codes, np.array([0, 1, 2]))
+    assert fitted.held_out is None
+    predicted = learner.predictor(fitted.parameters)(values)
+    assert predicted.argmax(axis=1).tolist() == codes.tolist()
+    np.testing.assert_allclose(np.exp(predicted).sum(axis=1), 1.0)
+
+
 def said(path: Path) -> Iterator[str]:
     """Yield every text of a file, with … where something is filled in."""
     for node in ast.walk(ast.parse(path.read_text())):
