@@ -11,6 +11,7 @@ from texture_benchmarks.clock import run as clock
 from texture_benchmarks.decisions import run as decisions
 from texture_benchmarks.features import run as features
 from texture_benchmarks.frontier import run as frontier
+from texture_benchmarks.latency import hand
 from texture_benchmarks.latency import run as latency
 from texture_benchmarks.learning import run as learning
 from texture_benchmarks.load import run as load
@@ -37,6 +38,7 @@ from texture_core.catalogue import find
 
 BENCHMARKS: Mapping[str, Callable[[BenchmarkOptions], BenchmarkResult]] = {
     'latency': latency.run,  # from window to estimate, in one process and through the graph; computing time
+    'hand': hand.run,  # five BioTacs at once through the running nodes: latency and computing time
     'biotac20': biotac20.run,  # 20 recorded materials, tested on slides of a later time
     'recipes': recipes.run,  # all recipes on recorded slides: accuracy, training time, latency
     'recipes_later': recipes.run_later,  # the same on the vibration of slides of a later time alone

@@ -37,6 +37,7 @@ LONG = frozenset(
         'optimise_large',
         'optimise_pairs',
         'scenes',
+        'hand',
         'load',
         'motion',
         'peers',

@@ -93,12 +93,13 @@ class _Timing:
 
 
 def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: BenchmarkOptions) -> _Timing:
-    from texture_benchmarks.ros.live_latency import measure  # noqa: PLC0415
+    from texture_benchmarks.ros.live_latency import LiveSlide, measure  # noqa: PLC0415
 
     model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
     cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
     alone_us, without_us = _in_turn((model, replace(model, novelty_detector=None)), cut)
-    live = measure(folder / f'{recipe}.skops', options.seed, QUICK_LIVE_S if options.quick else LIVE_S)
+    slide = LiveSlide('twelve_textures', 'leather', QUICK_LIVE_S if options.quick else LIVE_S, options.seed)
+    [live] = measure(folder / f'{recipe}.skops', slide).values()
     return _Timing(alone_us, without_us, live)
 
 

@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 from texture_core.errors import DeviceError
 from texture_core.ros.conversions import from_msg
-from texture_recordings.ros.topics import TOPICS
+from texture_recordings.ros.topics import TOPICS, Topic
 
 POLL_S = 0.05
 
@@ -46,13 +46,13 @@ class Graph:
         self._context.try_shutdown()
 
     def publisher(self, topic: str) -> Any:
-        """Return a publisher on a topic of the suite, by its short name."""
-        kind, qos, name = TOPICS[topic]
+        """Return a publisher on a topic of the suite: 'signal', or 'finger1/signal' in a namespace of its own."""
+        kind, qos, name = _in_namespace(topic)
         return self.node.create_publisher(kind, name, qos)
 
     def listen(self, topic: str, received: Callable[[Any], None]) -> None:
         """Call `received` with the data class of each message of a topic, or the message itself of /diagnostics."""
-        kind, qos, name = TOPICS[topic]
+        kind, qos, name = _in_namespace(topic)
         convert = from_msg if kind.__module__.startswith('texture_msgs') else (lambda message: message)
         self.node.create_subscription(kind, name, lambda message: received(convert(message)), qos)
 
@@ -84,3 +84,9 @@ class Graph:
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             self._executor.spin_once(timeout_sec=left)
+
+
+def _in_namespace(topic: str) -> Topic:
+    namespace, _, short = topic.rpartition('/')
+    found = TOPICS[short]
+    return found._replace(name=f'{namespace}/{found.name}') if namespace else found

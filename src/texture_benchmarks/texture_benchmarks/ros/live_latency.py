@@ -6,7 +6,8 @@ import math
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,6 @@ READY_WITHIN_S = 60.0
 DRIVER_S = 10.0
 BATCH_S = 0.01  # as the sensor node delivers
 SPEED_M_S, FORCE_N = 0.1, 2.0
-SURFACE = 'leather'
 DOMAIN = 83  # of its own: what else runs on the machine must not listen
 
 
@@ -64,66 +64,149 @@ class LiveLatency:
         }
 
 
-def measure(model_path: Path, seed: int, slide_s: float) -> LiveLatency:
-    """Stream one long simulated slide through feature extractor and classifier, and time the estimates.
+@dataclass(frozen=True)
+class LiveSlide:
+    """What is streamed to each finger.
+
+    Parameters
+    ----------
+    scene, surface
+        Which simulated surface is touched.
+    slide_s
+        Length of the slide, s.
+    seed
+        Seed of the slide of the first finger; each further one has the next.
+    """
+
+    scene: str
+    surface: str
+    slide_s: float
+    seed: int
+
+
+def measure(model_path: Path, slide: LiveSlide, namespaces: Sequence[str] = ('',)) -> Mapping[str, LiveLatency]:
+    """Stream a simulated slide to each of several fingers at once, and time the estimates.
 
     Parameters
     ----------
     model_path
-        Path of the model.
-    seed
-        Seed of the simulated slide.
-    slide_s
-        Length of the slide.
+        Path of the model. Each finger has a feature extractor and a classifier of its own with it.
+    slide
+        What is streamed.
+    namespaces
+        Namespace of each finger, without a slash at either end.
 
     Returns
     -------
-    LiveLatency
-        Times from the last sample of a window to its estimate.
+    mapping
+        By namespace: times from the last sample of a window to its estimate, and the use of the processor.
+
+    Raises
+    ------
+    DeviceError
+        If the nodes do not come up, or an estimate does not come.
     """
     model = load_model(model_path)
-    states, signals = simulate_exploration(
-        load_scene('twelve_textures'), SURFACE, SPEED_M_S, FORCE_N, slide_s,
-        start_ns=0, exploration_id='long', rng=np.random.default_rng(seed),
-    )  # fmt: skip
-    batches = {topic: rebatch(signals[topic]) for topic in signals}
-    received: list[tuple[float, TextureEstimate]] = []
-    nodes = (
-        NodeProcess(
-            'texture_features', 'feature_extractor', {'recipe': str(model_path.with_suffix('.json'))}, domain_id=DOMAIN
-        ),
-        NodeProcess('texture_estimation', 'classifier', {'model': str(model_path)}, domain_id=DOMAIN),
-    )
-    with Graph(DOMAIN) as graph, nodes[0], nodes[1]:
-        graph.listen('texture', lambda estimate: received.append((time.perf_counter(), estimate)))
-        streamer = Streamer(graph, _plan(states, batches))
-        topics = ('exploration', *model.recipe.feature_set.topics)
-        graph.wait_until(
-            lambda: (
-                all(streamer.publishers[topic].get_subscription_count() for topic in topics)
-                and graph.node.count_publishers('texture') > 0
-            ),
-            READY_WITHIN_S,
-            'the two nodes',
-        )
-        graph.spin(SETTLE_S)
-        before, began = [node.cpu_s() for node in nodes], time.monotonic()
-        streamer.start()
-        graph.wait_until(
-            lambda: bool(received) and received[-1][1].final, slide_s + READY_WITHIN_S, 'the final estimate'
-        )
-        lasted_s = time.monotonic() - began
-        cpu = {n.name: (n.cpu_s() - used) / lasted_s for n, used in zip(nodes, before, strict=True)}
-        streamer.join()
+    topics = model.recipe.feature_set.topics
+    fingers = [_Finger.simulated(name, replace(slide, seed=slide.seed + i)) for i, name in enumerate(namespaces)]
+    with Graph(DOMAIN) as graph, ExitStack() as stack:
+        for finger in fingers:
+            finger.start(graph, stack, model_path)
+        streamer = Streamer(graph, sorted((timed for f in fingers for timed in f.plan()), key=lambda timed: timed[0]))
+        _wait_for_nodes(graph, streamer, fingers, topics)
+        shares = _stream(graph, streamer, fingers, slide.slide_s + READY_WITHIN_S)
     windows = model.recipe.feature_set.windows
-    expected = math.floor((slide_s - windows.length_s) / windows.hop_s + 1e-6) + 1
-    sent = {topic: _sent_at(streamer, topic) for topic in model.recipe.feature_set.topics}
-    found = [
-        at_s - max(sent[topic][_last_batch(batches[topic], estimate, windows.length_s)] for topic in sent)
-        for at_s, estimate in received
-        if not estimate.final
+    expected = math.floor((slide.slide_s - windows.length_s) / windows.hop_s + 1e-6) + 1
+    return {
+        finger.namespace: LiveLatency(np.array(finger.latency_s(streamer, topics, windows.length_s)), expected, share)
+        for finger, share in zip(fingers, shares, strict=True)
+    }
+
+
+def _wait_for_nodes(graph: Graph, streamer: Streamer, fingers: Sequence[_Finger], topics: Sequence[str]) -> None:
+    """Wait until each node listens to what is streamed, and each classifier can be heard."""
+    needed = [finger.topic(topic) for finger in fingers for topic in ('exploration', *topics)]
+
+    def ready() -> bool:
+        heard = all(streamer.publishers[topic].get_subscription_count() for topic in needed)
+        return heard and all(graph.node.count_publishers(finger.topic('texture')) for finger in fingers)
+
+    graph.wait_until(ready, READY_WITHIN_S * len(fingers), 'the feature extractors and classifiers')
+    graph.spin(SETTLE_S)
+
+
+def _stream(
+    graph: Graph, streamer: Streamer, fingers: Sequence[_Finger], deadline_s: float
+) -> list[Mapping[str, float]]:
+    """Stream until each finger has its final estimate; return the share of one core that each of its nodes used."""
+    before, began_s = [finger.cpu_s() for finger in fingers], time.monotonic()
+    streamer.start()
+    graph.wait_until(lambda: all(finger.ended for finger in fingers), deadline_s, 'the final estimates')
+    lasted_s = time.monotonic() - began_s
+    streamer.join()
+    return [
+        {name: (used_s - start[name]) / lasted_s for name, used_s in finger.cpu_s().items()}
+        for finger, start in zip(fingers, before, strict=True)
     ]
-    return LiveLatency(np.array(found), expected, cpu)
+
+
+@dataclass(eq=False)
+class _Finger:
+    """What is streamed to the nodes of one finger, and what comes from them."""
+
+    namespace: str
+    states: Sequence[ExplorationState]
+    batches: Mapping[str, Sequence[TactileSignal]]
+    nodes: list[NodeProcess] = field(default_factory=list)
+    received: list[tuple[float, TextureEstimate]] = field(default_factory=list)
+
+    @classmethod
+    def simulated(cls, namespace: str, slide: LiveSlide) -> _Finger:
+        """Return a finger that slides."""
+        states, signals = simulate_exploration(
+            load_scene(slide.scene), slide.surface, SPEED_M_S, FORCE_N, slide.slide_s,
+            start_ns=0, exploration_id='long', rng=np.random.default_rng(slide.seed),
+        )  # fmt: skip
+        return cls(namespace, states, {topic: rebatch(signals[topic]) for topic in signals})
+
+    def topic(self, short: str) -> str:
+        """Return the name of a topic of this finger."""
+        return f'{self.namespace}/{short}' if self.namespace else short
+
+    def start(self, graph: Graph, stack: ExitStack, model_path: Path) -> None:
+        """Start the two nodes, and note each estimate."""
+        for package, node, given in (
+            ('texture_features', 'feature_extractor', {'recipe': str(model_path.with_suffix('.json'))}),
+            ('texture_estimation', 'classifier', {'model': str(model_path)}),
+        ):
+            process = NodeProcess(package, node, given, namespace=f'/{self.namespace}', domain_id=DOMAIN)
+            self.nodes.append(stack.enter_context(process))
+        graph.listen(self.topic('texture'), lambda estimate: self.received.append((time.perf_counter(), estimate)))
+
+    @property
+    def ended(self) -> bool:
+        """Whether the final estimate has come."""
+        return bool(self.received) and self.received[-1][1].final
+
+    def cpu_s(self) -> Mapping[str, float]:
+        """Return the computing time of each node so far."""
+        return {node.name: node.cpu_s() for node in self.nodes}
+
+    def plan(self) -> list[Timed]:
+        """Return what is published when: a state at its stamp, a batch at its end."""
+        plan: list[Timed] = [(state.stamp_ns, self.topic('exploration'), state) for state in self.states]
+        for topic, signals in self.batches.items():
+            plan += [(signal.end_ns, self.topic(topic), signal) for signal in signals]
+        return sorted(plan, key=lambda timed: timed[0])
+
+    def latency_s(self, streamer: Streamer, topics: Sequence[str], length_s: float) -> list[float]:
+        """Return the time of each estimate since the last batch of its newest window was published."""
+        sent = {topic: _sent_at(streamer, self.topic(topic)) for topic in topics}
+        return [
+            at_s - max(sent[topic][_last_batch(self.batches[topic], estimate, length_s)] for topic in sent)
+            for at_s, estimate in self.received
+            if not estimate.final
+        ]
 
 
 def driver_cpu() -> float:
@@ -158,14 +241,6 @@ def rebatch(signals: Sequence[TactileSignal]) -> list[TactileSignal]:
         )
         for start in range(0, len(samples), size)
     ]
-
-
-def _plan(states: Sequence[ExplorationState], batches: Mapping[str, Sequence[TactileSignal]]) -> list[Timed]:
-    """Return what is published when: a state at its stamp, a batch at its end."""
-    plan: list[Timed] = [(state.stamp_ns, 'exploration', state) for state in states]
-    for topic, signals in batches.items():
-        plan += [(signal.end_ns, topic, signal) for signal in signals]
-    return sorted(plan, key=lambda timed: timed[0])
 
 
 def _sent_at(streamer: Streamer, topic: str) -> list[float]:
