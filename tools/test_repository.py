@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import re
+from collections import Counter
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -93,3 +95,18 @@ def test_the_domains_of_tests_are_those_that_no_demonstration_takes() -> None:
     numbers = {int(n) for path in ROOT.glob('src/*/test/*.py') for n in DOMAIN.findall(path.read_text())} - {0}
     assert numbers
     assert all(61 <= number <= 100 for number in numbers), numbers
+
+
+def public_classes(text: str) -> set[str]:
+    """Return the names of the classes that a module defines and that do not begin with an underscore."""
+    found = (node.name for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ClassDef))
+    return {name for name in found if not name.startswith('_')}
+
+
+def test_no_two_public_classes_of_the_suite_have_the_same_name() -> None:
+    """Who reads the name of a class shall know which one is meant, without looking at its import."""
+    modules = [path for root in ('src', 'tools') for path in (ROOT / root).rglob('*.py')]
+    code = [path for path in modules if 'test' not in path.parts and not path.name.startswith('test_')]
+    counts = Counter(name for path in code for name in public_classes(path.read_text(encoding='utf-8')))
+    assert counts['WindowParams'] == 1
+    assert not {name: count for name, count in counts.items() if count > 1}

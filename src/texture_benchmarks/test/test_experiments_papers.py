@@ -10,7 +10,7 @@ from texture_benchmarks.papers import EXPERIMENTS, PROTOCOLS, Experiment, report
 from texture_benchmarks.papers.claim_checks import at_least, higher, lower_in, most_errors, seldom
 from texture_benchmarks.papers.interval import apart, mean, share
 from texture_benchmarks.papers.method_result import MethodResult
-from texture_benchmarks.papers.protocol import Protocol, drawn, folds, halves, training_in
+from texture_benchmarks.papers.protocol import PaperProtocol, drawn, folds, halves, training_in
 from texture_benchmarks.papers.simulated_trials import gather
 from texture_benchmarks.papers.trial import evaluate_method, outcomes, recipe_of, reduced
 from texture_core.errors import InvalidParameter, UnknownName
@@ -32,7 +32,9 @@ def outcome(decided: list[int] | np.ndarray) -> MethodResult:
 
 @pytest.mark.benchmark
 @pytest.mark.parametrize('protocol', PROTOCOLS, ids=lambda protocol: protocol.name)
-def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(protocol: Protocol, tmp_path: Path) -> None:
+def test_each_experiment_runs_and_shows_the_papers_figures_beside_its_own(
+    protocol: PaperProtocol, tmp_path: Path
+) -> None:
     result, path = run_experiment(protocol.name, Experiment(tmp_path, quick=True))
     assert path.is_file()
     assert 'simulated' in result.data

@@ -16,7 +16,7 @@ import pytest
 from texture_core.errors import DeviceError, InvalidParameter
 from texture_core.signal import TactileSignal, lost_samples
 from texture_drivers.params import SensorParams
-from texture_drivers.sound_card.capture import Block
+from texture_drivers.sound_card.capture import AudioBlock
 from texture_drivers.sound_card.sensor import SoundCard
 from texture_simulation.devices.sound_card import FRAMES_AT_ONCE, SYSTEM_CONFIG, EmulatedSoundCard
 
@@ -216,9 +216,9 @@ class Blocks:
     """What stands for the capture: hands over blocks by hand."""
 
     def __init__(self) -> None:
-        self.waiting: list[Block] = []
+        self.waiting: list[AudioBlock] = []
 
-    def take(self) -> list[Block]:
+    def take(self) -> list[AudioBlock]:
         taken, self.waiting = self.waiting, []
         return taken
 
@@ -245,7 +245,7 @@ def by_hand(
     batches: list[Any] = []
     for number in range(count):
         end_ns = 10**18 + round(((number + 1) * 480 / RATE_HZ + late_s(number)) * 1e9)
-        blocks.waiting.append(Block(np.zeros((480, 1), dtype=np.float32), end_ns, number in overflows))
+        blocks.waiting.append(AudioBlock(np.zeros((480, 1), dtype=np.float32), end_ns, number in overflows))
         if number % 5 == 4:
             batches += sensor.read().get('signal', [])
     return sensor, batches

@@ -10,7 +10,7 @@ import pytest
 from texture_benchmarks.papers import EXPERIMENTS, PROTOCOLS, claim_checks
 from texture_benchmarks.papers.interval import Interval
 from texture_benchmarks.papers.method_result import MethodResult
-from texture_benchmarks.papers.protocol import Finding, Protocol
+from texture_benchmarks.papers.protocol import Finding, PaperProtocol
 from texture_benchmarks.papers.recipe_digest import digest_of
 from texture_benchmarks.papers.report import VERDICTS
 from texture_benchmarks.papers.seeds import mean_over_seeds, verdict
@@ -60,7 +60,7 @@ def test_the_stored_figures_are_those_of_the_recipes_as_they_are_now(name: str) 
     assert {recipe: digest_of(recipe) for recipe in recipes} == recipes
 
 
-def guessed(protocol: Protocol) -> dict[tuple[str, str], MethodResult]:
+def guessed(protocol: PaperProtocol) -> dict[tuple[str, str], MethodResult]:
     """Return results of each method in each task by which every slide is taken for any surface."""
     rng = np.random.default_rng(0)
     results = {}
@@ -76,14 +76,14 @@ def guessed(protocol: Protocol) -> dict[tuple[str, str], MethodResult]:
 
 
 @pytest.mark.parametrize('protocol', PROTOCOLS, ids=lambda protocol: protocol.name)
-def test_the_stored_figures_of_an_anchor_stand_beside_those_of_the_paper(protocol: Protocol) -> None:
+def test_the_stored_figures_of_an_anchor_stand_beside_those_of_the_paper(protocol: PaperProtocol) -> None:
     stored, anchor = numbers_of(protocol.name)['difficulty'], protocol.anchor
     assert stored['paper'] == anchor.test
     assert {task: part['paper'] for task, part in stored.get('parts', {}).items()} == anchor.parts
 
 
 @pytest.mark.parametrize('protocol', PROTOCOLS, ids=lambda protocol: protocol.name)
-def test_the_figure_that_set_a_scene_is_no_finding(protocol: Protocol, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_figure_that_set_a_scene_is_no_finding(protocol: PaperProtocol, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[MethodResult, float]] = []
 
     def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:

@@ -11,7 +11,7 @@ from texture_benchmarks.trust.chart import UNDISTURBED_SIMULATED, grid_panels, t
 from texture_benchmarks.trust.run import RECIPES, run
 from texture_benchmarks.trust.simulated import SIMULATED, TRAINED_SLIDES
 from texture_benchmarks.trust.simulated import simulate as simulate_row
-from texture_benchmarks.trust.trial import ROWS, UNDISTURBED, Outcome, Row, disturbed
+from texture_benchmarks.trust.trial import ROWS, UNDISTURBED, DisturbanceSweep, Outcome, disturbed
 from texture_core.estimates import TextureEstimate
 from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import load_recipe
@@ -30,7 +30,7 @@ def slide() -> LabelledSlide:
 
 
 @pytest.fixture(params=ROWS)
-def row(request: pytest.FixtureRequest) -> Row:
+def row(request: pytest.FixtureRequest) -> DisturbanceSweep:
     return ROWS[request.param]
 
 
@@ -38,7 +38,7 @@ def samples(item: LabelledSlide) -> np.ndarray:
     return np.concatenate([batch.samples for batch in item.signals['signal']])
 
 
-def test_every_row_changes_the_samples_and_keeps_the_slide(row: Row, slide: LabelledSlide) -> None:
+def test_every_row_changes_the_samples_and_keeps_the_slide(row: DisturbanceSweep, slide: LabelledSlide) -> None:
     for strength in row.strengths:
         # A short slide may lose nothing of one in a thousand, so some seeds are tried.
         changed = [disturbed(slide, row, strength, np.random.default_rng(seed)) for seed in range(40)]

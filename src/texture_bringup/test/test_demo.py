@@ -16,7 +16,7 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo.plan import DemoPlan
 from texture_bringup.demo.progress_log import ProgressLog
-from texture_bringup.demo.results import Row, is_refused, table
+from texture_bringup.demo.results import RecognisedSlide, is_refused, table
 from texture_bringup.demo.run import demonstrate
 from texture_core.estimates import TextureEstimate
 
@@ -35,7 +35,7 @@ def test_the_table_shows_a_mistake() -> None:
     right = TextureEstimate(0, 'a', 'glass', known=True, confidence=0.99, evidence_s=0.7)
     wrong = TextureEstimate(0, 'b', 'glass', known=True, confidence=0.6, evidence_s=1.2)
     unknown = TextureEstimate(0, 'c', 'leather', known=False, confidence=0.5, evidence_s=1.2)
-    rows = [Row('glass', right), Row('leather', wrong), Row('leather', unknown)]
+    rows = [RecognisedSlide('glass', right), RecognisedSlide('leather', wrong), RecognisedSlide('leather', unknown)]
     assert [row.right for row in rows] == [True, False, False]
     _, first, second, third = table(rows, {'a': 0.012})
     assert first.split() == ['glass', 'glass', '✓', '0.990', '0.7', 's', '12', 'ms']

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from texture_drivers.papillarray.protocol import Measurements, PacketParser, layout_of
+from texture_drivers.papillarray.protocol import Measurements, PapillArrayParser, layout_of
 
 START, END = bytes.fromhex('55667788'), bytes.fromhex('AABBCCDD')
 
@@ -63,7 +63,7 @@ def test_slip_of_any_length_is_passed_over() -> None:
 
 
 def test_the_first_packet_is_believed_when_the_second_is_as_long() -> None:
-    parser = PacketParser()
+    parser = PapillArrayParser()
     assert counters(parser.feed(stream(range(10)))) == list(range(1, 10))
     assert parser.refused == 0
 
@@ -73,7 +73,7 @@ def test_the_first_packet_is_believed_when_the_second_is_as_long() -> None:
 def test_it_does_not_matter_how_the_bytes_are_cut(lengths: list[int]) -> None:
     whole = stream(range(12))[30:]
     cuts = np.cumsum([0, *lengths])
-    parser = PacketParser()
+    parser = PapillArrayParser()
     pieces = [whole[a:b] for a, b in zip(cuts, [*cuts[1:], None], strict=True)]
     assert counters([found for piece in pieces for found in parser.feed(piece)]) == list(range(2, 12))
 
@@ -81,7 +81,7 @@ def test_it_does_not_matter_how_the_bytes_are_cut(lengths: list[int]) -> None:
 @pytest.mark.parametrize('at', range(0, len(packet(5)), 3))
 def test_a_lost_byte_costs_no_more_than_two_packets_and_nothing_false_is_believed(at: int) -> None:
     damaged = packet(5)[:at] + packet(5)[at + 1 :]
-    parser = PacketParser()
+    parser = PapillArrayParser()
     packets = [p for p in parser.feed(stream(range(5)) + damaged + stream(range(6, 12))) if layout_of(p)]
     assert {content(number) for number in range(12)} >= set(packets)
     assert {1, 2, 3, 4, 7, 8, 9, 10, 11} <= set(counters(packets))
@@ -90,7 +90,7 @@ def test_a_lost_byte_costs_no_more_than_two_packets_and_nothing_false_is_believe
 def test_a_byte_0_more_passes_the_checksum_and_is_refused_for_the_length() -> None:
     inner = content(5)
     damaged = START + inner[:10] + b'\x00' + inner[10:] + struct.pack('<H', sum(inner) % 65536) + END
-    parser = PacketParser()
+    parser = PapillArrayParser()
     assert counters(parser.feed(stream(range(5)) + damaged + stream(range(6, 12)))) == [1, 2, 3, 4, *range(7, 12)]
     assert parser.refused == 2
 
@@ -100,7 +100,7 @@ def test_a_changed_bit_is_refused(bit: int) -> None:
     for at in range(4, len(packet(5)) - 4):
         damaged = bytearray(packet(5))
         damaged[at] ^= 1 << bit
-        found = PacketParser().feed(stream(range(5)) + bytes(damaged) + stream(range(6, 8)))
+        found = PapillArrayParser().feed(stream(range(5)) + bytes(damaged) + stream(range(6, 8)))
         assert counters(found) == [1, 2, 3, 4, 6, 7]
 
 
@@ -127,7 +127,7 @@ def test_no_content_raises(inner: bytes) -> None:
 
 
 def test_noise_is_not_kept() -> None:
-    parser = PacketParser()
+    parser = PapillArrayParser()
     noise = np.random.default_rng(0).integers(0, 256, 100_000, dtype=np.uint8).tobytes()
     assert parser.feed(noise) == []
     parser.feed(START + b'\x00' * 100_000)

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from texture_drivers.tsf85.protocol import Item, Packet, PacketParser, start_command, stop_command
+from texture_drivers.tsf85.protocol import Item, Packet, Tsf85Parser, start_command, stop_command
 from texture_drivers.tsf85.tables import (
     ACCELEROMETER,
     AUTOSEND,
@@ -20,13 +20,13 @@ INERTIAL = bytes.fromhex('9A 7F 61 07 30 0001 FFFF 4000')
 
 
 def test_a_short_stamp_and_a_dynamic_value_are_read() -> None:
-    assert PacketParser().feed(SHORT_STAMP) == [
+    assert Tsf85Parser().feed(SHORT_STAMP) == [
         Packet(AUTOSEND, (Item(TIMESTAMP, 0, (0x6C1E,)), Item(DYNAMIC, 0, (258,))))
     ]
 
 
 def test_a_long_stamp_and_both_fingers_are_read() -> None:
-    (packet,) = PacketParser().feed(LONG_STAMP)
+    (packet,) = Tsf85Parser().feed(LONG_STAMP)
     assert packet.items == (
         Item(TIMESTAMP, 0, (0x6C1E,)),
         Item(DYNAMIC, 0, (-2,)),
@@ -35,7 +35,7 @@ def test_a_long_stamp_and_both_fingers_are_read() -> None:
 
 
 def test_an_image_of_the_second_finger_has_28_big_endian_taxels() -> None:
-    (packet,) = PacketParser().feed(IMAGE)
+    (packet,) = Tsf85Parser().feed(IMAGE)
     (item,) = packet.items
     assert (item.kind, item.finger) == (STATIC, 1)
     assert item.values[:2] == (0x0001, 0x0203)
@@ -43,13 +43,13 @@ def test_an_image_of_the_second_finger_has_28_big_endian_taxels() -> None:
 
 
 def test_the_checksum_byte_means_nothing_and_a_one_shot_reply_counts_too() -> None:
-    (packet,) = PacketParser().feed(INERTIAL)
+    (packet,) = Tsf85Parser().feed(INERTIAL)
     assert packet.items == (Item(ACCELEROMETER, 0, (1, -1, 16384)),)
 
 
 def test_a_packet_comes_out_with_its_last_byte_wherever_the_stream_is_cut() -> None:
     stream = SHORT_STAMP + LONG_STAMP + IMAGE + INERTIAL
-    parser = PacketParser()
+    parser = Tsf85Parser()
     came = [len(parser.feed(stream[i : i + 1])) for i in range(len(stream))]
     assert sum(came) == 4
     assert came[len(SHORT_STAMP) - 1] == 1
@@ -70,14 +70,14 @@ def test_a_packet_comes_out_with_its_last_byte_wherever_the_stream_is_cut() -> N
     ],
 )
 def test_a_packet_is_refused_for(reason: str, packet: str) -> None:
-    parser = PacketParser()
-    assert parser.feed(bytes.fromhex(packet) + SHORT_STAMP) == PacketParser().feed(SHORT_STAMP), reason
+    parser = Tsf85Parser()
+    assert parser.feed(bytes.fromhex(packet) + SHORT_STAMP) == Tsf85Parser().feed(SHORT_STAMP), reason
     assert parser.refused >= 1
     assert parser.refused_bytes == len(bytes.fromhex(packet))
 
 
 def test_a_packet_that_lost_a_byte_is_refused_even_if_the_stream_pauses_there() -> None:
-    parser = PacketParser()
+    parser = Tsf85Parser()
     assert parser.feed(SHORT_STAMP[:-1] + b'\x9a') == []
     assert len(parser.feed(SHORT_STAMP[1:])) == 1
     assert parser.packets == 1
@@ -85,7 +85,7 @@ def test_a_packet_that_lost_a_byte_is_refused_even_if_the_stream_pauses_there() 
 
 @given(st.lists(st.binary(max_size=400), max_size=20))
 def test_no_bytes_make_it_raise_or_keep_more_than_a_packet(pieces: list[bytes]) -> None:
-    parser = PacketParser()
+    parser = Tsf85Parser()
     for piece in pieces:
         parser.feed(piece)
         assert len(parser._buffer) <= MAX_PACKET_BYTES
@@ -93,8 +93,8 @@ def test_no_bytes_make_it_raise_or_keep_more_than_a_packet(pieces: list[bytes]) 
 
 @given(st.binary(max_size=600))
 def test_the_stream_is_found_again_after_any_noise(noise: bytes) -> None:
-    packets = PacketParser().feed(noise + SHORT_STAMP * 60)
-    assert packets[-20:] == PacketParser().feed(SHORT_STAMP) * 20
+    packets = Tsf85Parser().feed(noise + SHORT_STAMP * 60)
+    assert packets[-20:] == Tsf85Parser().feed(SHORT_STAMP) * 20
 
 
 def test_the_commands_are_those_of_the_vendor() -> None:

@@ -13,7 +13,7 @@ from texture_core.signal import TactileSignal
 from texture_drivers.channel_watch import Limits
 from texture_drivers.clock import PPM, SLOW_CLOCK, StreamClock
 from texture_drivers.framed_stream import SAMPLE, FramedStream
-from texture_drivers.stream_tracker import MICROSECONDS, Block, StreamTracker
+from texture_drivers.stream_tracker import MICROSECONDS, StreamBlock, StreamTracker
 
 LONGEST_STEP_US = 10 * MICROSECONDS  # a clock that leaps further is another one; the host's clock tells the gap
 
@@ -112,9 +112,9 @@ class StreamDecoder:
         self._latest_us = {}
         self._newest_us = 0
 
-    def _blocks(self, frames: Sequence[Frame]) -> dict[int, list[Block]]:
+    def _blocks(self, frames: Sequence[Frame]) -> dict[int, list[StreamBlock]]:
         """Return the blocks of each stream; those before a restart of the device's clock are given up."""
-        blocks: dict[int, list[Block]] = {}
+        blocks: dict[int, list[StreamBlock]] = {}
         for frame in frames:
             if not self._fits(frame):
                 continue
@@ -123,7 +123,7 @@ class StreamDecoder:
                 self._restart_streams()
                 blocks = {}
             time_us = self._latest_us[frame.kind] = self._time.advance(frame.time_us)
-            blocks.setdefault(frame.kind, []).append(Block(time_us, frame.rows, frame.lost, frame.body))
+            blocks.setdefault(frame.kind, []).append(StreamBlock(time_us, frame.rows, frame.lost, frame.body))
         return blocks
 
     def _has_restarted(self, frame: Frame) -> bool:

@@ -16,7 +16,7 @@ from texture_drivers.framed_stream import SAMPLE, FramedStream
 MICROSECONDS = 1_000_000
 
 
-class Block(NamedTuple):
+class StreamBlock(NamedTuple):
     """The samples of one frame, with unwrapped time."""
 
     time_us: int
@@ -42,7 +42,7 @@ class StreamTracker:
         """Samples that the device itself left out."""
         return self._counter.overrun
 
-    def end_us(self, block: Block) -> int:
+    def end_us(self, block: StreamBlock) -> int:
         """Return the device's time of a block's last sample."""
         return block.time_us + round((block.rows - 1) * MICROSECONDS / self.stream.rate_hz)
 
@@ -52,7 +52,7 @@ class StreamTracker:
             self._due_ns = clock.time_ns(self._counter.next_us)
         self._counter.resume(0)
 
-    def batches(self, blocks: Sequence[Block], clock: StreamClock) -> list[TactileSignal]:
+    def batches(self, blocks: Sequence[StreamBlock], clock: StreamClock) -> list[TactileSignal]:
         """Return the batches that consecutive blocks make: a new one wherever samples are missing."""
         if self._due_ns is not None:
             missing_ns = clock.time_ns(blocks[0].time_us) - self._due_ns

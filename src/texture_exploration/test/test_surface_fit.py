@@ -4,7 +4,7 @@ import pytest
 from texture_core.errors import InvalidData
 from texture_core.rotation import rotation_matrix
 from texture_exploration.arms.surface_frame import SurfaceFrame
-from texture_exploration.surface_fit import Touches, fit_surface
+from texture_exploration.surface_fit import SurfaceTouches, fit_surface
 
 UP, AHEAD = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 CORNERS = [(0.3, 0.0, 0.1), (0.4, 0.0, 0.1), (0.35, 0.08, 0.1)]
@@ -51,7 +51,7 @@ def test_a_wall_needs_its_pose_first():
 
 
 def test_touches_count_up_and_a_refused_one_is_not_kept():
-    touches = Touches()
+    touches = SurfaceTouches()
     assert touches.add(CORNERS[0], UP, AHEAD) is None
     assert touches.add(CORNERS[1], UP, AHEAD) is None
     with pytest.raises(InvalidData):

@@ -30,7 +30,7 @@ from texture_exploration.motions.catalogue import MOTIONS
 from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
-from texture_exploration.surface_fit import TOUCHES, Touches
+from texture_exploration.surface_fit import TOUCHES, SurfaceTouches
 
 PERIOD_S = 0.01
 CLOSING_S = 10.0  # longer than any motion needs to lift
@@ -75,7 +75,7 @@ class Explorer:
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._closed = self._released = False
-        self._touches = Touches()
+        self._touches = SurfaceTouches()
 
     def connect(self) -> Vector:
         """Reach the arm, or reach it again after a fault; return where explorations begin.

@@ -87,7 +87,7 @@ def fit_surface(
     return SurfaceFit(pose, float(np.sqrt(np.mean(distances**2))), largest_m)
 
 
-class Touches:
+class SurfaceTouches:
     """Collects touches until they make a plane; further ones refine it."""
 
     def __init__(self) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from texture_drivers.tsf85.batch_cutter import SIGNAL
 from texture_drivers.tsf85.finger_stream import FingerStream
-from texture_drivers.tsf85.protocol import PacketParser
+from texture_drivers.tsf85.protocol import Tsf85Parser
 from texture_drivers.tsf85.sample_frames import SampleFrameSplitter
 from texture_simulation.devices.tsf85_encoder import Tsf85Encoder
 
@@ -49,7 +49,7 @@ def test_both_fingers_may_sense() -> None:
 def test_without_stamps_the_index_jumps_over_lost_packets_and_the_times_are_right_again() -> None:
     encoder, parser, splitter, finger = (
         Tsf85Encoder(stamped=False),
-        PacketParser(),
+        Tsf85Parser(),
         SampleFrameSplitter(0),
         FingerStream(),
     )

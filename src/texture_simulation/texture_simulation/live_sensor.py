@@ -16,7 +16,7 @@ from texture_simulation.trajectory import Trajectory
 LONGEST_BURST_S = 0.25
 
 
-class Contact(Protocol):
+class SurfaceContact(Protocol):
     """Where a finger, or several, touch a surface."""
 
     @property
@@ -34,7 +34,7 @@ class ContactModel(Protocol):
     """What a sensor model lets the emulator change."""
 
     @property
-    def touch(self) -> Contact:
+    def touch(self) -> SurfaceContact:
         """Where it touches."""
 
 

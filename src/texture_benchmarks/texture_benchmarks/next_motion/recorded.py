@@ -32,7 +32,7 @@ PARTS = ('trained on', 'tested')
 
 
 @dataclass(frozen=True)
-class Protocol:
+class TouchSplit:
     """How a slide is cut into touches, and which of them are trained on.
 
     Parameters
@@ -71,17 +71,17 @@ class Protocol:
 
 LEAST_SAMPLES = 16
 # A slide is 52 to 60 mm long; one at 0.1 m/s lasts 0.6 s. Each texture has one slide with each motion.
-PROTOCOLS: Mapping[str, Protocol] = {
-    SHOWN: Protocol(touch_m=0.006),
-    'touches of 12 mm, every other one trained on': Protocol(touch_m=0.012),
-    'touches of 0.15 s, every other one trained on': Protocol(touch_s=0.15),
-    'touches of 12 mm, the first half trained on': Protocol(touch_m=0.012, alternate=False),
-    'touches of 0.15 s, the first half trained on': Protocol(touch_s=0.15, alternate=False),
+PROTOCOLS: Mapping[str, TouchSplit] = {
+    SHOWN: TouchSplit(touch_m=0.006),
+    'touches of 12 mm, every other one trained on': TouchSplit(touch_m=0.012),
+    'touches of 0.15 s, every other one trained on': TouchSplit(touch_s=0.15),
+    'touches of 12 mm, the first half trained on': TouchSplit(touch_m=0.012, alternate=False),
+    'touches of 0.15 s, the first half trained on': TouchSplit(touch_s=0.15, alternate=False),
 }
 
 
 @dataclass(frozen=True, eq=False)
-class Touches:
+class RecordedTouches:
     """Features of the touches of all slides, in two parts.
 
     Parameters
@@ -97,7 +97,7 @@ class Touches:
     parts: Sequence[Mapping[tuple[SlideMotion, str], Array]]
 
     @classmethod
-    def of(cls, slides: Sequence[SlideSamples], protocol: Protocol) -> Touches:
+    def of(cls, slides: Sequence[SlideSamples], protocol: TouchSplit) -> RecordedTouches:
         """Cut each slide into touches, and describe them by the mean over the taxels.
 
         Parameters
@@ -183,7 +183,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         slides = SlideDataset.from_bags(bags[:QUICK_TEXTURES] if options.quick else bags).samples('signal')
     protocols = {SHOWN: PROTOCOLS[SHOWN]} if options.quick else PROTOCOLS
     seeds = [[options.seed, number] for number in range(1 if options.quick else SEEDS)]
-    found = {name: _find(Touches.of(slides, protocol), seeds) for name, protocol in protocols.items()}
+    found = {name: _find(RecordedTouches.of(slides, protocol), seeds) for name, protocol in protocols.items()}
     path = options.out / 'next_motion_recorded.png'
     return BenchmarkResult(
         name='next_motion_recorded',
@@ -203,13 +203,13 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def _find(touches: Touches, seeds: Sequence[Sequence[int]]) -> Found:
+def _find(touches: RecordedTouches, seeds: Sequence[Sequence[int]]) -> Found:
     draws = [_trials(touches, trained, seed) for seed in seeds for trained in range(len(PARTS))]
     right = {name: np.stack([shares[name] for shares, _ in draws]) for name in WAYS}
     return Found(right, float(np.mean([best for _, best in draws])))
 
 
-def _trials(touches: Touches, trained: int, seed: Sequence[int]) -> tuple[dict[str, Array], float]:
+def _trials(touches: RecordedTouches, trained: int, seed: Sequence[int]) -> tuple[dict[str, Array], float]:
     """Return the share right after each touch by the way to choose, and that of the best fixed order of two."""
     rng, known = np.random.default_rng([*seed, trained]), touches.training(trained)
     values = touches.drawn(1 - trained, TRIALS, rng)
@@ -223,7 +223,7 @@ def _trials(touches: Touches, trained: int, seed: Sequence[int]) -> tuple[dict[s
     return by_way, _best_of_two(touches, known, values)
 
 
-def _best_of_two(touches: Touches, known: NextTouchModel, values: Array) -> float:
+def _best_of_two(touches: RecordedTouches, known: NextTouchModel, values: Array) -> float:
     """Return the share right of the best order of two motions, chosen with hindsight."""
     truth = np.repeat([known.textures.index(texture) for texture in touches.textures], TRIALS)
     likelihoods = [

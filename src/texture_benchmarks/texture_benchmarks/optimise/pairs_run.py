@@ -13,7 +13,7 @@ import numpy as np
 from texture_benchmarks.optimise.pairs_seeds import counts, over_seeds
 from texture_benchmarks.papers import ets_circular, ets_fine, ets_linear
 from texture_benchmarks.papers.interval import share
-from texture_benchmarks.papers.protocol import Mask, Protocol, RecognitionTask
+from texture_benchmarks.papers.protocol import Mask, PaperProtocol, RecognitionTask
 from texture_benchmarks.papers.simulated_trials import gather
 from texture_benchmarks.papers.trial import reduced
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
@@ -44,7 +44,7 @@ SEEDS, QUICK_SEEDS = 5, 2
 class PairCase:
     """Searches of one experiment: its protocol and task, the recipe, what is varied, and the size of the search."""
 
-    protocol: Protocol
+    protocol: PaperProtocol
     task: RecognitionTask
     recipe: str
     space: str

@@ -21,7 +21,7 @@ LINE = 4.6  # least distance of two names, in percent of the slides
 
 
 @dataclass(frozen=True)
-class Method:
+class AccuracyCurve:
     """How often a method is right over time.
 
     Parameters
@@ -43,7 +43,7 @@ class Method:
     ends: tuple[float, float] | None = None
 
 
-def overview_chart(methods: Sequence[Method], path: str | Path) -> Path:
+def overview_chart(methods: Sequence[AccuracyCurve], path: str | Path) -> Path:
     """Draw all methods, each named at the left end of its line.
 
     Parameters

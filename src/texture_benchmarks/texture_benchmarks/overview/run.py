@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from texture_benchmarks.overview.chart import OURS, PAPERS, PEERS, Method, overview_chart
+from texture_benchmarks.overview.chart import OURS, PAPERS, PEERS, AccuracyCurve, overview_chart
 from texture_benchmarks.recipes.run import DATA, LATER, VIBRATION
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData
@@ -51,7 +51,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def methods_of(stored: Mapping[str, Mapping[str, Any]]) -> list[Method]:
+def methods_of(stored: Mapping[str, Mapping[str, Any]]) -> list[AccuracyCurve]:
     """Return what is drawn, from the stored figures of each benchmark; those of the peers may be missing.
 
     Parameters
@@ -65,14 +65,17 @@ def methods_of(stored: Mapping[str, Mapping[str, Any]]) -> list[Method]:
     whole = stored['trust'][ALL_CHANNELS]
     at_s = whole['accuracy_at_s']
     ends = (whole['early']['mean_s'], whole['early']['accuracy'])
-    return [*methods, Method(f'{ALL_CHANNELS}\n(all channels)', OURS, [*map(float, at_s)], [*at_s.values()], ends)]
+    return [
+        *methods,
+        AccuracyCurve(f'{ALL_CHANNELS}\n(all channels)', OURS, [*map(float, at_s)], [*at_s.values()], ends),
+    ]
 
 
-def _of_cell(title: str, kind: str, cell: Mapping[str, Any]) -> Method:
+def _of_cell(title: str, kind: str, cell: Mapping[str, Any]) -> AccuracyCurve:
     """Return what a cell of a table holds: all decisions, or those after some times where an older run has no more."""
     computing_s = 1e-6 * cell['latency_us']['median']
     found = cell.get('decisions') or _after_some_times(cell['accuracy_at_s'])
-    return Method(title, kind, [seconds + computing_s for seconds in found['s']], found['share'])
+    return AccuracyCurve(title, kind, [seconds + computing_s for seconds in found['s']], found['share'])
 
 
 def _after_some_times(accuracy_at_s: Mapping[str, float | None]) -> dict[str, list[float]]:

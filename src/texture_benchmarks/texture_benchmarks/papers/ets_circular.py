@@ -16,7 +16,7 @@ from texture_benchmarks.papers.protocol import (
     Finding,
     Method,
     MethodResults,
-    Protocol,
+    PaperProtocol,
     RecognitionTask,
     Visits,
     halves,
@@ -77,7 +77,7 @@ def _visits(radius_m: float) -> tuple[Visits, ...]:
     )
 
 
-PROTOCOL = Protocol(
+PROTOCOL = PaperProtocol(
     name='ets-circular',
     scene='ets_circular',
     paper='Roberge et al., "Textures recognition through tactile exploration", sections IV.A and IV.B.2',

@@ -13,7 +13,7 @@ from texture_benchmarks.papers.protocol import (
     Finding,
     Method,
     MethodResults,
-    Protocol,
+    PaperProtocol,
     RecognitionTask,
     Visits,
     halves,
@@ -46,7 +46,7 @@ def findings(outcomes: MethodResults) -> list[Finding]:
     ]
 
 
-PROTOCOL = Protocol(
+PROTOCOL = PaperProtocol(
     name='ets-fine',
     scene='ets_fine',
     paper='Roberge et al., "Textures recognition through tactile exploration", section V',

@@ -14,7 +14,7 @@ from texture_benchmarks.papers.protocol import (
     Finding,
     Method,
     MethodResults,
-    Protocol,
+    PaperProtocol,
     RecognitionTask,
     Visits,
     halves,
@@ -77,7 +77,7 @@ def findings(outcomes: MethodResults) -> list[Finding]:
     ]
 
 
-PROTOCOL = Protocol(
+PROTOCOL = PaperProtocol(
     name='ets-linear',
     scene='ets_linear',
     paper='Roberge et al., "Textures recognition through tactile exploration", sections IV.A and IV.B.1',

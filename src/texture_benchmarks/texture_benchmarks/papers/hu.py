@@ -14,7 +14,7 @@ from texture_benchmarks.papers.protocol import (
     Finding,
     Method,
     MethodResults,
-    Protocol,
+    PaperProtocol,
     RecognitionTask,
     View,
     Visits,
@@ -45,7 +45,7 @@ def findings(outcomes: MethodResults) -> list[Finding]:
     ]
 
 
-PROTOCOL = Protocol(
+PROTOCOL = PaperProtocol(
     name='hu',
     scene='hu',
     paper='Hu et al. 2014, "A finger-shaped tactile sensor for fabric surfaces evaluation", section 5',

@@ -12,7 +12,7 @@ from texture_benchmarks.papers.protocol import (
     Finding,
     Method,
     MethodResults,
-    Protocol,
+    PaperProtocol,
     RecognitionTask,
     Visits,
     folds,
@@ -90,7 +90,7 @@ def findings(outcomes: MethodResults) -> list[Finding]:
     ]  # fmt: skip
 
 
-PROTOCOL = Protocol(
+PROTOCOL = PaperProtocol(
     name='jamali',
     scene='jamali',
     paper='Jamali & Sammut 2010, "Material classification by tactile sensing using surface textures", section VI',

@@ -14,7 +14,7 @@ from texture_benchmarks.papers.protocol import (
     Finding,
     Method,
     MethodResults,
-    Protocol,
+    PaperProtocol,
     RecognitionTask,
     Table,
     View,
@@ -130,7 +130,7 @@ def _methods(svm: float, em: float, table: Table | None) -> tuple[Method, ...]:
     )
 
 
-PROTOCOL = Protocol(
+PROTOCOL = PaperProtocol(
     name='kaboli',
     scene='kaboli',
     paper='Kaboli et al. 2015, "In-hand object recognition via texture properties", section V',

@@ -9,7 +9,7 @@ from texture_benchmarks.papers.protocol import (
     Finding,
     Method,
     MethodResults,
-    Protocol,
+    PaperProtocol,
     RecognitionTask,
     Visits,
     training_in,
@@ -49,7 +49,7 @@ def findings(outcomes: MethodResults) -> list[Finding]:
     ]
 
 
-PROTOCOL = Protocol(
+PROTOCOL = PaperProtocol(
     name='kaboli-shapes',
     scene='kaboli_shapes',
     paper='Kaboli et al. 2015, "In-hand object recognition via texture properties", section VI',

@@ -209,7 +209,7 @@ class Anchor:
 
 
 @dataclass(frozen=True)
-class Protocol:
+class PaperProtocol:
     """A paper's experiment.
 
     Parameters

@@ -13,7 +13,7 @@ from texture_benchmarks.papers.experiment import Experiment, ExperimentResult
 from texture_benchmarks.papers.interval import share
 from texture_benchmarks.papers.method_result import MethodResult
 from texture_benchmarks.papers.paper_charts import accuracy_chart, confusions_chart
-from texture_benchmarks.papers.protocol import Finding, Method, MethodResults, Protocol, RecognitionTask, Table
+from texture_benchmarks.papers.protocol import Finding, Method, MethodResults, PaperProtocol, RecognitionTask, Table
 from texture_benchmarks.papers.recipe_digest import digest_of
 from texture_benchmarks.papers.trial import NONE, TunedRecipes, outcomes, searched, without_ours
 from texture_core.arrays import AnyArray
@@ -24,7 +24,7 @@ SEARCHED = '; recipes that were searched for: the first alone, whose slides for 
 VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
 
 
-def run(protocol: Protocol, experiment: Experiment) -> ExperimentResult:
+def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
     """Rebuild a paper's experiment on simulated surfaces."""
     scene = load_scene(protocol.scene)
     protocol = without_ours(protocol) if experiment.papers_only else protocol
@@ -64,7 +64,7 @@ def _slides(outcome: MethodResult) -> int:
     return len(outcome.codes) // len(outcome.surfaces)
 
 
-def _difficulty(protocol: Protocol, found: MethodResults) -> dict[str, Any]:
+def _difficulty(protocol: PaperProtocol, found: MethodResults) -> dict[str, Any]:
     anchor = protocol.anchor
     outcome = found.get((anchor.task, anchor.method)) if not anchor.experiment else None
     parts = {
@@ -129,7 +129,7 @@ def finding_as_json(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _charts(protocol: Protocol, found: MethodResults, name: str, out: Path) -> tuple[Path, ...]:
+def _charts(protocol: PaperProtocol, found: MethodResults, name: str, out: Path) -> tuple[Path, ...]:
     stem = f'experiment_{name.replace("-", "_")}'
     panels = {
         task.name: {m.name: (m.paper.test, found[task.name, m.name].test) for m in task.methods}
@@ -154,7 +154,7 @@ def _charts(protocol: Protocol, found: MethodResults, name: str, out: Path) -> t
     return tuple(charts)
 
 
-def _lines(protocol: Protocol, found: MethodResults, checked: Sequence[Finding]) -> Iterator[str]:
+def _lines(protocol: PaperProtocol, found: MethodResults, checked: Sequence[Finding]) -> Iterator[str]:
     yield (
         f'{"%":38}{"paper: learning":>16}{"test":>7}{"unclassified":>14}   '
         f'{"simulated: learning":>20}{"test":>22}{"unclassified":>14}'

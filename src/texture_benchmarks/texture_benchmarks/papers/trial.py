@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.papers.method_result import MethodResult
-from texture_benchmarks.papers.protocol import Mask, Method, MethodResults, Protocol, RecognitionTask
+from texture_benchmarks.papers.protocol import Mask, Method, MethodResults, PaperProtocol, RecognitionTask
 from texture_benchmarks.papers.simulated_trials import Slides, gather
 from texture_benchmarks.papers.tuning import TunedRecipe, tune
 from texture_core.arrays import Array
@@ -32,7 +32,7 @@ NONE: TunedRecipes = {}
 
 
 def outcomes(
-    protocol: Protocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE, splits: int = 0
+    protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE, splits: int = 0
 ) -> MethodResults:
     """Return what comes out of each method in each task.
 
@@ -63,7 +63,7 @@ def outcomes(
     }
 
 
-def without_ours(protocol: Protocol) -> Protocol:
+def without_ours(protocol: PaperProtocol) -> PaperProtocol:
     """Return the protocol with the methods of the paper and their variations alone."""
     tasks = [
         replace(task, methods=tuple(method for method in task.methods if method.recipe not in OUR_RECIPES))
@@ -73,7 +73,7 @@ def without_ours(protocol: Protocol) -> Protocol:
 
 
 def of_task(
-    protocol: Protocol,
+    protocol: PaperProtocol,
     task: RecognitionTask,
     scene: Scene,
     seed: int,
@@ -117,7 +117,7 @@ def of_task(
         yield method.name, evaluate_method(recipe, slides, trained_on[:most], method.views, singly=method.singly)
 
 
-def searched(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> TunedRecipes:
+def searched(protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool) -> TunedRecipes:
     """Return the recipes for which the paper has a genetic search, found on what the first split is trained on.
 
     Parameters
@@ -159,7 +159,7 @@ def searched(protocol: Protocol, scene: Scene, seed: int, *, quick: bool) -> Tun
 
 
 def _measured(
-    protocol: Protocol, task: RecognitionTask, scene: Scene, seed: int, *, quick: bool
+    protocol: PaperProtocol, task: RecognitionTask, scene: Scene, seed: int, *, quick: bool
 ) -> tuple[Slides, Mask]:
     """Return the slides of a task, and which of them each split is trained on."""
     task = reduced(task, protocol.quick_count) if quick else task

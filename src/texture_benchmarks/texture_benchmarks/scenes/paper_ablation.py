@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from texture_benchmarks.papers import ets_linear, jamali
-from texture_benchmarks.papers.protocol import Protocol, folds, halves
+from texture_benchmarks.papers.protocol import PaperProtocol, folds, halves
 from texture_benchmarks.papers.trial import of_task
 from texture_benchmarks.scenes.touch_protocols import TOUCH_PROTOCOLS, completed, variants
 from texture_benchmarks.scenes.trial import Ablation, difference
@@ -19,7 +19,7 @@ from texture_simulation.scene import Scene, load_scene
 class Paper:
     """A paper's experiment, its slides divided less often than there, and the method by which its scene was set."""
 
-    protocol: Protocol
+    protocol: PaperProtocol
     method: str
 
 

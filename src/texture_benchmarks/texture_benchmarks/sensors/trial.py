@@ -14,7 +14,7 @@ from texture_core.catalogue import find
 from texture_core.framing import Frame, FrameDecoder
 from texture_drivers.anyskin.protocol import FrameParser
 from texture_drivers.papillarray import protocol as papillarray
-from texture_drivers.tsf85.protocol import Packet, PacketParser
+from texture_drivers.tsf85.protocol import Packet, Tsf85Parser
 from texture_simulation.devices import anyskin, daq, pvdf
 from texture_simulation.devices.biotac_encoder import encode_replies, reply_frame
 from texture_simulation.devices.faults import ByteFaults
@@ -65,7 +65,7 @@ class Tsf85Receiver:
     """The TSF-85's parser."""
 
     def __init__(self) -> None:
-        self._parser = PacketParser()
+        self._parser = Tsf85Parser()
 
     def feed(self, data: bytes) -> list[Packet]:
         """Return packets."""
@@ -113,7 +113,7 @@ class PapillArrayReceiver:
     """The PapillArray's parser, and the check of what its packets hold."""
 
     def __init__(self) -> None:
-        self._parser = papillarray.PacketParser()
+        self._parser = papillarray.PapillArrayParser()
         self._malformed = 0
 
     def feed(self, data: bytes) -> list[bytes]:

@@ -60,7 +60,7 @@ def _other_finger(
 
 
 @dataclass(frozen=True)
-class Row:
+class DisturbanceSweep:
     """One disturbance at several strengths.
 
     Parameters
@@ -94,18 +94,24 @@ class Row:
         return f'{100.0 * strength if self.percent else strength:g}'
 
 
-ROWS: Mapping[str, Row] = {
-    'gain': Row(_of_vibration('lower gain'), (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0), 'gain × {:g}'),
-    'white noise': Row(_shared('white noise'), (0.003, 0.01, 0.03, 0.1), 'white noise {:g} % of the rms', percent=True),
-    'speed': Row(_shared('slower than trained'), (0.4, 0.7, 0.9, 0.95, 1.05, 1.1, 1.4, 2.0), 'speed × {:g}'),
-    'another finger': Row(_other_finger, (1.0, 2.0, 4.0), 'another finger, {:g} dB'),
-    'wear': Row(_of_vibration('wear'), (800.0, 300.0), 'low-pass {:g} Hz'),
-    'offset drift': Row(_shared('offset drift'), (0.1, 1.0, 10.0), 'drift {:g} rms/s'),
-    'lost samples': Row(_of_vibration('lost samples'), (0.001, 0.005, 0.01), 'lost samples {:g} %', percent=True),
-    'hidden losses': Row(
+ROWS: Mapping[str, DisturbanceSweep] = {
+    'gain': DisturbanceSweep(_of_vibration('lower gain'), (0.5, 0.7, 0.8, 0.9, 1.1, 1.25, 1.4, 2.0), 'gain × {:g}'),
+    'white noise': DisturbanceSweep(
+        _shared('white noise'), (0.003, 0.01, 0.03, 0.1), 'white noise {:g} % of the rms', percent=True
+    ),
+    'speed': DisturbanceSweep(
+        _shared('slower than trained'), (0.4, 0.7, 0.9, 0.95, 1.05, 1.1, 1.4, 2.0), 'speed × {:g}'
+    ),
+    'another finger': DisturbanceSweep(_other_finger, (1.0, 2.0, 4.0), 'another finger, {:g} dB'),
+    'wear': DisturbanceSweep(_of_vibration('wear'), (800.0, 300.0), 'low-pass {:g} Hz'),
+    'offset drift': DisturbanceSweep(_shared('offset drift'), (0.1, 1.0, 10.0), 'drift {:g} rms/s'),
+    'lost samples': DisturbanceSweep(
+        _of_vibration('lost samples'), (0.001, 0.005, 0.01), 'lost samples {:g} %', percent=True
+    ),
+    'hidden losses': DisturbanceSweep(
         _of_vibration('losses hidden'), (0.003, 0.01, 0.03, 0.1), 'hidden losses {:g} %', percent=True
     ),
-    'clipped': Row(_of_vibration('clipping'), (3.0, 2.0, 1.0), 'clipped at {:g} rms'),
+    'clipped': DisturbanceSweep(_of_vibration('clipping'), (3.0, 2.0, 1.0), 'clipped at {:g} rms'),
 }
 
 
@@ -159,7 +165,7 @@ class Outcome:
         )
 
 
-def disturbed(item: LabelledSlide, row: Row, strength: float, rng: np.random.Generator) -> LabelledSlide:
+def disturbed(item: LabelledSlide, row: DisturbanceSweep, strength: float, rng: np.random.Generator) -> LabelledSlide:
     """Return a slide under a disturbance of this strength.
 
     Parameters
@@ -210,7 +216,7 @@ def evaluate_vectors(model: TextureModel, surface: str, vectors: Sequence[Featur
 
 
 def _changed(
-    item: LabelledSlide, topic: str, row: Row, strength: float, rng: np.random.Generator
+    item: LabelledSlide, topic: str, row: DisturbanceSweep, strength: float, rng: np.random.Generator
 ) -> list[TactileSignal]:
     batches = item.signals[topic]
     whole = at_rate(item, topic, batches[0].sampling_rate_hz).signals[topic]

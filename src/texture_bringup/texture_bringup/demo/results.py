@@ -16,7 +16,7 @@ from texture_recordings.bags import read_bag
 
 
 @dataclass(frozen=True)
-class Row:
+class RecognisedSlide:
     """One slide: what lay under the finger, and what was said of it."""
 
     surface: str
@@ -53,7 +53,7 @@ def latencies_s(bag: Path) -> Mapping[str, float]:
     return {name: statistics.median(values) for name, values in found.items()}
 
 
-def table(rows: Sequence[Row], latencies: Mapping[str, float]) -> list[str]:
+def table(rows: Sequence[RecognisedSlide], latencies: Mapping[str, float]) -> list[str]:
     """Return the lines of the table of results; latencies in s by exploration."""
     width = max(13, *(len(row.surface) for row in rows))
     lines = [f'{"surface":<{width}}  {"recognised as":<{width}}    confidence  sliding used  latency']

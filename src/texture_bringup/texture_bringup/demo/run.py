@@ -11,7 +11,7 @@ from pathlib import Path
 from texture_bringup.demo.picture import draw
 from texture_bringup.demo.plan import DemoPlan
 from texture_bringup.demo.progress_log import ProgressLog
-from texture_bringup.demo.results import Row, is_refused, latencies_s, table, untrained_figures
+from texture_bringup.demo.results import RecognisedSlide, is_refused, latencies_s, table, untrained_figures
 from texture_bringup.demo.rig import DemoRig
 from texture_core.errors import InvalidData
 from texture_core.estimates import TextureEstimate
@@ -136,7 +136,7 @@ def _train(places: Places, recipe: str, progress: ProgressLog) -> None:
         progress.line(line)
 
 
-def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> list[Row]:
+def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressLog) -> list[RecognisedSlide]:
     progress.section('Recognising: new slides at other places; each may end as soon as the classifier is certain')
     rows = []
     with rig.recording(places.recognition_bag):
@@ -144,7 +144,7 @@ def _recognise(rig: DemoRig, places: Places, plan: DemoPlan, progress: ProgressL
             progress.part(f'{surface:<18}', first=True)
             measured = rig.explore(surface, plan.requests(surface, plan.recognition_slides, early_stopping=True))
             for number, explored in enumerate(measured):
-                rows.append(Row(surface, explored.texture))
+                rows.append(RecognisedSlide(surface, explored.texture))
                 progress.part(f'{", " if number else "recognised as "}{explored.texture.label or "nothing"}')
             progress.part('', last=True)
     return rows
@@ -161,7 +161,7 @@ def _explore_untrained(rig: DemoRig, plan: DemoPlan, progress: ProgressLog) -> T
 
 
 def _report(
-    rows: list[Row], untrained: TextureEstimate, places: Places, plan: DemoPlan, progress: ProgressLog
+    rows: list[RecognisedSlide], untrained: TextureEstimate, places: Places, plan: DemoPlan, progress: ProgressLog
 ) -> EvaluationReport:
     progress.section('Result')
     latencies: Mapping[str, float] = latencies_s(places.recognition_bag)

@@ -17,7 +17,7 @@ Values = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
 
-class PacketParser:
+class PapillArrayParser:
     """Turn a byte stream into the contents of packets, whatever is lost or added on the way.
 
     The checksum is a sum: a byte 0 more or less does not change it. So a packet is believed only if the one before it,

@@ -17,7 +17,7 @@ from texture_drivers.channel_watch import Limits
 from texture_drivers.clock import PPM, SLOW_CLOCK, StreamClock
 from texture_drivers.packet_numbering import PacketNumbering
 from texture_drivers.papillarray import tables
-from texture_drivers.papillarray.protocol import Measurements, PacketLayout, PacketParser, Values, layout_of
+from texture_drivers.papillarray.protocol import Measurements, PacketLayout, PapillArrayParser, Values, layout_of
 from texture_drivers.params import SensorParams
 from texture_drivers.serial_sensor import SerialSensor
 from texture_drivers.settings import load_settings
@@ -91,7 +91,7 @@ class PapillArrayDecoder:
         self._device = device
         self._frame_id = frame_id
         self._rate_hz = float(settings.rate_hz)
-        self._parser = PacketParser()
+        self._parser = PapillArrayParser()
         self._layout: tuple[int, PacketLayout] | None = None  # length of the packets, and their layout
         self._clock = StreamClock(MICROSECONDS_PER_S)
         self._numbering = PacketNumbering(self._rate_hz)

@@ -18,7 +18,7 @@ FULL_SCALE = 2.0**15
 LONGEST_LATENCY_S = 1.0  # a time of conversion that lies further off is none: some drivers tell 0
 
 
-class Block(NamedTuple):
+class AudioBlock(NamedTuple):
     """What PortAudio delivered at once.
 
     Parameters
@@ -58,7 +58,7 @@ class Capture:
         self._rate_hz = rate_hz
         self._now_ns = now_ns
         self._overflowed = False
-        self._blocks: deque[Block] = deque()
+        self._blocks: deque[AudioBlock] = deque()
         self._most_blocks = round(tables.QUEUED_S * rate_hz / tables.BLOCK_FRAMES)
         with open_errors(device) as sounddevice:
             self._stream = sounddevice.InputStream(
@@ -71,7 +71,7 @@ class Capture:
             )
             self._stream.start()
 
-    def take(self) -> Sequence[Block]:
+    def take(self) -> Sequence[AudioBlock]:
         """Return the blocks that have come since the last call."""
         return [self._blocks.popleft() for _ in range(len(self._blocks))]
 
@@ -91,7 +91,7 @@ class Capture:
         latency_s = times.currentTime - times.inputBufferAdcTime - frames / self._rate_hz
         believed_s = latency_s if 0 <= latency_s < LONGEST_LATENCY_S else 0.0
         end_ns = self._now_ns() - round(believed_s * NANOSECONDS)
-        self._blocks.append(Block((samples / FULL_SCALE).astype(np.float32), end_ns, self._overflowed))
+        self._blocks.append(AudioBlock((samples / FULL_SCALE).astype(np.float32), end_ns, self._overflowed))
         self._overflowed = False
 
 

@@ -16,7 +16,7 @@ from texture_drivers.decimator import Decimator
 from texture_drivers.params import SensorParams
 from texture_drivers.settings import load_settings
 from texture_drivers.sound_card import tables
-from texture_drivers.sound_card.capture import Block, Capture
+from texture_drivers.sound_card.capture import AudioBlock, Capture
 
 SILENCE_S = 1.0
 
@@ -144,7 +144,7 @@ class SoundCard:
         full = abs(self._settings.gain) * (1 - 2.0**-15)
         return {tables.SIGNAL: (-full, full)}
 
-    def _place(self, block: Block) -> list[TactileSignal]:
+    def _place(self, block: AudioBlock) -> list[TactileSignal]:
         """Number, filter and decimate a block; nothing while the clock is not settled."""
         self._overflows += block.overflowed
         missing = self._missing(block) if block.overflowed else 0
@@ -171,7 +171,7 @@ class SoundCard:
             )
         ]
 
-    def _missing(self, block: Block) -> int:
+    def _missing(self, block: AudioBlock) -> int:
         """Return how many samples an overflow has cost: those by which the block is late."""
         if not self._numbering.clock.settled:
             return 0

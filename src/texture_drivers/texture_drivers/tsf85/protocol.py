@@ -24,7 +24,7 @@ class Packet(NamedTuple):
     items: tuple[Item, ...]
 
 
-class PacketParser:
+class Tsf85Parser:
     """Turn a byte stream into packets, whatever is lost or added on the way.
 
     The protocol has no checksum, so a packet is believed only if everything about it fits: a data command, known item

@@ -15,7 +15,7 @@ from texture_drivers.serial_port import SerialPort
 from texture_drivers.settings import load_settings
 from texture_drivers.tsf85 import tables
 from texture_drivers.tsf85.finger_stream import FingerStream
-from texture_drivers.tsf85.protocol import Packet, PacketParser, start_command, stop_command
+from texture_drivers.tsf85.protocol import Packet, Tsf85Parser, start_command, stop_command
 from texture_drivers.tsf85.sample_frames import SampleFrameSplitter
 from texture_drivers.tsf85.settings import Tsf85Settings
 
@@ -63,7 +63,7 @@ class Tsf85:
         self._now_ns = now_ns
         settings = load_settings(Tsf85Settings, params.config)
         self._port: SerialPort | None = None
-        self._parser = PacketParser(layout)
+        self._parser = Tsf85Parser(layout)
         self._prefixes = {finger: f'finger{finger}/' for finger in fingers} or {params.finger: ''}
         self._splitters = {finger: SampleFrameSplitter(finger, settings.kinds) for finger in self._prefixes}
         self._fingers = {

@@ -20,7 +20,7 @@ from texture_core.exploration import Phase
 from texture_core.files import Arrays, open_regular
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_recordings.bag_writer import BagWriter
-from texture_recordings.importers.biotac20_slide import FRAME_NS, SLIDE_FRAMES, BiotacSlide, SlideMotion
+from texture_recordings.importers.biotac20_slide import FRAME_NS, SLIDE_FRAMES, BiotacSlide, BiotacSlideMotion
 from texture_recordings.slides import parse_selection
 
 PAC_PER_FRAME = 22
@@ -132,7 +132,7 @@ def _write_slide(bag: BagWriter, recording: BiotacSlide, start_ns: int, indices:
     frames = recording.frames[: len(indices)]
     vibration = restore_sign(frames[:, PAC_COLUMNS].ravel()).astype(np.float32)[:, None]
     static = frames[:, STATIC_COLUMNS].astype(np.float32)
-    motion = SlideMotion.of(recording)
+    motion = BiotacSlideMotion.of(recording)
     stop_ns = start_ns + int(indices[-1] - indices[0] + 1) * FRAME_NS
     for count, part in enumerate(_batches(indices)):
         first = int(indices[part.start])

@@ -54,14 +54,14 @@ class BiotacSlide:
 
 
 @dataclass(frozen=True, eq=False)
-class SlideMotion:
+class BiotacSlideMotion:
     """Speed, direction and normal force over the time of one slide.
 
     Examples
     --------
     >>> velocity, wrench = np.array([[0.0, 0.0, 0.02, 0.0]]), np.zeros((1, 7))
     >>> slide = BiotacSlide('cork', '1', np.zeros((1, 44)), np.zeros(1), velocity, wrench, epoch=0.0)
-    >>> SlideMotion.of(slide).state(0, 0, 10).speed_m_s
+    >>> BiotacSlideMotion.of(slide).state(0, 0, 10).speed_m_s
     0.02
     """
 
@@ -70,7 +70,7 @@ class SlideMotion:
     wrench: AnyArray
 
     @classmethod
-    def of(cls, recording: BiotacSlide) -> SlideMotion:
+    def of(cls, recording: BiotacSlide) -> BiotacSlideMotion:
         """Return the motion of a slide, without what was not measured."""
         velocity = recording.velocity[np.isfinite(recording.velocity).all(axis=1)]
         wrench = recording.wrench[np.isfinite(recording.wrench).all(axis=1)]

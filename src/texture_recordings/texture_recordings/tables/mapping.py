@@ -24,7 +24,7 @@ CONDITION_UNITS: Mapping[str, Mapping[str, float]] = {
 
 
 @dataclass(frozen=True)
-class SlideConditions:
+class ConditionQuantities:
     """How the finger slid; what is not named is unknown."""
 
     speed: Quantity = field(default_factory=Quantity)
@@ -55,7 +55,7 @@ class TableMapping:
     (True, True, True)
     >>> mapping.streams['signal'] == StreamColumns(['ax'])
     True
-    >>> mapping.conditions == SlideConditions(speed=Quantity())  # unknown
+    >>> mapping.conditions == ConditionQuantities(speed=Quantity())  # unknown
     True
     """
 
@@ -67,7 +67,7 @@ class TableMapping:
     streams: Mapping[str, StreamColumns] = field(default_factory=dict)
     label: LabelColumn = field(default_factory=LabelColumn)
     slides: SlideBorders = field(default_factory=SlideBorders)
-    conditions: SlideConditions = field(default_factory=SlideConditions)
+    conditions: ConditionQuantities = field(default_factory=ConditionQuantities)
     session: str = param('', "Names the column or field by which slides go into bags; '' makes one bag a surface.")
     sensor: str = param('imported', 'Names the sensor in the bags.')
     motion: str = param('linear_slide', 'Names the motion in the bags.')
