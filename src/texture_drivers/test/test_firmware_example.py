@@ -1,4 +1,4 @@
-"""The C++ in docs/sensors/daq.md is what people will copy: it must make frames that the driver takes."""
+"""The C++ in docs/sensors/others.md is what people will copy: it must make frames that the driver takes."""
 
 import re
 import shutil
@@ -10,7 +10,7 @@ import pytest
 
 from texture_core.framing import FrameDecoder
 
-PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'sensors' / 'daq.md'
+PAGE = Path(__file__).resolve().parents[3] / 'docs' / 'sensors' / 'others.md'
 COMPILER = shutil.which('g++')
 # Reads rows of 8 samples and writes frames of 10 rows.
 MAIN = """
