@@ -1,9 +1,9 @@
 """Check the words of the project: `python tools/check_terms.py [FOLDER]` ends with 1 and names what is to be changed.
 
 Identifiers use the field's terms: a short list of words is banned as a part of any name in Python code. What users
-read, the descriptions of parameters and the comments of messages, services and actions, are whole sentences. The prose
-of the pages (README, CONTRIBUTING, docs/, README of each package) keeps to the same terms; code, links and names of
-files in it are left out.
+read, the descriptions of parameters and launch arguments and the comments of messages, services and actions, are whole
+sentences. The prose of the pages (README, CONTRIBUTING, docs/, README of each package) keeps to the same terms; code,
+links and names of files in it are left out.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from xml.etree import ElementTree
 
 ROOT = Path(__file__).parents[1]
 # What is banned, and what to write instead.
@@ -169,6 +170,14 @@ def check_interface(path: Path) -> Iterator[str]:
             yield f"{path}:{line}: the comment of '{field.group(2)}' is no sentence, {fault}"
 
 
+def check_launch(path: Path) -> Iterator[str]:
+    """Yield one sentence for each argument of a launch file without a whole sentence as its description."""
+    for argument in ElementTree.parse(path).getroot().findall('arg'):
+        text = argument.get('description', '')
+        if fault := sentence_fault(text):
+            yield f"{path}: the description of the argument '{argument.get('name')}' is no sentence, {fault}: {text}"
+
+
 def check_page(path: Path) -> Iterator[str]:
     """Yield one sentence for each banned word in the prose of a Markdown page."""
     text = path.read_text(encoding='utf-8')
@@ -191,6 +200,8 @@ def check(folder: Path) -> list[str]:
         found += check_python(path)
     for path in sorted(path for kind in ('msg', 'srv', 'action') for path in folder.rglob(f'*.{kind}')):
         found += check_interface(path)
+    for path in sorted(folder.rglob('*.launch.xml')):
+        found += check_launch(path)
     return found
 
 

@@ -9,6 +9,7 @@ from check_terms import (
     banned_words,
     check,
     check_interface,
+    check_launch,
     check_page,
     check_pages,
     check_python,
@@ -72,6 +73,15 @@ def test_each_field_of_a_message_needs_a_sentence_beside_it(tmp_path: Path) -> N
         '---\n'
     )
     assert [line.split("'")[1] for line in check_interface(path)] == ['force_n', 'units']
+
+
+def test_each_argument_of_a_launch_file_needs_a_sentence(tmp_path: Path) -> None:
+    path = tmp_path / 'arm.launch.xml'
+    path.write_text(
+        '<launch><arg name="ip" description="address of the arm"/><arg name="rate"/>'
+        '<arg name="out" description="Sets the folder of the bag."/></launch>'
+    )
+    assert [line.split("'")[1] for line in check_launch(path)] == ['ip', 'rate']
 
 
 def test_faults_of_a_tree_are_named_with_file_and_line(tmp_path: Path) -> None:
