@@ -7,11 +7,12 @@ from scipy.stats import binom
 from texture_core.features import FeatureVector
 from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator
-from texture_estimation.open_set.error_bound import ANY_ERROR_RATE, ErrorBound
+from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import load_recipe
 
 RECIPE = load_recipe('default')
 WORD = 'never certain'
+ANY_ERROR_RATE = ErrorBound(0, 1.0)  # allows any, so nothing has to be shown
 
 
 def estimates(model, examples):

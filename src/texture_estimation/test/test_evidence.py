@@ -9,7 +9,7 @@ from texture_estimation.classification.training import train
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.open_set.domain import Domain
-from texture_estimation.open_set.error_bound import ANY_ERROR_RATE
+from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search.fitness import decided_by_slide
 
@@ -34,7 +34,7 @@ def vectors(examples, label='felt', hop_s=0.1, slide=0, name='e1'):
 
 def unlimited(model):
     """Return the model as if its few held-out slides showed any confidence."""
-    return dataclasses.replace(model, error_bound=ANY_ERROR_RATE)
+    return dataclasses.replace(model, error_bound=ErrorBound(0, 1.0))
 
 
 def predict(model, stream):

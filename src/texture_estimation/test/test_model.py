@@ -11,6 +11,7 @@ from texture_core.slide_motion import SlideMotion
 from texture_estimation.classification.training import train
 from texture_estimation.model import load_model
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
+from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import load_recipe
 
 
@@ -132,3 +133,59 @@ def test_a_model_whose_motions_are_no_numbers_is_refused(part, model, tmp_path):
     broken = NextTouchModel.from_arrays({**parameters, **numbers})
     assert load_model(dataclasses.replace(model, next_touch_model=whole).save(tmp_path / 'whole')).next_touch_model
     refused(dataclasses.replace(model, next_touch_model=broken).save(tmp_path / 'broken'), 'not finite')
+
+
+ENTRY = {'slides': 12, 'max_error_rate': 0.02}
+
+
+def with_entry(saved, entry):
+    """Store another entry of the held-out slides in the card; None removes it."""
+    path = saved.with_suffix('.json')
+    card = {name: value for name, value in json.loads(path.read_text()).items() if name != 'error_bound'}
+    path.write_text(json.dumps(card if entry is None else {**card, 'error_bound': entry}))
+    return saved
+
+
+def test_a_model_of_an_earlier_version_without_its_held_out_slides_is_refused(saved):
+    refused(
+        with_entry(saved, None),
+        "no entry 'error_bound'; .* a whole number from 0 to 1000000, and max_error_rate, a number from 0 to 1; "
+        "train it again with 'texture train'",
+    )
+
+
+@pytest.mark.parametrize(
+    'entry',
+    [
+        3,
+        [12, 0.02],
+        'none',
+        {},
+        {'slides': 12},
+        {**ENTRY, 'more': 1},
+        {'slide': 12, 'max_error_rate': 0.02},
+        {**ENTRY, 'slides': -1},
+        {**ENTRY, 'slides': 12.5},
+        {**ENTRY, 'slides': '12'},
+        {**ENTRY, 'slides': True},
+        {**ENTRY, 'slides': None},
+        {**ENTRY, 'slides': 10**400},
+        {**ENTRY, 'max_error_rate': -0.1},
+        {**ENTRY, 'max_error_rate': 1.1},
+        {**ENTRY, 'max_error_rate': float('nan')},
+        {**ENTRY, 'max_error_rate': float('inf')},
+        {**ENTRY, 'max_error_rate': '0.02'},
+        {**ENTRY, 'max_error_rate': False},
+        {**ENTRY, 'max_error_rate': [0.02]},
+    ],
+    ids=lambda entry: repr(entry)[:60],
+)
+def test_held_out_slides_that_are_no_such_numbers_are_refused_in_one_sentence(saved, entry):
+    refused(with_entry(saved, entry), "error_bound.*, a number from 0 to 1; train it again with 'texture train'")
+
+
+@pytest.mark.parametrize('slides', [0, 12, 149])
+def test_the_held_out_slides_of_the_card_limit_the_loaded_model(saved, slides):
+    loaded = load_model(with_entry(saved, {'slides': slides, 'max_error_rate': 0.02}))
+    assert loaded.error_bound == ErrorBound(slides, 0.02)
+    assert loaded.error_bound.shown is (slides == 149)

@@ -24,7 +24,7 @@ from texture_estimation.learners.mlp_predictor import MlpPredictor
 from texture_estimation.log_probabilities import is_tied, log_softmax
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
 from texture_estimation.open_set.domain import Domain
-from texture_estimation.open_set.error_bound import ANY_ERROR_RATE, ErrorBound
+from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.open_set.novelty import NoveltyDetector, SlideNovelty, space_means
 from texture_estimation.open_set.prediction_sets import PredictionSets
 from texture_estimation.open_set.stopping_rule import StoppingRule
@@ -54,6 +54,8 @@ class TextureModel:
         Fitted parameters of the learner, as the file stores them.
     tempering_exponent
         Exponent of the effective window count in the evidence, 0 to 1.
+    error_bound
+        What the held-out slides can show; it limits the confidence, and early stopping.
     training
         Facts about the training, for the card.
     stopping_rule
@@ -72,8 +74,6 @@ class TextureModel:
         Predictor since slides were added; None if none were.
     domain
         Conditions under which the model was trained; outside them it decides nothing.
-    error_bound
-        What the held-out slides can show; it limits the confidence, and early stopping.
 
     Examples
     --------
@@ -97,6 +97,7 @@ class TextureModel:
     recipe: Recipe
     parameters: Mapping[str, Any]
     tempering_exponent: float
+    error_bound: ErrorBound
     training: Mapping[str, Any] = field(default_factory=dict)
     stopping_rule: StoppingRule = field(default_factory=StoppingRule)
     prediction_sets: PredictionSets = field(default_factory=PredictionSets)
@@ -106,7 +107,6 @@ class TextureModel:
     added_slides: tuple[AddedSlide, ...] = ()
     incremental_predictor: Predictor | None = None
     domain: Domain = field(default_factory=Domain)
-    error_bound: ErrorBound = ANY_ERROR_RATE
 
     @cached_property
     def predictor(self) -> Predictor:
@@ -344,6 +344,7 @@ def load_model(path: str | Path) -> TextureModel:
             recipe=recipe,
             parameters=parameters,
             tempering_exponent=float(card['tempering_exponent']),
+            error_bound=ErrorBound.from_card(card),
             training=dict(card['training']),
             stopping_rule=StoppingRule(**card['stopping_rule']),
             prediction_sets=PredictionSets(**{name: _tuples(value) for name, value in card['prediction_sets'].items()}),
@@ -351,7 +352,6 @@ def load_model(path: str | Path) -> TextureModel:
             next_touch_model=NextTouchModel.from_arrays(gaussians) if gaussians else None,
             examples=TrainingExamples.from_arrays(examples) if examples else None,
             domain=Domain.from_card(card.get('domain', {})),
-            error_bound=ErrorBound(**card['error_bound']) if 'error_bound' in card else ANY_ERROR_RATE,
         )
         model.validate()
     added_slides = read_added_slides(target, model.feature_set, model.names)

@@ -52,7 +52,7 @@ def usable(target: Path) -> Iterator[None]:
         yield
     except BROKEN as error:
         raise ModelMismatch(
-            f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again"
+            f"model '{target}' cannot be used: {type(error).__name__}: {error}; train it again with 'texture train'"
         ) from error
 
 

@@ -35,6 +35,7 @@ from texture_core.errors import InvalidData
 from texture_estimation.channels import with_channels
 from texture_estimation.classification.decision_fitting import DEFAULT_TEMPERING_EXPONENT
 from texture_estimation.model import TextureModel
+from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import Recipe, load_recipe
 from texture_features.labelled_features import LabelledFeatures
 from texture_recordings.slide_dataset import SlideDataset
@@ -151,6 +152,7 @@ def _try(case: _Case, quick: bool) -> _AblationResult:
         recipe=case.recipe,
         parameters=fitted.parameters,
         tempering_exponent=DEFAULT_TEMPERING_EXPONENT,
+        error_bound=ErrorBound(0, case.recipe.training.max_error_rate),  # no slide is held out: never certain
     )
     if fitted.held_out is None:
         raise InvalidData('slides for training are too short to hold any out; record longer ones')

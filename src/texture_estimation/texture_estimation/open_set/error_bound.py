@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import UnionType
+from typing import Any
 
 from texture_core.arrays import Array
+from texture_core.errors import InvalidData
+from texture_core.plain_data import safe_repr
 
 LEVEL = 0.05  # the error rate exceeds its upper bound in so many of all trainings
 PERCENT = 100.0
+ENTRY = 'error_bound'  # of a model card
+MAX_SLIDES = 1_000_000
+ALLOWED = f'slides, a whole number from 0 to {MAX_SLIDES}, and max_error_rate, a number from 0 to 1'
 
 
 @dataclass(frozen=True)
@@ -24,9 +32,14 @@ class ErrorBound:
     Parameters
     ----------
     slides
-        Number of held-out slides; 0 if nothing was held out.
+        Number of held-out slides, at most MAX_SLIDES; 0 if nothing was held out.
     max_error_rate
-        Allowed fraction of wrong decisions when slides are ended early.
+        Allowed fraction of wrong decisions when slides are ended early, 0 to 1.
+
+    Raises
+    ------
+    InvalidData
+        If a value has another type or is out of its range.
 
     Examples
     --------
@@ -37,6 +50,27 @@ class ErrorBound:
 
     slides: int
     max_error_rate: float
+
+    def __post_init__(self) -> None:
+        if not (_is_within(self.slides, int, MAX_SLIDES) and _is_within(self.max_error_rate, int | float, 1.0)):
+            slides, rate = safe_repr(self.slides), safe_repr(self.max_error_rate)
+            raise InvalidData(f'{ENTRY} has slides {slides:.40} and max_error_rate {rate:.40}; it needs {ALLOWED}')
+
+    @classmethod
+    def from_card(cls, card: Mapping[str, Any]) -> ErrorBound:
+        """Return the bound that a model card holds.
+
+        Raises
+        ------
+        InvalidData
+            If the card holds none, as cards of earlier versions, or if it has other keys or values.
+        """
+        if ENTRY not in card:
+            raise InvalidData(f"its card is of an earlier version and has no entry '{ENTRY}'; it needs {ALLOWED}")
+        values = card[ENTRY]
+        if not isinstance(values, Mapping) or set(values) != {'slides', 'max_error_rate'}:
+            raise InvalidData(f'{ENTRY} is {safe_repr(values):.80}; it needs {ALLOWED}')
+        return cls(**values)
 
     @property
     def highest_confidence(self) -> float:
@@ -89,4 +123,7 @@ class ErrorBound:
         return mixed
 
 
-ANY_ERROR_RATE = ErrorBound(slides=0, max_error_rate=1.0)  # claims nothing, so nothing has to be shown
+def _is_within(value: Any, kind: type | UnionType, largest: float) -> bool:
+    """Return whether a value is a number of this type from 0 to the largest one; a truth value is no number."""
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    return is_number and bool(0 <= value <= largest)
