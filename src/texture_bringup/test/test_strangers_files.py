@@ -50,12 +50,12 @@ from texture_estimation.model import load_model
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.grades import Grades, read_grades
 from texture_estimation.roughness.model import load_roughness_model
+from texture_estimation.roughness.ratings import read_ratings
 from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
 from texture_estimation.roughness.training import train_grades
 from texture_estimation.search.racing import HalfScores
 from texture_estimation.search.recipe_space import RecipeSpace
 from texture_estimation.search.score_cache import ScoreCache
-from texture_evaluation.ratings import read_ratings
 from texture_exploration.hands.profile import load_profile
 from texture_exploration.presets import load_preset
 from texture_features.feature_set import FeatureSet

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from texture_core.files import writing
+from texture_estimation.roughness.ratings import GRADES, Ratings
 from texture_evaluation.agreement import intraclass_correlation, krippendorff_alpha, one_against_rest
-from texture_evaluation.ratings import GRADES, Ratings
 
 TEXTURES_PER_GRADE = (4, 6)  # of the paper's 25; other numbers of textures in proportion
 PAPERS_TEXTURES = 25

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from texture_core.arrays import AnyArray
+from texture_estimation.roughness.ratings import GRADES, Ratings
 from texture_evaluation.charts import COLOURS, chart
-from texture_evaluation.ratings import GRADES, Ratings
 
 MIN_SHARE = 4 / 30  # the paper leaves out grades that got fewer than 4 of 30 votes
 MANY = 40  # more textures than this: small names

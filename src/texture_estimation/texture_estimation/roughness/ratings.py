@@ -14,8 +14,8 @@ import numpy as np
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.files import MB, read_text
+from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 
-SMOOTH, ROUGH = 1.0, 5.0
 GRADES = np.arange(1, 6)
 MAX_BYTES = 1 * MB
 MAX_CELLS = 1_000_000  # people × textures
@@ -35,6 +35,12 @@ class Ratings:
         1 to 5; NaN where a person did not grade a texture.
     note
         How the grades were made from what was read; '' if they stood there.
+
+    Examples
+    --------
+    >>> ratings = Ratings(('anna', 'ben'), ('silk', 'jute'), np.array([[1.0, 4.0], [2.0, 5.0]]))
+    >>> ratings.means.tolist(), ratings.votes[0].tolist()
+    ([1.5, 4.5], [1, 1, 0, 0, 0])
     """
 
     raters: tuple[str, ...]
@@ -80,16 +86,7 @@ def read_ratings(path: str | Path, scale: tuple[float, float] = (SMOOTH, ROUGH))
         raise InvalidData(
             f"'{path}' has {len(raters)} raters and {len(textures)} textures; their product may be {MAX_CELLS}"
         )
-    rater_at = {name: index for index, name in enumerate(raters)}
-    texture_at = {name: index for index, name in enumerate(textures)}
-    grades = np.full((len(raters), len(textures)), np.nan)
-    for line, row in rows:
-        at = rater_at[row['rater']], texture_at[row['texture']]
-        if not np.isnan(grades[at]):
-            raise InvalidData(
-                f"'{path}', line {line}: rater '{row['rater']}' graded '{row['texture']}' before; give one grade each"
-            )
-        grades[at] = _grade(row['grade'], scale, f"'{path}', line {line}")
+    grades = _grades(rows, raters, textures, scale, path)
     _check_filled(raters, textures, grades, path)
     low, high = scale
     note = '' if scale == (SMOOTH, ROUGH) else f'ratings from {low:g} to {high:g} were mapped linearly to 1 to 5'
@@ -117,6 +114,27 @@ def _read_rows(path: Path) -> list[tuple[int, Mapping[str, str]]]:
         if any(row[name] is None for name in COLUMNS) or not row['rater'] or not row['texture']:
             raise InvalidData(f"'{path}', line {line}: rater or texture is missing; write rater,texture,grade")
     return rows
+
+
+def _grades(
+    rows: Sequence[tuple[int, Mapping[str, str]]],
+    raters: Sequence[str],
+    textures: Sequence[str],
+    scale: tuple[float, float],
+    path: str | Path,
+) -> Array:
+    """Return the grades, (n_raters, n_textures), NaN where there is none."""
+    rater_at = {name: index for index, name in enumerate(raters)}
+    texture_at = {name: index for index, name in enumerate(textures)}
+    grades = np.full((len(raters), len(textures)), np.nan)
+    for line, row in rows:
+        at = rater_at[row['rater']], texture_at[row['texture']]
+        if not np.isnan(grades[at]):
+            raise InvalidData(
+                f"'{path}', line {line}: rater '{row['rater']}' graded '{row['texture']}' before; give one grade each"
+            )
+        grades[at] = _grade(row['grade'], scale, f"'{path}', line {line}")
+    return grades
 
 
 def _grade(text: str, scale: tuple[float, float], where: str) -> float:
