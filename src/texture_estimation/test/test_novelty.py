@@ -8,7 +8,9 @@ from texture_estimation.open_set.novelty import (
     EFFECTIVE_WINDOWS,
     FEATURES,
     HIDDEN,
+    LOG_ODDS,
     ONSET,
+    SCORES,
     NoveltyDetector,
     SlideNovelty,
     space_means,
@@ -88,9 +90,9 @@ def test_slides_that_are_all_the_same_are_at_no_distance_and_others_are_far():
     assert distance.score(np.full(3, 5.0), 1) > distance.score(np.eye(3)[1], 1) + scale
 
 
-def detector(held_out, rate=0.1, spaces=(FEATURES,)):
+def detector(held_out, rate=0.1, spaces=(FEATURES,), counted=SCORES):
     distance = ClassDistance.fit(*slide_means(np.zeros((3, FEATURE_COUNT)), np.random.default_rng(1)))
-    return NoveltyDetector.fit(dict.fromkeys(spaces, distance), held_out, rate)
+    return NoveltyDetector.fit(dict.fromkeys(spaces, distance), held_out, rate, counted)
 
 
 def test_about_as_many_new_slides_are_rejected_as_allowed():
@@ -107,6 +109,19 @@ def test_no_score_makes_up_for_another():
     assert fitted.novelty_score([20.0, 0.5, 0.5], 1.0) == fitted.novelty_score([20.0, -1e3, -1e3], 1.0)
     assert fitted.novelty_score([20.0, 0.5, 0.5], 1.0) > fitted.threshold(1.0)
     assert fitted.novelty_score([0.0, 0.0, 0.0], 1.0) == 0.0
+
+
+@pytest.mark.parametrize('effective_windows', [1.0, 2.4, 50.0])
+def test_a_score_that_is_left_out_changes_neither_the_novelty_score_nor_the_threshold(effective_windows):
+    rng = np.random.default_rng(0)
+    held_out = [rng.exponential(size=(500, 3)) for _ in EFFECTIVE_WINDOWS]
+    fitted = detector(held_out, counted=(FEATURES, LOG_ODDS))
+    alone = detector([scores[:, :2] for scores in held_out])
+    for agreement in (-1e3, 0.0, 1e3):
+        found = fitted.novelty_score([4.0, 3.0, agreement], effective_windows)
+        assert found == pytest.approx(alone.novelty_score([4.0, 3.0], effective_windows))
+    assert fitted.threshold(effective_windows) == pytest.approx(alone.threshold(effective_windows))
+    assert fitted.threshold(effective_windows) < detector(held_out).threshold(effective_windows)
 
 
 def test_an_exponential_tail_counts_its_negative_log_probability():

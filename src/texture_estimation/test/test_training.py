@@ -128,6 +128,28 @@ def test_unknown_surfaces_are_reported_only_if_asked_for(make_examples):
     assert not final_estimate(model, values + 50.0).known
 
 
+def test_only_the_named_scores_count_in_the_novelty_of_a_slide(make_examples):
+    examples = make_examples()
+    learner = load_recipe('default').learner
+    of_all, of_two = (
+        train(
+            dataclasses.replace(
+                RECIPE,
+                learner=dataclasses.replace(learner, epochs=1),
+                training=dataclasses.replace(RECIPE.training, false_rejection_rate=0.1, **more),
+            ),
+            examples,
+        ).novelty_detector
+        for more in ({}, {'novelty_scores': ['features', 'log_odds']})
+    )
+    assert (list(of_all.distances), list(of_two.distances)) == (['features', 'hidden', 'onset'], ['features'])
+    usual, without_agreement = of_two.medians[0].tolist(), of_two.medians[0].tolist()
+    without_agreement[-1] += 1.0
+    assert of_two.novelty_score(without_agreement, 1.0) == pytest.approx(of_two.novelty_score(usual, 1.0))
+    usual[1] += 1e3
+    assert of_two.novelty_score(usual, 1.0) > of_two.threshold(1.0)
+
+
 def test_a_slide_of_a_class_that_was_left_out_is_unknown_at_every_estimate(make_examples):
     labels = ('cork', 'felt', 'wood', 'slate', 'glass', 'paper')
     examples = make_examples(labels=labels, slides=12, features=8, seed=3)

@@ -14,6 +14,7 @@ from texture_estimation.classification.evidence_rules import EVIDENCE_RULES, Evi
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner, extras_of
 from texture_estimation.open_set.domain_margins import DomainMargins
+from texture_estimation.open_set.novelty import FEATURES, SCORES
 from texture_estimation.open_set.stopping_rule import NEVER
 from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature_set import FeatureSet
@@ -89,6 +90,13 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=0.5,
     )
+    novelty_scores: list[str] = param(  # noqa: RUF009 – it gives a field
+        list(SCORES),
+        'Names the scores that are summed to the novelty score: distances to training slides by the features, by the '
+        'hidden layer and by the features of the first windows, log-odds of the two best labels, agreement of the '
+        'windows; each one costs computing time.',
+        choices=SCORES,
+    )
     slowest_m_s: float = param(
         0.0,
         'Sets the lowest speed at which surfaces will be explored: further training windows show as little of a '
@@ -145,6 +153,10 @@ class DecisionParams(TrainingParams):
     )
 
     def __post_init__(self) -> None:
+        if FEATURES not in self.novelty_scores:
+            raise InvalidParameter(
+                f"training: novelty_scores is {self.novelty_scores}; add '{FEATURES}', which every learner has"
+            )
         if self.slowest_m_s > self.fastest_m_s or (self.fastest_m_s > 0.0 and not self.slowest_m_s):
             raise InvalidParameter(
                 f'training: slowest_m_s is {self.slowest_m_s:g} and fastest_m_s is {self.fastest_m_s:g}; '

@@ -143,6 +143,7 @@ def fit_open_set(
             recipe.evidence,
             decisions.false_rejection_rate,
             gain_range=recipe.augmentation.gain_range,
+            scores=decisions.novelty_scores,
         )
     if found is None:
         return _fit_stopping(slides, recipe.evidence, tempering_exponent, decisions.max_error_rate), None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -15,7 +15,14 @@ from texture_estimation.classification.evidence_rules import EvidenceRule, runni
 from texture_estimation.learners.folds import assign_folds
 from texture_estimation.learners.learner import Codes, Fitted, Learner, Predictor, hidden_layer
 from texture_estimation.open_set.class_distance import ClassDistance
-from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, NoveltyDetector, SlideNovelty, space_means
+from texture_estimation.open_set.novelty import (
+    EFFECTIVE_WINDOWS,
+    HIDDEN,
+    SCORES,
+    NoveltyDetector,
+    SlideNovelty,
+    space_means,
+)
 from texture_features.augmentation.augmented_features import NOISE
 from texture_features.augmentation.feature_copies import FeatureCopies
 from texture_features.features import slide_onset
@@ -101,6 +108,7 @@ def fit_novelty(
     false_rejection_rate: float,
     *,
     gain_range: float = 1.0,
+    scores: Collection[str] = SCORES,
 ) -> tuple[NoveltyDetector, Sequence[SlideTrace]] | None:
     """Return the detector, and the held-out slides and disturbed copies by which it was fitted.
 
@@ -121,6 +129,8 @@ def fit_novelty(
         Fraction of slides over known surfaces that may be rejected, above 0.
     gain_range
         Largest factor by which copies of the slides are amplified or attenuated.
+    scores
+        Names of the scores that count, of SCORES.
 
     Returns
     -------
@@ -147,7 +157,8 @@ def fit_novelty(
             [copy for copy in copies if copy.group not in held_out],
             predictor,
             overlap,
-            compared,
+            compared=compared,
+            scores=scores,
         )
         for slide in (slide for slide in (*slides, *disturbed) if slide.group in held_out):
             values = slide.values
@@ -163,11 +174,12 @@ def fit_novelty(
             followed = SlideTrace(slide.truth, means, effective_windows, np.zeros((0, 0)), slide.disturbance)
             traces.append(_with_scores(followed, values, evidence, predictor, distances))
     final = learner.predictor(fitted.parameters)
-    distances = _fit_distances(slides, copies, final if hidden_layer(final) else None, overlap, compared)
+    layered = final if hidden_layer(final) else None
+    distances = _fit_distances(slides, copies, layered, overlap, compared=compared, scores=scores)
     held_out_scores = [_scores_at(traces, level) for level in EFFECTIVE_WINDOWS]
     if min(map(len, held_out_scores)) < MIN_SLIDES:
         return None
-    return NoveltyDetector.fit(distances, held_out_scores, false_rejection_rate), traces
+    return NoveltyDetector.fit(distances, held_out_scores, false_rejection_rate, scores), traces
 
 
 def _folds(
@@ -213,18 +225,25 @@ def _copied_slides(copies: FeatureCopies, names: Any, classes: Codes) -> Iterato
 
 
 def _fit_distances(
-    slides: Sequence[_Slide], copies: Sequence[_Slide], predictor: Predictor | None, overlap: float, compared: Array
+    slides: Sequence[_Slide],
+    copies: Sequence[_Slide],
+    predictor: Predictor | None,
+    overlap: float,
+    *,
+    compared: Array,
+    scores: Collection[str],
 ) -> Mapping[str, ClassDistance]:
-    """Return the distances, with the metric of undisturbed slides and references among the copies, too.
+    """Return the distances that count, with the metric of undisturbed slides and references among the copies, too.
 
     `compared` is 0 for features that only say when a window was, which slides cut in another way have otherwise.
     """
-    hidden = hidden_layer(predictor) if predictor is not None else None
+    hidden = hidden_layer(predictor) if predictor is not None and HIDDEN in scores else None
     means, more = (
         [_space_means(slide.values, hidden, overlap, compared) for slide in those] for those in (slides, copies)
     )
     classes, more_classes = (np.array([slide.truth for slide in those]) for those in (slides, copies))
-    found = {space: ClassDistance.fit(np.stack([own[space] for own in means]), classes) for space in means[0]}
+    spaces = [space for space in means[0] if space in scores]
+    found = {space: ClassDistance.fit(np.stack([own[space] for own in means]), classes) for space in spaces}
     if not more:
         return found
     return {

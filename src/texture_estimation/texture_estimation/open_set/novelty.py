@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -21,10 +21,14 @@ EFFECTIVE_WINDOWS = (1.0, 1.5, 2.0, 3.0, 5.0)
 # first windows of slides are compared by themselves, as this shows soonest that something differs.
 FEATURES, HIDDEN, ONSET = 'features', 'hidden', 'onset'
 SPACES: Mapping[str, float] = {FEATURES: EFFECTIVE_WINDOWS[-1], HIDDEN: EFFECTIVE_WINDOWS[-1], ONSET: 1.5}
-OTHER_SCORES = 2  # negative log-odds of the best to the second label, negative fraction of windows that agree with it
+# Negative log-odds of the best to the second label, and the negative fraction of the windows that agree with the best.
+LOG_ODDS, AGREEMENT = 'log_odds', 'agreement'
+OTHER_SCORES = (LOG_ODDS, AGREEMENT)
+SCORES = (*SPACES, *OTHER_SCORES)
 TAIL_QUANTILE = 0.9
 MIN_SPREAD = 1e-6  # of a score, relative to its median: slides that are all the same
 LEAST_AGREEMENT_SPREAD = 0.1  # in most slides all windows may agree, which makes one that does not no novelty
+UNCOUNTED_SPREAD = 1e30  # of a score that is left out: its tail is zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +72,11 @@ class NoveltyDetector:
 
     @classmethod
     def fit(
-        cls, distances: Mapping[str, ClassDistance], held_out: Sequence[Array], false_rejection_rate: float
+        cls,
+        distances: Mapping[str, ClassDistance],
+        held_out: Sequence[Array],
+        false_rejection_rate: float,
+        counted: Collection[str] = SCORES,
     ) -> NoveltyDetector:
         """Fit tails and thresholds.
 
@@ -81,6 +89,8 @@ class NoveltyDetector:
         false_rejection_rate
             Fraction of the slides over known surfaces that may be taken for unknown: of new slides like those held out,
             no more are, on average. With too few slides for the fraction, none of those held out is.
+        counted
+            Which of OTHER_SCORES count; of the spaces, those in `distances` do.
 
         Returns
         -------
@@ -90,8 +100,9 @@ class NoveltyDetector:
         medians = np.stack([np.median(scores, axis=0) for scores in held_out])
         spreads = np.stack([np.quantile(scores, TAIL_QUANTILE, axis=0) for scores in held_out]) - medians
         spreads = np.maximum(spreads, MIN_SPREAD * (1.0 + np.abs(medians)))
-        if spreads.shape[1] == len(distances) + OTHER_SCORES:
+        if spreads.shape[1] == len(distances) + len(OTHER_SCORES):
             spreads[:, -1] = np.maximum(spreads[:, -1], LEAST_AGREEMENT_SPREAD)
+            spreads[:, len(distances) :][:, [name not in counted for name in OTHER_SCORES]] = UNCOUNTED_SPREAD
         tails = [
             np.maximum(scores - median, 0.0) / spread
             for scores, median, spread in zip(held_out, medians, spreads, strict=True)
@@ -260,7 +271,7 @@ class SlideNovelty:
             self._found[space].clear()
 
     def scores(self, label: int, log_odds: float) -> list[float]:
-        """Return the scores for a label: distances, then what `OTHER_SCORES` counts; larger ones are rarer.
+        """Return the scores for a label: distances, then `OTHER_SCORES`; larger ones are rarer.
 
         Parameters
         ----------
