@@ -83,14 +83,12 @@ def in_processes(names: Sequence[str], act: Act, at_once: int) -> dict[str, int]
     dict
         Exit code of each name.
     """
-    context = multiprocessing.get_context('fork')  # nothing is imported again
     waiting, codes = list(names), {}
     running: dict[object, tuple[str, BaseProcess]] = {}
     while waiting or running:
         while waiting and len(running) < at_once:
             name = waiting.pop(0)
-            process = context.Process(target=_run, args=(name, act, at_once), name=name)
-            process.start()
+            process = _started(name, act, at_once)
             running[process.sentinel] = name, process
         for ended in wait([process.sentinel for _, process in running.values()]):
             name, done = running.pop(ended)
@@ -102,3 +100,11 @@ def in_processes(names: Sequence[str], act: Act, at_once: int) -> dict[str, int]
 def _run(name: str, act: Act, at_once: int) -> None:
     with single_blas_thread() if at_once > 1 else nullcontext():
         raise SystemExit(act(name))
+
+
+def _started(name: str, act: Act, at_once: int) -> BaseProcess:
+    """Start the act for one name in a process of its own."""
+    context = multiprocessing.get_context('fork')  # nothing is imported again
+    process = context.Process(target=_run, args=(name, act, at_once), name=name)
+    process.start()
+    return process

@@ -155,15 +155,17 @@ def from_mapping(cls: type[T], values: Mapping[str, Any], where: str = '') -> T:
     place = f'{where}: ' if where else ''
     if not isinstance(values, Mapping):
         raise InvalidParameter(f'{place}came {safe_repr(values)}; a mapping of parameter names to values is needed')
-    checked = {}
-    for name, value in values.items():
-        if name not in known:
-            raise InvalidParameter(f'{place}{unknown_name(str(name), known, "parameter")}')
-        try:
-            checked[name] = known[name].check(value)
-        except (InvalidParameter, UnknownName) as error:
-            raise InvalidParameter(f'{place}{error}') from error
-    return cls(**checked)
+    return cls(**{name: _checked(known, name, value, place) for name, value in values.items()})
+
+
+def _checked(known: Mapping[str, Parameter], name: str, value: Any, place: str) -> Any:
+    """Return the value that a parameter takes; InvalidParameter, with the place, if there is no such parameter."""
+    if name not in known:
+        raise InvalidParameter(f'{place}{unknown_name(str(name), known, "parameter")}')
+    try:
+        return known[name].check(value)
+    except (InvalidParameter, UnknownName) as error:
+        raise InvalidParameter(f'{place}{error}') from error
 
 
 def markdown_table(cls: type) -> str:

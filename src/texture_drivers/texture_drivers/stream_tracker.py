@@ -67,11 +67,15 @@ class StreamTracker:
             runs[-1][2].append(block.data)
         return [self._batch(index, clock.time_ns(time_us), b''.join(data)) for index, time_us, data in runs]
 
+    def _account(self, index: int, samples: int) -> None:
+        """Count samples that are published, and those that are missing before them."""
+        self.lost += 0 if self._published is None else index - self._published
+        self._published = index + samples
+        self.samples += samples
+
     def _batch(self, index: int, stamp_ns: int, data: bytes) -> TactileSignal:
         counts: NDArray[np.int16] = np.frombuffer(data, dtype=SAMPLE).reshape(-1, len(self.stream.channels))
-        self.lost += 0 if self._published is None else index - self._published
-        self._published = index + len(counts)
-        self.samples += len(counts)
+        self._account(index, len(counts))
         return TactileSignal(
             stamp_ns=stamp_ns,
             sensor=self.stream.sensor,

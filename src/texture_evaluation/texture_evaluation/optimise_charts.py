@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 
 from texture_estimation.search.generation import Generation
-from texture_evaluation.charts import COLOURS, chart, pareto_front
+from texture_evaluation.charts import COLOURS, chart, line_styles, pareto_front
 
 NAMED = 10  # lines of more searches than this are not named
 
@@ -29,15 +30,10 @@ def convergence_chart(searches: Mapping[str, Sequence[Generation]], title: str, 
     """
     with chart(path, (7.5, 4.2), title) as figure:
         axes = figure.subplots()
-        for number, (name, history) in enumerate(searches.items()):
-            axes.step(
-                [one.number for one in history],
-                [100 * one.best.fitness for one in history],
-                where='mid',
-                color=COLOURS[number % len(COLOURS)],
-                linestyle=('-', '--', ':')[number // len(COLOURS) % 3],
-                label=name if len(searches) <= NAMED else None,
-            )
+        for (name, history), style in zip(searches.items(), cycle(line_styles()), strict=False):
+            best = [100 * one.best.fitness for one in history]
+            label = name if len(searches) <= NAMED else None
+            axes.step([one.number for one in history], best, where='mid', label=label, **style)
         axes.set(xlabel='generation', ylabel='fitness of the best, as the search sees it (%)')
         if len(searches) <= NAMED:
             axes.legend(loc='lower right')

@@ -36,13 +36,10 @@ class Answers:
         given = np.isfinite(self.grades)
         errors = np.abs(self.grades - self.true)
         within = errors <= NORMAL_90 * self.stds
-        names = np.asarray(self.textures)
-        spreads = [float(self.grades[given & (names == name)].std()) for name in dict.fromkeys(self.textures)
-                   if (given & (names == name)).any()]  # fmt: skip
         return {
             'error': float(errors[given].mean()) if given.any() else None,
             'error_of_the_mean': self._error_of_the_mean(),
-            'std': float(np.mean(spreads)) if spreads else None,
+            'std': self._spread(),
             'without_grade': float(1.0 - given.mean()),
             # the paper writes 0 for no grade, and does not say whether it counts
             'error_none_as_0': float(np.where(given, errors, self.true).mean()),
@@ -67,6 +64,13 @@ class Answers:
         """Return the standard error of the mean error, a texture being one opinion however many windows it has."""
         means = list(self.error_by_texture().values())
         return float(np.std(means, ddof=1) / np.sqrt(len(means))) if len(means) > 1 else None
+
+    def _spread(self) -> float | None:
+        """Return the standard deviation of the grades within a texture, the mean over the textures with a grade."""
+        given, names = np.isfinite(self.grades), np.asarray(self.textures)
+        rows = [given & (names == name) for name in dict.fromkeys(self.textures)]
+        spreads = [float(self.grades[own].std()) for own in rows if own.any()]
+        return float(np.mean(spreads)) if spreads else None
 
     def error_by_texture(self) -> dict[str, float]:
         """Return the mean absolute error of each texture that got a grade."""

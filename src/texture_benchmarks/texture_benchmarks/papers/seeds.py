@@ -145,16 +145,11 @@ def mean_over_seeds(values: Sequence[float]) -> Interval:
 def lines(numbers: Mapping[str, Any]) -> Iterator[str]:
     """Yield the means over seeds as a table for people."""
     yield f'over {len(numbers["seeds"])} seeds: mean, and its interval of 95 %'
-    for task, methods in numbers.get('tasks', {}).items():
-        for method, figures in methods.items():
-            if 'over_seeds' in figures:
-                mean, low, high = (100 * value for value in figures['over_seeds'])
-                yield f'  {task}, {method}: {mean:.1f} % ({low:.1f} to {high:.1f})'
-    for regressor, parts in numbers.get('regressors', {}).items():
-        for part, figures in parts.items():
-            if 'over_seeds' in figures:
-                mean, low, high = figures['over_seeds']
-                yield f'  {regressor}, {part}: {mean:.2f} ({low:.2f} to {high:.2f}) grades'
+    for name, values in _over_seeds(numbers.get('tasks', {})):
+        mean, low, high = (100 * value for value in values)
+        yield f'  {name}: {mean:.1f} % ({low:.1f} to {high:.1f})'
+    for name, (mean, low, high) in _over_seeds(numbers.get('regressors', {})):
+        yield f'  {name}: {mean:.2f} ({low:.2f} to {high:.2f}) grades'
     for finding in numbers['findings']:
         if 'over_seeds' in finding:
             mean, low, high = finding['over_seeds']
@@ -165,3 +160,11 @@ def _add(figures: dict[str, Any], found: Sequence[float]) -> None:
     if len(found) > 1:
         figures['by_seed'] = list(found)
         figures['over_seeds'] = mean_over_seeds(found).as_json()
+
+
+def _over_seeds(groups: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Sequence[float]]]:
+    """Yield the name, and mean and interval over seeds, of each member of each group that has them."""
+    for group, members in groups.items():
+        for member, figures in members.items():
+            if 'over_seeds' in figures:
+                yield f'{group}, {member}', figures['over_seeds']

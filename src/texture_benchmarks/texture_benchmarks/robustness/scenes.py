@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -132,15 +133,12 @@ def simulate_slide_signals(
     stream = find(SENSORS, touch_conditions.scene.sensor, 'sensor model').fast
     each = max(1, count // len(touch_conditions.fingers))
     slides = []
-    for surface in touch_conditions.scene.surfaces:
-        for finger in touch_conditions.fingers:
-            samples = simulate_slides(
-                touch_conditions.scene, surface, each, touch_conditions.sliding, rng, finger=finger
-            )
-            slides += [
-                _recorded(stream, surface, touch_conditions.sliding, each * finger + number, own)
-                for number, own in enumerate(samples)
-            ]
+    for surface, finger in product(touch_conditions.scene.surfaces, touch_conditions.fingers):
+        samples = simulate_slides(touch_conditions.scene, surface, each, touch_conditions.sliding, rng, finger=finger)
+        slides += [
+            _recorded(stream, surface, touch_conditions.sliding, each * finger + number, own)
+            for number, own in enumerate(samples)
+        ]
     return slides
 
 

@@ -187,12 +187,18 @@ class PapillArrayDecoder:
             stamp_ns = self._clock.time_ns(time_us)
             index = self._numbering.place(counter, len(rows), stamp_ns)
             self._samples += len(rows)
-            for array, names in self._topics.items():
-                pillars = found.pillars[array][rows]
-                topics.setdefault(names.signal, []).append(self._pillars(stamp_ns, index, pillars))
-                if self._settings.wrench and array < len(found.wholes):
-                    whole = self._whole(stamp_ns, index, found.wholes[array][rows])
-                    topics.setdefault(names.wrench, []).append(whole)
+            self._add_batches(found, rows, stamp_ns, index, topics)
+
+    def _add_batches(
+        self, found: Measurements, rows: NDArray[np.intp], stamp_ns: int, index: int, topics: Topics
+    ) -> None:
+        """Add the batch of each array that a run of packets makes."""
+        for array, names in self._topics.items():
+            pillars = found.pillars[array][rows]
+            topics.setdefault(names.signal, []).append(self._pillars(stamp_ns, index, pillars))
+            if self._settings.wrench and array < len(found.wholes):
+                whole = self._whole(stamp_ns, index, found.wholes[array][rows])
+                topics.setdefault(names.wrench, []).append(whole)
 
     def _runs(self, found: Measurements) -> Iterator[NDArray[np.intp]]:
         """Yield the rows of packets that follow each other, without those sent twice."""

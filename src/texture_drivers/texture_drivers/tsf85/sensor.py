@@ -101,6 +101,12 @@ class Tsf85:
         data = self._port.read()
         arrival_ns = self._now_ns()
         packets = self._without_duplicates(self._parser.feed(data))
+        topics, alive = self._place(packets, arrival_ns)
+        self._watch_silence(self._port, alive, len(data))
+        return topics
+
+    def _place(self, packets: Sequence[Packet], arrival_ns: int) -> tuple[dict[str, Sequence[TactileSignal]], bool]:
+        """Return the batches of each topic, and whether any finger sent a frame."""
         topics: dict[str, Sequence[TactileSignal]] = {}
         alive = False
         for number, finger in self._fingers.items():
@@ -108,8 +114,7 @@ class Tsf85:
             alive = alive or bool(frames)
             for topic, batches in finger.place(frames, arrival_ns).items():
                 topics[f'{self._prefixes[number]}{topic}'] = batches
-        self._watch_silence(self._port, alive, len(data))
-        return topics
+        return topics, alive
 
     def close(self) -> None:
         """Stop the stream and close the device."""

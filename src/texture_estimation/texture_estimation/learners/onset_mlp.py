@@ -67,17 +67,17 @@ class OnsetMlp(Mlp):
         return dataclasses.replace(self, column=found[0] if found else UNBOUND)
 
     @staticmethod
-    def predictor(folds_of: Mapping[str, Any]) -> OnsetMlpPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> OnsetMlpPredictor:
         """Return the predictor made from the stored parameters."""
-        network = Mlp.predictor(folds_of)
+        network = Mlp.predictor(parameters)
         return OnsetMlpPredictor(
             network.hidden,
             network.hidden_offset,
             network.output,
             network.output_offset,
-            np.asarray(folds_of['onset'], dtype=np.float64, order='F'),
-            np.asarray(folds_of['onset_offset'], dtype=np.float64),
-            int(folds_of['onset_column']),
+            np.asarray(parameters['onset'], dtype=np.float64, order='F'),
+            np.asarray(parameters['onset_offset'], dtype=np.float64),
+            int(parameters['onset_column']),
         )
 
     def _fit(self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None) -> dict[str, Array]:

@@ -61,14 +61,14 @@ class SvmLinear:
         standard = (X - mean) / scale
         c = self._choose(standard, y, groups)
         weights, intercepts = _planes(_svc(standard, y, c))
-        folds_of = {'mean': mean, 'scale': scale, 'weights': weights, 'intercepts': intercepts}
+        parameters = {'mean': mean, 'scale': scale, 'weights': weights, 'intercepts': intercepts}
         note = f'not calibrated: pairs won; C = {c:.3g} by {self.repeats} times {self.folds}-fold cross-validation'
-        return Fitted(folds_of, None, note)
+        return Fitted(parameters, None, note)
 
     @staticmethod
-    def predictor(folds_of: Mapping[str, Any]) -> LinearPairsPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> LinearPairsPredictor:
         """Return the predictor made from the stored parameters."""
-        return LinearPairsPredictor(**folds_of)
+        return LinearPairsPredictor(**parameters)
 
     def _choose(self, standard: Array, y: Codes, groups: Codes) -> float:
         """Return the penalty that does best on what is held out; the middle one if nothing can be."""

@@ -84,20 +84,24 @@ class SvmPredictor:
         (..., n_pairs)
             Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
         """
+        kernel = self._kernel(X)
+        n_labels, rows, width = self.coefficients.shape
+        parameters = self.coefficients @ kernel.reshape(*kernel.shape[:-1], n_labels, width, 1)
+        sums = parameters.reshape(*kernel.shape[:-1], n_labels * rows)
+        decisions: Array = sums.take(self._first, axis=-1)  # type: ignore[assignment,attr-defined]
+        decisions += sums.take(self._second, axis=-1)  # type: ignore[attr-defined]
+        decisions += self.intercepts
+        return decisions
+
+    def _kernel(self, X: Array) -> Array:
+        """Return the kernel of each window with each support vector, (..., n_vectors)."""
         projected = X if self.projection is None else X @ self.projection
         standard = (projected - self.mean) / self.scale
         # |x - s|² = |x|² + |s|² - 2 x·s, one product with all support vectors
         squares = self.gamma * np.add.reduce(standard * standard, axis=-1, keepdims=True)
         exponents = self.vectors @ standard if standard.ndim == 1 else standard @ self.vectors.T
         exponents -= self.squares + squares
-        kernel = np.exp(exponents, out=exponents)
-        n_labels, rows, width = self.coefficients.shape
-        parameters = self.coefficients @ kernel.reshape(*kernel.shape[:-1], n_labels, width, 1)
-        sums = parameters.reshape(*kernel.shape[:-1], n_labels * rows)
-        decisions: Array = sums.take(self._first, axis=-1)  # type: ignore[attr-defined]
-        decisions += sums.take(self._second, axis=-1)  # type: ignore[attr-defined]
-        decisions += self.intercepts
-        return decisions
+        return np.exp(exponents, out=exponents)
 
 
 def export(scaler: Any, svc: Any, coupling: PairCoupling, projection: Array | None = None) -> SvmPredictor:

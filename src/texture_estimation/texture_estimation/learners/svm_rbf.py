@@ -89,7 +89,7 @@ class SvmRbf:
         coupling, held_out, note = self._calibrate(X, y, groups, differences)
         projection = self._projection(X, y, groups, differences)
         scaler, svc = self._fit_svc(_projected(X, projection), y)
-        folds_of = {
+        parameters = {
             **({} if projection is None else {'projection': projection}),
             'scaler': scaler,
             'svc': svc,
@@ -97,15 +97,18 @@ class SvmRbf:
             'offsets': coupling.offsets,
             'temperature': coupling.temperature,
         }
-        return Fitted(folds_of, held_out, note)
+        return Fitted(parameters, held_out, note)
 
     @staticmethod
-    def predictor(folds_of: Mapping[str, Any]) -> SvmPredictor:
+    def predictor(parameters: Mapping[str, Any]) -> SvmPredictor:
         """Return the predictor made from the stored parameters."""
         coupling = PairCoupling(
-            len(folds_of['svc'].n_support_), folds_of['slopes'], folds_of['offsets'], float(folds_of['temperature'])
+            len(parameters['svc'].n_support_),
+            parameters['slopes'],
+            parameters['offsets'],
+            float(parameters['temperature']),
         )
-        return export(folds_of['scaler'], folds_of['svc'], coupling, folds_of.get('projection'))
+        return export(parameters['scaler'], parameters['svc'], coupling, parameters.get('projection'))
 
     def _calibrate(
         self, X: Array, y: Codes, groups: Codes, differences: Array | None
@@ -115,14 +118,22 @@ class SvmRbf:
         if split is None:
             return uncalibrated(n_labels), None, 'not calibrated, as a label has a single window'
         folds_of, note = split
+        decisions = self._held_out_decisions(X, y, groups, differences, folds_of)
+        coupling = fit_coupling(decisions, y, n_labels)
+        return coupling, coupling(decisions), note
+
+    def _held_out_decisions(
+        self, X: Array, y: Codes, groups: Codes, differences: Array | None, folds_of: Codes
+    ) -> Array:
+        """Return the decision values of each window, (n, n_pairs), by a fit without the fold that it is in."""
+        n_labels = int(y.max()) + 1
         decisions = np.empty((len(y), n_labels * (n_labels - 1) // 2))
         for part in np.unique(folds_of):
             held = folds_of == part
             projection = self._projection(X[~held], y[~held], groups[~held], differences)
             fitted = self._fit_svc(_projected(X[~held], projection), y[~held])
             decisions[held] = export(*fitted, uncalibrated(n_labels), projection).decisions(X[held])
-        coupling = fit_coupling(decisions, y, n_labels)
-        return coupling, coupling(decisions), note
+        return decisions
 
     def _projection(self, X: Array, y: Codes, groups: Codes, differences: Array | None) -> Array | None:
         return within_class_whitening(X, y, groups, self.whitening, differences) if self.whitening else None

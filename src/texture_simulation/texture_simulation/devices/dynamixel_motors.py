@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texture_core.arrays import Array
 from texture_core.finger_state import FingerState
@@ -164,13 +165,17 @@ class DynamixelMotors:
         free = np.array([motor not in self.held for motor in self.ids])
         for _ in range(steps):
             self._current = np.where(torque, np.clip(gain * (goal - self._angle), -most, most), 0.0)
-            depth = np.maximum(0.0, self._angle * self._lever - self._height)
-            spring = self.stiffness_n_m * self._lever * (depth > 0)
-            # Implicit: the load is that at the end of the step, so no stiffness makes it swing.
-            self._speed = (self._current * TORQUE_NM_A - spring * depth) / (DAMPING + PHYSICS_S * spring * self._lever)
-            self._speed = np.where(free, self._speed, 0.0)
-            self._angle = self._angle + self._speed * PHYSICS_S
+            self._move(free)
         self._show()
+
+    def _move(self, free: NDArray[np.bool_]) -> None:
+        """Move the joints for one step with the present currents; those that are not free stay."""
+        depth = np.maximum(0.0, self._angle * self._lever - self._height)
+        spring = self.stiffness_n_m * self._lever * (depth > 0)
+        # Implicit: the load is that at the end of the step, so no stiffness makes it swing.
+        speed = (self._current * TORQUE_NM_A - spring * depth) / (DAMPING + PHYSICS_S * spring * self._lever)
+        self._speed = np.where(free, speed, 0.0)
+        self._angle = self._angle + self._speed * PHYSICS_S
 
     def write(self, motor: int, address: int, data: bytes) -> int:
         """Write into a control table unless the motor refuses it; return the error of the status packet.
