@@ -83,15 +83,7 @@ def live_tsf85(
         Closed when its context ends.
     """
     model = tsf85.Tsf85Model(scene, surface, rng, TSF85S[layout])
-    device = EmulatedTsf85(link, rng, finger, long_stamps)
-    return LiveSensor(
-        model,
-        device,
-        lambda path: device.advance(*model.advance(path)),
-        device.skip,
-        rate_hz=RATE_HZ,
-        points=tsf85.OVERSAMPLING,
-    )
+    return _of_tsf85(model, EmulatedTsf85(link, rng, finger, long_stamps))
 
 
 def live_tsf85_pair(
@@ -117,7 +109,11 @@ def live_tsf85_pair(
     LiveSensor
         Not started: its first `advance` is the beginning of its time.
     """
-    model, device = tsf85_pair.Tsf85Pair(scene, surface, rng), EmulatedTsf85(link, rng, long_stamps=long_stamps)
+    return _of_tsf85(tsf85_pair.Tsf85Pair(scene, surface, rng), EmulatedTsf85(link, rng, long_stamps=long_stamps))
+
+
+def _of_tsf85(model: tsf85.Tsf85Model | tsf85_pair.Tsf85Pair, device: EmulatedTsf85) -> LiveSensor:
+    """Return the sensor of a TSF-85, whether one finger touches or both."""
     return LiveSensor(
         model,
         device,

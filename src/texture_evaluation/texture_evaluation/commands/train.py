@@ -55,7 +55,7 @@ def summary(model: TextureModel, out: Path) -> list[str]:
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
         *filter(None, [model.error_bound.reason]),
         *([f'{kinds} kinds of slides over each, among which `texture identify` can choose'] if kinds else []),
-        f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it',
+        _saved_as(out),
     ]
 
 
@@ -67,5 +67,9 @@ def graded_summary(model: RoughnessModel, out: Path) -> list[str]:
     return [
         f"recipe '{model.recipe.name}' trained on the grades of {training['textures']} textures",
         f'from {training["slides"]} slides, {training["windows"]} windows of {training["window_s"]:g} s; {held_out}',
-        f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it',
+        _saved_as(out),
     ]
+
+
+def _saved_as(out: Path) -> str:
+    return f'saved as {out.with_name(out.name.removesuffix(".skops"))}.skops, with its card beside it'
