@@ -16,6 +16,9 @@ FOLLOWED_SHARE = 0.1  # a controller may limit speed and acceleration to its own
 class FollowWatch:
     """Compare the way that was commanded with the way that the finger has gone.
 
+    The comparison begins again when the commanded velocity turns back: a late arm still goes the old way for its lag,
+    which is no sign of a lost controller.
+
     Parameters
     ----------
     follow_m
@@ -50,10 +53,10 @@ class FollowWatch:
         str
             A sentence without a full stop, or ''.
         """
-        place = np.array(position)
-        if self._begin is None:
+        place, velocity = np.array(position), np.array(velocity_m_s)
+        if self._begin is None or velocity @ self._asked_m < 0.0:
             self._begin, self._asked_m = (now_ns, place), np.zeros(3)
-        self._asked_m = self._asked_m + np.array(velocity_m_s) * held_s
+        self._asked_m = self._asked_m + velocity * held_s
         begin_ns, start = self._begin
         asked_m = float(np.linalg.norm(self._asked_m))
         if asked_m < self._follow_m or now_ns - begin_ns < FOLLOW_NS:
