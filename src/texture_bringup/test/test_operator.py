@@ -19,10 +19,11 @@ DOMAIN = 62
 
 
 @contextmanager
-def silent_explorer():
-    """An explorer that takes a goal and never answers."""
+def silent_explorer(taken=None):
+    """An explorer that takes a goal, sets `taken` and never answers."""
     os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-    context, taken, over, left = Context(), *(threading.Event() for _ in range(3))
+    context, over, left = Context(), threading.Event(), threading.Event()
+    taken = taken or threading.Event()
     context.init(domain_id=DOMAIN)
     node = Node('explorer', context=context)
 
@@ -86,3 +87,17 @@ def test_an_explorer_that_does_not_keep_the_timeout_is_left(monkeypatch):
         operator.wait_for_explorer(30.0)
         with pytest.raises(MotionAborted, match=r'no result within the timeout of 0\.2 s; the exploration was'):
             operator.explore(ExplorationRequest('linear_slide', timeout_s=0.2))
+
+
+def test_ctrl_c_says_that_the_robot_must_be_looked_at_when_the_explorer_does_not_confirm_the_end(monkeypatch):
+    monkeypatch.setattr(operators, 'CANCEL_DEADLINE_S', 0.5)
+    taken = threading.Event()
+
+    def press_ctrl_c():
+        if taken.is_set():
+            raise KeyboardInterrupt
+
+    with silent_explorer(taken), operators.Operator(domain_id=DOMAIN, guard=press_ctrl_c) as operator:
+        operator.wait_for_explorer(30.0)
+        with pytest.raises(KeyboardInterrupt, match=r'has not confirmed within 0\.5 s that the finger was lifted'):
+            operator.explore(ExplorationRequest('linear_slide'))

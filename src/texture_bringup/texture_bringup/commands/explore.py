@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 from texture_bringup.ros.operator import ExplorationResult, Operator
@@ -57,8 +59,28 @@ def run(options: argparse.Namespace) -> int:
     requests = requests_of(options)
     with Operator(options.namespace) as operator:
         operator.wait_for_explorer(deadline_s=10.0)
-        succeeded = all(tell(operator.explore(request, show_progress)) for request in requests)
+        succeeded = all(tell(explored(operator, request)) for request in requests)
     return 0 if succeeded else 1
+
+
+def explored(operator: Operator, request: ExplorationRequest) -> ExplorationResult:
+    """Explore with a line of progress; after Ctrl-C print how the exploration ended, which the operator must know."""
+    try:
+        with progress_line():
+            return operator.explore(request, show_progress)
+    except KeyboardInterrupt as interrupt:
+        print(interrupt, file=sys.stderr)
+        raise
+
+
+@contextmanager
+def progress_line() -> Iterator[None]:
+    """End the line of the progress, however the exploration ends."""
+    try:
+        yield
+    finally:
+        if sys.stderr.isatty():
+            print(file=sys.stderr)
 
 
 def tell(explored: ExplorationResult) -> bool:
@@ -69,8 +91,6 @@ def tell(explored: ExplorationResult) -> bool:
     MotionRefused
         If the explorer refused it.
     """
-    if sys.stderr.isatty():
-        print(file=sys.stderr)
     if not explored.exploration_id:
         raise MotionRefused(explored.message)
     print(f'{explored.exploration_id}: {explored.message}')

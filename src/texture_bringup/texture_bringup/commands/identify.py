@@ -6,7 +6,7 @@ import argparse
 
 import numpy as np
 
-from texture_bringup.commands.explore import show_progress, tell
+from texture_bringup.commands.explore import progress_line, show_progress, tell
 from texture_bringup.ros.operator import Operator
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
@@ -48,7 +48,8 @@ def run(options: argparse.Namespace) -> int:
             number += 1
             motion, information = known.best_motion(belief, list(known.gaussians))
             print(f'slide {number}: {motion_text(motion)}; {information:.2f} nats expected')
-            explored, vectors = operator.explore_with_features(request_of(motion, options.surface), show_progress)
+            with progress_line():
+                explored, vectors = operator.explore_with_features(request_of(motion, options.surface), show_progress)
             if not explored.success:
                 return int(not tell(explored))
             belief = known.update(belief, motion, slide_values(vectors, model.feature_set))

@@ -25,6 +25,7 @@ from texture_bringup.dashboard.recorder import Recorder
 from texture_bringup.dashboard.server import make_app
 from texture_bringup.dashboard.serving import Serving
 from texture_bringup.ros.answers import answer_of, ready
+from texture_bringup.ros.operator import VANISHED
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.exploration import ExplorationRequest
 from texture_core.parameters import from_mapping, param
@@ -103,7 +104,7 @@ class DashboardNode(Node):
                 seen_s = time.monotonic() if self._explorer.server_is_ready() else seen_s
                 continue
             return {'success': result.success, 'message': result.message, 'id': result.exploration_id}
-        raise MotionAborted('the explorer has vanished; look at its output')
+        raise MotionAborted(VANISHED)
 
     async def stop(self, _requested: Mapping[str, Any]) -> Mapping[str, Any]:
         """Stop what moves."""

@@ -41,6 +41,10 @@ ACCEPT_S = 15.0
 RETRY_PERIOD_S = 5.0
 # What this process sees, the other processes see soon after.
 DISCOVERY_S = 1.0
+VANISHED = (
+    'the explorer has vanished; if it was exploring, the finger may still touch the surface: look at the robot, and at '
+    'the output of the explorer'
+)
 Progress = Callable[[ExplorationState, TextureEstimate], None]
 
 
@@ -152,6 +156,8 @@ class Operator:
         ------
         MotionAborted
             If the explorer vanishes meanwhile, or says nothing any more.
+        KeyboardInterrupt
+            After Ctrl-C; its sentence is how the exploration ended.
         """
 
         def on_feedback(message: Any) -> None:
@@ -170,8 +176,7 @@ class Operator:
                 lambda: endings.append(goal.get_result_async()),
             )
         except KeyboardInterrupt:
-            self._cancel(goal, endings[0])
-            raise
+            raise KeyboardInterrupt(self._cancel(goal, endings[0])) from None
         answer = next((ending.result() for ending in endings if ending.done()), None)
         if answer is None:
             goal.cancel_goal_async()
@@ -336,7 +341,7 @@ class Operator:
             if self._explore.server_is_ready():
                 seen_s = now_s
             elif now_s - seen_s > GONE_S:
-                raise MotionAborted('the explorer has vanished; look at its output')
+                raise MotionAborted(VANISHED)
             if now_s - self._received_s > silent_s:
                 raise MotionAborted(
                     f'no answer for {silent_s:g} s, though there is an explorer; stop it, and see that it is alone'
@@ -356,9 +361,15 @@ class Operator:
         self._guard()
         self._executor.spin_once(timeout_sec=STEP_S)
 
-    def _cancel(self, goal: Any, ending: Future) -> None:
-        """Ask for the end, and wait until the finger is lifted."""
+    def _cancel(self, goal: Any, ending: Future) -> str:
+        """Ask for the end, wait until the finger is lifted, and return in a sentence how it ended."""
         goal.cancel_goal_async()
         deadline = time.monotonic() + CANCEL_DEADLINE_S
         while not ending.done() and time.monotonic() < deadline:
             self._executor.spin_once(timeout_sec=STEP_S)
+        if not ending.done():
+            return (
+                f'the explorer has not confirmed within {CANCEL_DEADLINE_S:g} s that the finger was lifted; look at '
+                'the robot, and use its own stop if it moves'
+            )
+        return f'the exploration has ended: {ending.result().result.message}'

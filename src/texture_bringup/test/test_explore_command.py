@@ -1,0 +1,38 @@
+"""What `texture explore` prints when an exploration does not come to its end."""
+
+import pytest
+
+from texture_bringup.commands.explore import explored
+from texture_core.errors import MotionAborted
+from texture_core.estimates import TextureEstimate
+from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
+from texture_core.program import run_program
+
+ENDED = 'the exploration has ended: cancelled by the client'
+
+
+class EndingOperator:
+    """An operator whose exploration ends in mid-slide."""
+
+    def __init__(self, error):
+        self._error = error
+
+    def explore(self, _request, on_progress):
+        on_progress(ExplorationState(0, 'one', 'linear_slide', Phase.SLIDE), TextureEstimate(0, 'one'))
+        raise self._error
+
+
+@pytest.mark.parametrize(
+    ('error', 'lines'),
+    [
+        (KeyboardInterrupt(ENDED), [ENDED, 'texture: interrupted']),
+        (MotionAborted('no answer'), ['texture: no answer']),
+    ],
+)
+def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress(monkeypatch, capsys, error, lines):
+    monkeypatch.setattr('sys.stderr.isatty', lambda: True)
+    run_program(lambda: explored(EndingOperator(error), ExplorationRequest('linear_slide')))
+    progress, *below = capsys.readouterr().err.splitlines()
+    assert progress.strip() == ''  # the terminal returns to the beginning of the line before it draws
+    assert below[0].startswith('slide')
+    assert below[1:] == lines
