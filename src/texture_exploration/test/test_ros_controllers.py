@@ -434,6 +434,15 @@ def test_a_released_explorer_commands_rest_and_refuses_until_it_is_connected_aga
     assert explorer.fault() == ''
 
 
+def test_explorations_begin_where_somebody_else_left_the_finger_but_not_where_a_fault_did(robot):
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    home = explorer.connect()
+    robot.arm.position = np.add(robot.arm.position, (0.05, 0.0, 0.0))
+    assert explorer.connect() == pytest.approx(home)
+    explorer.release()
+    assert math.dist(explorer.connect(), home) == pytest.approx(0.05)
+
+
 MANAGED = {
     'controller_manager': 'controller_manager',
     'activate_controllers': 'twist',

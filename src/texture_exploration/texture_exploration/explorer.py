@@ -113,10 +113,15 @@ class Explorer:
             self.arm.close()
 
     def release(self) -> None:
-        """Abort, wait until the finger is lifted, let the arm go; until `connect`, requests are refused."""
+        """Abort, wait until the finger is lifted, let the arm go; until `connect`, requests are refused.
+
+        Explorations begin where the finger is at that `connect`: whoever had the arm meanwhile may have moved it, and
+        the way back to the old place may be blocked.
+        """
         with self._lock:
             self._released = True
         self._end_motion('the explorer let go of the arm')
+        self._home = None
 
     def now_ns(self) -> int:
         """Return the time on the clock of the states."""
