@@ -80,6 +80,23 @@ def test_a_controller_that_dies_in_the_slide_is_named_and_the_next_request_conne
     assert again is not None
 
 
+def test_an_emulated_controller_that_is_interrupted_with_the_explorer_lets_it_lift_the_finger_first(graph):
+    """As by Ctrl-C in the terminal of a launch; a real controller is not part of that launch."""
+    explorer = Explorer(RosControllersArm(PATIENT), TouchParams(), LIMITS, lambda state: None)
+    with NodeProcess('texture_simulation', 'twist_controller', HELD) as controller:
+        explorer.connect()
+
+        def interrupt():
+            controller.process.send_signal(signal.SIGINT)
+            explorer.stop('interrupted')
+
+        exploration, since_ns = explored(explorer, interrupt)
+        assert since_ns
+        assert exploration.outcome.message == 'interrupted'  # anything else ends without a lift
+        explorer.close()
+        assert controller.process.wait(DEADLINE_S) == 0
+
+
 def test_when_the_process_that_commands_is_killed_the_arm_comes_to_rest(graph, record_property):
     places = graph.listen(PoseStamped, 'tcp_pose_broadcaster/pose')
     with NodeProcess('texture_simulation', 'twist_controller', HELD):

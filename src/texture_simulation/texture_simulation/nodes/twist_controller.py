@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from dataclasses import dataclass
@@ -19,6 +20,9 @@ from texture_core.ros.parameters import declare, on_change
 from texture_core.ros.run import run
 from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm
 from texture_simulation.devices.twist_controller_params import TwistControllerParams
+
+COMMANDED_S = 0.3  # who commands an arm that moves does so more often
+LONGEST_LIFT_S = 6.0  # shorter than a launcher waits before it kills
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,7 @@ class TwistControllerNode(Node):
         on_change(self, ControllerTopicParams, partial(setattr, self, '_topics'))
         self._lock = threading.Lock()  # of the arm
         self._ignored = 0
+        self._commanded_s = -math.inf
         topics = self._topics
         self._poses = self.create_publisher(PoseStamped, topics.pose_topic, 1)
         self._wrenches = self.create_publisher(WrenchStamped, topics.wrench_topic, 1)
@@ -71,7 +76,14 @@ class TwistControllerNode(Node):
         self._thread.start()
 
     def shutdown(self) -> None:
-        """Let time stand still."""
+        """Let time stand still, once nobody commands the arm any more.
+
+        Ctrl-C in the terminal of a launch also reaches this node, while the explorer lifts the finger. A real
+        controller is no part of that launch.
+        """
+        end_s = time.monotonic() + LONGEST_LIFT_S
+        while time.monotonic() < min(end_s, self._commanded_s + COMMANDED_S) and self.executor is not None:
+            self.executor.spin_once(timeout_sec=0.05)
         self._closing.set()
         self._thread.join()
         self._emulator.close()
@@ -81,6 +93,7 @@ class TwistControllerNode(Node):
         if message.header.frame_id != self._topics.base_frame_id:
             self._ignored += 1
             return
+        self._commanded_s = time.monotonic()
         linear = message.twist.linear
         with self._lock:
             self._arm.command(time.monotonic_ns(), np.array([linear.x, linear.y, linear.z]))
