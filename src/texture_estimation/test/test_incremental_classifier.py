@@ -6,6 +6,7 @@ import pytest
 
 from texture_core.errors import InvalidData, ModelMismatch, TextureError
 from texture_core.features import FeatureVector
+from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.incremental.incremental_classifier import EXPLORATIONS, IncrementalClassifier
 from texture_estimation.model import load_model
 from texture_estimation.open_set.domain import Domain
@@ -234,3 +235,58 @@ def test_a_texture_that_was_not_added_is_not_removed(three_added, model, label, 
 def test_with_nothing_added_a_removal_says_so(model):
     with pytest.raises(InvalidData, match='has no added slides that could be removed'):
         IncrementalClassifier(model).remove('silk')
+
+
+def estimated(model, values, exploration_id='asked'):
+    """Return the estimates of a slide, window by window and at its end."""
+    evidence = EvidenceAccumulator(model)
+    windows = [
+        FeatureVector(number * 10**8, exploration_id, 0.5, 0.1, model.names, row, feature_set=model.feature_set)
+        for number, row in enumerate(values)
+    ]
+    return [
+        evidence.update(vector) for vector in (*windows, FeatureVector(10**10, exploration_id, 0.0, 0.1, last=True))
+    ]
+
+
+def with_slides(model, values, count):
+    """Return the model after so many slides with these windows were added as silk."""
+    incremental_classifier = IncrementalClassifier(model)
+    for number in range(count):
+        measured(incremental_classifier, values, f'e{number}')
+        incremental_classifier.add('silk', f'e{number}')
+    return incremental_classifier.model
+
+
+@pytest.mark.parametrize('count', [1, 2, 5])
+def test_an_added_texture_is_reported_but_no_surer_than_its_slides_can_show(model, silk, count):
+    bound = dataclasses.replace(model.error_bound, slides=600, max_error_rate=0.02)
+    estimates = estimated(with_slides(dataclasses.replace(model, error_bound=bound), silk, count), silk + 0.1)
+    assert {estimate.label for estimate in estimates} == {'silk'}
+    assert not any(estimate.decided for estimate in estimates)
+    highest = max(0.05 ** (1 / count), 1.0 / len(estimates[0].labels))
+    assert max(estimate.confidence for estimate in estimates) <= highest + 1e-9
+    assert f'with {count} the confidence is' in estimates[-1].message
+
+
+def test_a_trained_texture_keeps_its_label_and_nearly_its_confidence_beside_an_added_one(model, examples, silk):
+    wood = examples.values[examples.labels == 'wood'][:6]
+    before, after = (estimated(one, wood)[-1] for one in (model, with_slides(model, silk, 1)))
+    assert before.label == after.label == 'wood'
+    assert after.confidence == pytest.approx(before.confidence, abs=0.1)
+
+
+def test_live_and_stored_models_give_the_same_estimates_with_added_slides(three_added, silk):
+    incremental_classifier, path = three_added
+    live, stored = (estimated(one, silk + 0.2) for one in (incremental_classifier.model, load_model(path)))
+    for first, second in zip(live, stored, strict=True):
+        assert first.label == second.label
+        np.testing.assert_allclose(first.probabilities, second.probabilities, atol=1e-6)
+
+
+def test_estimates_are_as_before_once_a_texture_is_removed(model, examples, silk):
+    incremental_classifier = IncrementalClassifier(model)
+    measured(incremental_classifier, silk)
+    incremental_classifier.add('silk')
+    incremental_classifier.remove('silk')
+    assert estimated(incremental_classifier.model, examples.values[:9]) == estimated(model, examples.values[:9])

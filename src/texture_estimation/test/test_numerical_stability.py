@@ -9,9 +9,8 @@ from scipy.signal import lfilter
 from texture_core.resources import folder
 from texture_core.window import Window
 from texture_estimation.classification.training import train
-from texture_estimation.incremental.ridge_classifier import RidgeClassifier
+from texture_estimation.incremental.slide_gaussians import LENGTHS, SlideGaussians
 from texture_estimation.learners.catalogue import LEARNERS
-from texture_estimation.log_probabilities import log_softmax
 from texture_estimation.open_set.class_distance import ClassDistance
 from texture_estimation.open_set.novelty import EFFECTIVE_WINDOWS, FEATURES, NoveltyDetector
 from texture_estimation.recipe import Recipe, load_recipe
@@ -103,9 +102,12 @@ def test_known_surfaces_stay_known_and_what_is_far_from_all_is_unknown(change, m
 def test_what_was_trained_live_is_evaluated_with_finite_log_probabilities(change, make_examples):
     examples = make_examples(slides=2, windows=4)
     codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
-    regressor = RidgeClassifier(change(examples.values), codes, groups, trained=lambda rows: np.zeros((len(rows), 4)))
+    trained = SlideGaussians.fit(change(examples.values), codes, groups, overlap=1.0)
+    gaussians = trained.with_added([change(examples.values)[:4] + 1.0], np.array([4]))
     for values in (change(make_examples(seed=1).values), np.zeros((1, change(examples.values).shape[1]))):
-        assert np.isfinite(log_softmax(regressor.predictor(values))).all()
+        assert np.isfinite(gaussians.window_shares(values)).all()
+        for length in LENGTHS:
+            assert np.isfinite(gaussians.shares(values.mean(axis=0), values.var(axis=0), length)).all()
 
 
 @pytest.mark.filterwarnings('error::RuntimeWarning')

@@ -12,8 +12,10 @@ from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
 from texture_estimation.classification.evidence_rules import GroupedEvidence
 from texture_estimation.fingerprint import fingerprint_difference
+from texture_estimation.incremental.slide_moments import SlideMoments
 from texture_estimation.log_probabilities import is_tied
 from texture_estimation.model import TextureModel
+from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.open_set.novelty import SlideNovelty
 from texture_features.slide_conditions import RunningConditions
 
@@ -98,8 +100,9 @@ class EvidenceAccumulator:
         self._windows = self._evidence_ns = self._window_ns = self._end_ns = 0
         self._message = '' if self.model else NO_MODEL
         self._evidence = GroupedEvidence(
-            len(self.model.labels) if self.model else 0, self.model.recipe.evidence.group if self.model else 0
+            self.model.n_trained if self.model else 0, self.model.recipe.evidence.group if self.model else 0
         )
+        self._moments = SlideMoments(len(self.model.names)) if self.model and self.model.added_slides else None
         self._zeros = np.zeros(len(self.model.names) if self.model else 0)
         detector = self.model.active_novelty_detector if self.model else None
         self._novelty = SlideNovelty(detector.distances, len(self.model.labels)) if self.model and detector else None
@@ -138,6 +141,8 @@ class EvidenceAccumulator:
         weight = model.recipe.evidence.window_weight(effective_windows)
         self._evidence.add(window_evidence, new_ns / NANOSECONDS, weight)
         self._end_ns = max(end, self._end_ns)
+        if self._moments is not None:
+            self._moments.add(vector.values)
         if self._novelty is not None:
             best = int(window_evidence.argmax())
             self._novelty.add(vector.values, activations, best, effective_windows)
@@ -157,15 +162,18 @@ class EvidenceAccumulator:
         effective_windows = self._evidence_ns / self._window_ns
         mean = self._evidence.mean
         deciding = self._evidence.time_s * NANOSECONDS / self._window_ns
-        probabilities = model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent)
+        probabilities = self._with_added(
+            model, model.recipe.evidence.posterior(mean, deciding, model.tempering_exponent), effective_windows
+        )
         listed = probabilities.tolist()
         confidence = max(listed)
         best, decided = listed.index(confidence), listed.count(confidence) == 1
         within = not self._deviation
         novelty_score, known = self._novelty_score(model, mean, best, effective_windows)
         known = known and within
-        certain = decided and known and model.certain(confidence, effective_windows, novelty_score)
-        reported = model.error_bound.limited(probabilities)
+        bound = model.error_bound_of(best)
+        certain = decided and known and bound.shown and model.certain(confidence, effective_windows, novelty_score)
+        reported = bound.limited(probabilities)
         return TextureEstimate(
             stamp_ns=self._end_ns,
             exploration_id=vector.exploration_id,
@@ -181,12 +189,19 @@ class EvidenceAccumulator:
             evidence_s=self._evidence_ns / NANOSECONDS,
             final=final,
             model=model.name,
-            message=self._explanation(model, final),
+            message=self._explanation(model, bound, final),
         )
 
-    def _explanation(self, model: TextureModel, final: bool) -> str:
+    def _with_added(self, model: TextureModel, trained: Array, effective_windows: float) -> Array:
+        """Return the probabilities of all labels from those of the trained textures among themselves."""
+        if self._moments is None or model.slide_gaussians is None:
+            return trained
+        shares = model.slide_gaussians.shares(self._moments.mean, self._moments.variance, effective_windows)
+        return model.slide_gaussians.combined(trained, shares)
+
+    def _explanation(self, model: TextureModel, bound: ErrorBound, final: bool) -> str:
         """Return what the reader of an estimate must know about it, in sentences; '' if all is well."""
-        missing = (model.prediction_sets.reason, model.error_bound.reason) if final and not self._deviation else ()
+        missing = (model.prediction_sets.reason, bound.reason) if final and not self._deviation else ()
         return '; '.join(filter(None, (self._deviation, self._message, *missing)))
 
     def _novelty_score(

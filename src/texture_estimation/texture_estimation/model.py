@@ -17,7 +17,7 @@ from texture_core.arrays import Array
 from texture_core.errors import ModelMismatch
 from texture_estimation import model_files
 from texture_estimation.incremental.added_slides import AddedSlide, read_added_slides
-from texture_estimation.incremental.ridge_classifier import RidgeClassifier
+from texture_estimation.incremental.slide_gaussians import SlideGaussians
 from texture_estimation.incremental.training_examples import TrainingExamples
 from texture_estimation.learners.learner import Predictor, hidden_layer
 from texture_estimation.learners.mlp_predictor import MlpPredictor
@@ -29,9 +29,11 @@ from texture_estimation.open_set.novelty import NoveltyDetector, SlideNovelty, s
 from texture_estimation.open_set.prediction_sets import PredictionSets
 from texture_estimation.open_set.stopping_rule import StoppingRule
 from texture_estimation.recipe import Recipe
+from texture_features.features import slide_onset
 
 # Names of their parts in the file.
 EXAMPLES, NOVELTY_DETECTOR, NEXT_TOUCH_MODEL = 'examples', 'novelty_detector', 'next_touch_model'
+LEAST_PROBABILITY = 1e-300  # so that its logarithm is finite
 # What a model file may hold beyond plain values and arrays; anything else is refused before it is built.
 TRUSTED = ('sklearn.preprocessing._data.StandardScaler', 'sklearn.svm._classes.SVC')
 
@@ -70,8 +72,8 @@ class TextureModel:
         Training windows that are kept for incremental training; None if it holds none.
     added_slides
         Slides added after the training.
-    incremental_predictor
-        Predictor since slides were added; None if none were.
+    slide_gaussians
+        Gaussians of whole slides that tell added textures; None until a slide is added.
     domain
         Conditions under which the model was trained; outside them it decides nothing.
 
@@ -105,14 +107,12 @@ class TextureModel:
     next_touch_model: NextTouchModel | None = None
     examples: TrainingExamples | None = None
     added_slides: tuple[AddedSlide, ...] = ()
-    incremental_predictor: Predictor | None = None
+    slide_gaussians: SlideGaussians | None = None
     domain: Domain = field(default_factory=Domain)
 
     @cached_property
     def predictor(self) -> Predictor:
-        """Predictor of the learner, or the incremental one since slides were added."""
-        if self.incremental_predictor is not None:
-            return self.incremental_predictor
+        """Predictor of the trained textures."""
         return self.recipe.learner.predictor(self.parameters)
 
     @cached_property
@@ -120,9 +120,9 @@ class TextureModel:
         """Novelty detector that includes the added slides."""
         if self.novelty_detector is None or not self.added_slides:
             return self.novelty_detector
-        windows = self.recipe.feature_set.windows
-        overlap = min(windows.hop_s / windows.length_s, 1.0)
-        means = [space_means(added.values, self.activations(added.values), overlap) for added in self.added_slides]
+        means = [
+            space_means(added.values, self.activations(added.values), self._overlap) for added in self.added_slides
+        ]
         numbers = np.array([self.labels.index(added.label) for added in self.added_slides])
         return self.novelty_detector.with_slides(means, numbers)
 
@@ -134,6 +134,12 @@ class TextureModel:
         return self.domain.widened(
             [added.conditions for added in self.added_slides], [added.label for added in self.added_slides]
         )
+
+    @property
+    def _overlap(self) -> float:
+        """Distance of two windows of a slide over their length."""
+        windows = self.recipe.feature_set.windows
+        return min(windows.hop_s / windows.length_s, 1.0)
 
     def certain(self, confidence: float, effective_windows: float, novelty_score: float) -> bool:
         """Return whether a slide may end: by the stopping rule, if enough slides were held out to show its error rate.
@@ -161,6 +167,13 @@ class TextureModel:
         """Return the outputs of the trained hidden layer, (..., n_hidden); None if the classifier has none."""
         return self._hidden_layer(X) if self._hidden_layer is not None else None
 
+    def error_bound_of(self, number: int) -> ErrorBound:
+        """Return what can be shown for the label of this number: few slides of an added texture show little."""
+        if number < self.n_trained:
+            return self.error_bound
+        slides = sum(added.label == self.labels[number] for added in self.added_slides)
+        return replace(self.error_bound, slides=slides)
+
     def predict_with_activations(self, X: Array) -> tuple[Array, Array | None]:
         """Return what `predictor` and `activations` give, with the hidden layer computed once where both have it.
 
@@ -170,13 +183,13 @@ class TextureModel:
 
         Returns
         -------
-        (..., n_labels)
-            Log-probabilities up to a constant of the window.
+        (..., n_trained)
+            Log-probabilities of the trained textures up to a constant of the window.
         (..., n_hidden) or None
             Outputs of the trained hidden layer; None if the classifier has none.
         """
         # A predictor derived from it may add to what the hidden layer gives, as that of `onset_mlp` does.
-        if self.incremental_predictor is None and type(self.predictor) is MlpPredictor:
+        if type(self.predictor) is MlpPredictor:
             activations = self.predictor.activations(X)
             return self.predictor.scores(activations), activations
         return self.predictor(X), self.activations(X)
@@ -193,7 +206,12 @@ class TextureModel:
         (..., n_labels)
             Natural logarithms.
         """
-        return log_softmax(self.predictor(X))
+        trained = log_softmax(self.predictor(X))
+        if self.slide_gaussians is None or not self.added_slides:
+            return trained
+        combined = self.slide_gaussians.combined(np.exp(trained), self.slide_gaussians.window_shares(X))
+        log_probabilities: Array = np.log(np.maximum(combined, LEAST_PROBABILITY))
+        return log_probabilities
 
     def decide(self, X: Array) -> list[str]:
         """Return the label of each window alone, (n,) of (n, n_features); '' where several labels are equally good.
@@ -209,16 +227,30 @@ class TextureModel:
         return ['' if tied else self.labels[index] for index, tied in zip(best, none, strict=True)]
 
     def with_added_slides(self, added_slides: tuple[AddedSlide, ...]) -> TextureModel:
-        """Return the model with these added slides; `incremental_predictor` is unchanged."""
-        new = dict.fromkeys(
-            added_slide.label for added_slide in added_slides if added_slide.label not in self.trained_labels
-        )
-        return replace(self, labels=(*self.trained_labels, *new), added_slides=added_slides)
+        """Return the model with these added slides in place of those it has.
+
+        Raises
+        ------
+        ModelMismatch
+            If the model holds no training examples.
+        """
+        trained = self.trained_labels
+        labels = (*trained, *dict.fromkeys(slide.label for slide in added_slides if slide.label not in trained))
+        gaussians = self.slide_gaussians or self._fit_slide_gaussians()
+        if added_slides:
+            codes = np.array([labels.index(slide.label) for slide in added_slides])
+            gaussians = gaussians.with_added([slide.values for slide in added_slides], codes, self._overlap)
+        return replace(self, labels=labels, added_slides=added_slides, slide_gaussians=gaussians)
 
     @property
     def trained_labels(self) -> tuple[str, ...]:
         """Textures known from the training."""
-        return self.labels[: int(self.examples.codes.max()) + 1] if self.examples else self.labels
+        return self.labels[: self.n_trained]
+
+    @cached_property
+    def n_trained(self) -> int:
+        """Number of textures known from the training."""
+        return int(self.examples.codes.max()) + 1 if self.examples else len(self.labels)
 
     def examples_of(self, label: str) -> Array:
         """Return the examples of a label from training and added slides, (n, n_features).
@@ -232,27 +264,15 @@ class TextureModel:
         own = [added_slide.values for added_slide in self.added_slides if added_slide.label == label]
         return np.concatenate([np.empty((0, len(self.names))) if known is None else known, *own])
 
-    def ridge_classifier(self) -> RidgeClassifier:
-        """Return the incremental classifier of the training examples and the added slides.
-
-        Raises
-        ------
-        ModelMismatch
-            If the model holds no training examples.
-        """
+    def _fit_slide_gaussians(self) -> SlideGaussians:
+        """Return the Gaussians of the trained textures, from the windows of the training that are kept."""
         if self.examples is None:
             raise ModelMismatch(f"model '{self.name}' holds no training examples, so none can be added; train it again")
-        known = self.examples
-        ridge_classifier = RidgeClassifier(
-            known.values.astype(np.float64),
-            known.codes,
-            known.slides,
-            parameters=self.parameters if self.recipe.learner_name == 'mlp' else None,
-            trained=self.recipe.learner.predictor(self.parameters),
-        )
-        for label in dict.fromkeys(added_slide.label for added_slide in self.added_slides):
-            ridge_classifier.set_examples(self.labels.index(label), self.examples_of(label))
-        return ridge_classifier
+        known, windows = self.examples, self.recipe.training_windows
+        kept = len(known.codes) / max(int(self.training.get('windows', 0)), len(known.codes))
+        overlap = min(windows.hop_s / windows.length_s / kept, 1.0)
+        compared = np.array([name.rsplit('/', 1)[-1] != slide_onset.NAME for name in self.names], dtype=np.float64)
+        return SlideGaussians.fit(known.values.astype(np.float64), known.codes, known.slides, overlap, compared)
 
     def validate(self) -> None:
         """Use every part once on a window of zeros: what does not fit the others, or is no number, raises now.
@@ -357,9 +377,8 @@ def load_model(path: str | Path) -> TextureModel:
     added_slides = read_added_slides(target, model.feature_set, model.names)
     if not added_slides:
         return model
-    incremental_predictor = model.with_added_slides(added_slides)
     try:
-        return replace(incremental_predictor, incremental_predictor=incremental_predictor.ridge_classifier().predictor)
+        return model.with_added_slides(added_slides)
     except model_files.BROKEN as error:
         raise ModelMismatch(f"the added slides of model '{target}' cannot be used: {error}; move them away") from error
 

@@ -50,7 +50,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         ]
     return BenchmarkResult(
         name='learning',
-        measured='share of test windows and whole test slides (summed log-probabilities) that are right, mean over the '
+        measured='share of test windows and of whole test slides (final estimate) that are right, mean over the '
         'draws; processor time of adding a slide, stored on disk; time to classify a window',
         data=f'BioTac vibration, {len(labels)} materials (github dexrob/BioTac_slide_20_50, Gao et al. 2020), recipe '
         f'{RECIPE} calibrated in {FOLDS} parts',
@@ -116,8 +116,8 @@ def _numbers(
 
 def _mean(scores: Sequence[Score]) -> Mapping[str, float]:
     return {
-        'windows': round(float(np.mean([score.windows for score in scores])), 4),
-        'slides': round(float(np.mean([score.slides for score in scores])), 4),
+        field: round(float(np.mean([getattr(score, field) for score in scores])), 4)
+        for field in Score.__dataclass_fields__
     }
 
 

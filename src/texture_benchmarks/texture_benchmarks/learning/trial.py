@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import Array
+from texture_core.estimates import TextureEstimate
 from texture_estimation.classification.training import train
+from texture_estimation.evidence import EvidenceAccumulator
 from texture_estimation.incremental.incremental_classifier import IncrementalClassifier
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
@@ -22,10 +24,16 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Score:
-    """Shares of test windows and of whole test slides that are right, 0 to 1."""
+    """Shares of test windows and of whole test slides that are right, 0 to 1.
+
+    `known` is the share of slides that are reported as known surfaces, `certain_and_wrong` that of slides which could
+    have been stopped at their end with a wrong label.
+    """
 
     windows: float
     slides: float
+    known: float
+    certain_and_wrong: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,12 +125,21 @@ def _add_examples(incremental_classifier: IncrementalClassifier, examples: Label
 def _score(model: TextureModel, examples: LabelledFeatures) -> Score:
     log_probabilities = model.predict_log_proba(examples.values)
     truth = np.array([model.labels.index(label) for label in examples.labels])
-    slides, first, inverse = np.unique(examples.groups, return_index=True, return_inverse=True)
-    sums = np.zeros((len(slides), len(model.labels)))
-    np.add.at(sums, inverse.reshape(-1), log_probabilities)
+    slides = [(str(slide), str(examples.labels[examples.groups == slide][0])) for slide in np.unique(examples.groups)]
+    finals = [(label, _final(model, examples, slide)) for slide, label in slides]
     return Score(
-        float((log_probabilities.argmax(axis=1) == truth).mean()), float((sums.argmax(axis=1) == truth[first]).mean())
+        windows=float((log_probabilities.argmax(axis=1) == truth).mean()),
+        slides=float(np.mean([final.label == label for label, final in finals])),
+        known=float(np.mean([final.known for _, final in finals])),
+        certain_and_wrong=float(np.mean([final.decided and final.label != label for label, final in finals])),
     )
+
+
+def _final(model: TextureModel, examples: LabelledFeatures, slide: str) -> TextureEstimate:
+    """Return the final estimate of a slide, as the classifier reports it."""
+    evidence = EvidenceAccumulator(model)
+    *_, final = [evidence.update(vector) for vector in examples.vectors(slide)]
+    return final
 
 
 def _predict_us(model: TextureModel, window: Array, repeats: int = 200) -> float:
@@ -130,6 +147,6 @@ def _predict_us(model: TextureModel, window: Array, repeats: int = 200) -> float
     times = []
     for _ in range(repeats):
         began = time.perf_counter()
-        model.predictor(window)
+        model.predict_log_proba(window)
         times.append(time.perf_counter() - began)
     return 1e6 * float(np.median(times))

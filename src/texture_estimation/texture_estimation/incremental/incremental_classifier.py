@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections import OrderedDict
 from pathlib import Path
 
@@ -60,8 +59,7 @@ class IncrementalClassifier:
     """
 
     def __init__(self, model: TextureModel, path: str | Path | None = None) -> None:
-        self.model = model
-        self._ridge_classifier = model.ridge_classifier()
+        self.model = model.with_added_slides(model.added_slides)  # which fits the Gaussians before a slide is added
         self._path = path
         self._numbers = stored_numbers(path) if path is not None else []  # of the files, one for each added slide
         self._recent_windows: OrderedDict[str, list[Array]] = OrderedDict()
@@ -102,8 +100,8 @@ class IncrementalClassifier:
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
         if self._path is not None:
             self._store(self._path, added_slide)
-        self._update((*self.model.added_slides, added_slide), label)
-        return len(self._ridge_classifier.examples_of(self.model.labels.index(label)))
+        self.model = self.model.with_added_slides((*self.model.added_slides, added_slide))
+        return len(self.model.examples_of(label))
 
     def _refuse_second_label(self, exploration_id: str, label: str) -> None:
         others = [kept.label for kept in self.model.added_slides if kept.exploration_id == exploration_id != '']
@@ -127,7 +125,7 @@ class IncrementalClassifier:
         if self._path is not None:
             remove_added_slide(self._path, self._numbers[-1])
             del self._numbers[-1]
-        self._update(tuple(before), last.label)
+        self.model = self.model.with_added_slides(tuple(before))
         return last
 
     def remove(self, label: str) -> tuple[AddedSlide, ...]:
@@ -155,7 +153,7 @@ class IncrementalClassifier:
                     del self._numbers[place]
                 removed.append(kept.pop(place))
         finally:
-            self._start_again(tuple(kept))
+            self.model = self.model.with_added_slides(tuple(kept))
         return tuple(reversed(removed))
 
     def _store(self, path: str | Path, added_slide: AddedSlide) -> None:
@@ -178,21 +176,3 @@ class IncrementalClassifier:
                 f'train the model again without it. {allowed}'
             )
         raise unknown_name(label, added, 'added texture')
-
-    def _start_again(self, added_slides: tuple[AddedSlide, ...]) -> None:
-        """Compute the incremental classifier again: without a label in the middle, the numbers of the others change."""
-        updated = dataclasses.replace(self.model.with_added_slides(added_slides), incremental_predictor=None)
-        self._ridge_classifier = updated.ridge_classifier()
-        self.model = dataclasses.replace(
-            updated, incremental_predictor=self._ridge_classifier.predictor if added_slides else None
-        )
-
-    def _update(self, added_slides: tuple[AddedSlide, ...], label: str) -> None:
-        """Update the model to these added slides; only those of one label differ from before."""
-        updated = self.model.with_added_slides(added_slides)
-        labels = updated.labels if label in updated.labels else self.model.labels
-        as_trained = label in updated.trained_labels and all(added_slide.label != label for added_slide in added_slides)
-        self._ridge_classifier.set_examples(labels.index(label), updated.examples_of(label), as_trained=as_trained)
-        self.model = dataclasses.replace(
-            updated, incremental_predictor=self._ridge_classifier.predictor if added_slides else None
-        )

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texture_core.arrays import AnyArray, Array
-from texture_estimation.incremental.ridge_classifier import spread
 from texture_estimation.learners.learner import Codes
+
+# Windows of a texture that are kept; more cost time and memory, and hardly help.
+MAX_EXAMPLES = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,3 +101,8 @@ class TrainingExamples:
         """Return what `as_arrays` gave."""
         codes, slides = (np.asarray(parameters[name], dtype=np.intp) for name in ('codes', 'slides'))
         return cls(np.asarray(parameters['values'], dtype=np.float32), codes, slides)
+
+
+def spread(count: int, most: int = MAX_EXAMPLES) -> Codes:
+    """Return at most so many of the numbers 0 to count - 1, evenly spread."""
+    return np.unique(np.linspace(0, max(count - 1, 0), min(count, most)).round().astype(np.intp))
