@@ -290,3 +290,14 @@ def test_estimates_are_as_before_once_a_texture_is_removed(model, examples, silk
     incremental_classifier.add('silk')
     incremental_classifier.remove('silk')
     assert estimated(incremental_classifier.model, examples.values[:9]) == estimated(model, examples.values[:9])
+
+
+@pytest.mark.filterwarnings('ignore:overflow', 'ignore:invalid value')
+def test_an_added_slide_whose_values_overflow_is_refused_with_a_sentence(three_added):
+    _, path = three_added
+    [first, *_] = sorted((path.parent / 'surfaces.added').iterdir())
+    content = json.loads(first.read_text())
+    content['values'][0][0] = 1e300
+    first.write_text(json.dumps(content))
+    with pytest.raises(ModelMismatch, match=r'the added slides of model .* cannot be used: .*; move them away'):
+        load_model(path)

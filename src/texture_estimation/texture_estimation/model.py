@@ -292,6 +292,8 @@ class TextureModel:
             novelty = SlideNovelty(self.novelty_detector.distances, len(self.labels))
             novelty.add(nothing, self.activations(nothing), 0, 1.0)
             self.novelty_detector.novelty_score(novelty.scores(0, 0.0), 1.0)
+        if self.slide_gaussians is not None:
+            self.slide_gaussians.check(nothing)
         if self.next_touch_model is not None:
             self.next_touch_model.check(nothing)
         if self.examples is not None:
@@ -378,7 +380,9 @@ def load_model(path: str | Path) -> TextureModel:
     if not added_slides:
         return model
     try:
-        return model.with_added_slides(added_slides)
+        with_added = model.with_added_slides(added_slides)
+        with_added.validate()
+        return with_added
     except model_files.BROKEN as error:
         raise ModelMismatch(f"the added slides of model '{target}' cannot be used: {error}; move them away") from error
 

@@ -198,6 +198,21 @@ class SlideGaussians:
         probabilities[..., self.added] += own[..., self.n_trained :]
         return probabilities
 
+    def check(self, mean: Array) -> None:
+        """Raise ValueError unless the shares of a slide with this mean, (n_features,), are numbers at every length.
+
+        Parameters
+        ----------
+        mean : (n_features,)
+
+        Raises
+        ------
+        ValueError
+            If an added slide holds values so large that they overflow.
+        """
+        if not all(np.isfinite(self.shares(mean, np.zeros_like(mean), length)).all() for length in self.lengths):
+            raise ValueError('its values are too large to be features')
+
     def _described(self, values: Array, overlap: float) -> list[Array]:
         """Return the descriptor of the start of a slide of each length; the last one is of the whole slide."""
         ends = [*(window_count(length, overlap) for length in self.lengths[:-1]), len(values)]
