@@ -47,7 +47,7 @@ def open_topics(params: RosControllersParams) -> ControllerTopics:
         module = importlib.import_module('texture_exploration.ros.controller_topics')
     except ImportError as error:
         raise DeviceError(
-            f"the arm 'ros_controllers' needs ROS 2, which is not installed here ({error}); see docs/start.md"
+            f"the arm 'ros_controllers' needs ROS 2, which is not installed here ({error}); see docs/index.md"
         ) from error
     topics: ControllerTopics = module.RosTopics(params)
     return topics
