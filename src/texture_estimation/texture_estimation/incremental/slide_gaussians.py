@@ -87,9 +87,10 @@ class SlideGaussians:
             Without added slides.
         """
         values = compared * values
-        names, first = np.unique(slides, return_index=True)
-        parts = [values[slides == name] for name in names]
-        classes = codes[first]
+        order = np.argsort(slides, kind='stable')
+        first = np.unique(slides[order], return_index=True)[1]
+        parts = np.split(values[order], first[1:])
+        classes = codes[order][first]
         counts = np.bincount(classes)
         typical = 1.0 + (float(np.median([len(part) for part in parts])) - 1.0) * overlap
         whole = max(WHOLE * typical, LENGTHS[0])
