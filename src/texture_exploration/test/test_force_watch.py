@@ -110,6 +110,24 @@ def test_a_pause_of_the_arm_is_no_frozen_reading():
     assert watch.frozen(replace(state, time_ns=400_000_000), ArmCommand()) == ''  # one state after a pause
 
 
+@pytest.mark.parametrize(('late_s', 'is_frozen'), [(0.03, False), (0.2, True)])
+def test_a_force_that_the_arm_held_may_stay_the_same_until_the_lift_takes_effect(late_s, is_frozen):
+    """A hand in current control reports exactly the force that it holds; one count of its encoder moves the height."""
+    watch = ForceWatch(SafetyLimits(), ForceReading.CONTROLLED, 1.0)
+    for step in range(50):
+        free = ArmState(step * 10_000_000, (0.0, 0.0, 0.01), (0.0, 0.0, 0.0), 0.0)
+        watch.note(Phase.APPROACH, free, ArmCommand(normal_m_s=-0.01))
+    said = []
+    for step in range(130):
+        lifted_s = max(0.0, 0.01 * (step - 100))
+        height_m = -0.0005 + (0.00007 if step > 50 else 0.0) + 0.05 * lifted_s
+        force_n = 1.0 if lifted_s <= late_s else 0.0
+        command = ArmCommand(force_n=1.0) if step < 100 else ArmCommand(normal_m_s=0.05)
+        said.append(watch.frozen(ArmState(step * 10_000_000, (0.0, 0.0, height_m), (0.0, 0.0, 0.0), force_n), command))
+    assert not any(said[:105])
+    assert any(said[105:110]) is is_frozen  # within 100 ms of the lift
+
+
 @pytest.mark.parametrize(
     ('lift', 'drifted'),
     [

@@ -27,7 +27,8 @@ class ForceWatch:
 
     - a sensor that always carries noise (`ForceReading.NOISY`): at any time;
     - one that may repeat itself (`MEASURED`): in contact, while the finger moves along the normal;
-    - an arm that holds the force itself (`CONTROLLED`): the same, as long as the wanted force is not reached.
+    - an arm that holds the force itself (`CONTROLLED`): the same, as long as the wanted force is not reached. The time
+      in which it held the force does not count: the reading also stays until a lift that was commanded takes effect.
 
     The force in free air is compared before and after the slide: what differs is drift, and the true force of the slide
     was wrong by as much.
@@ -55,7 +56,7 @@ class ForceWatch:
 
     def frozen(self, arm: ArmState, command: ArmCommand) -> str:
         """Return in a sentence that the reading is frozen, '' if not; `command` is what the arm was doing."""
-        if self._first is None or arm.force_n != self._first.force_n:
+        if self._first is None or arm.force_n != self._first.force_n or self._holds(arm.force_n, command):
             self._first, self._repeats, self._newest_ns = arm, 0, arm.time_ns
             return ''
         if arm.time_ns > self._newest_ns:
@@ -65,7 +66,7 @@ class ForceWatch:
         if self._repeats < MIN_REPEATS or same_s < self._limits.frozen_force_s:
             return ''
         moved_m = abs(arm.position[2] - self._first.position[2])
-        if self._reading is not ForceReading.NOISY and not self._implausible(arm.force_n, moved_m, command):
+        if self._reading is not ForceReading.NOISY and not self._implausible(arm.force_n, moved_m):
             return ''
         return (
             f'the measured force is frozen: it has been {arm.force_n:.3f} N for {same_s * 1e3:.0f} ms, while the '
@@ -127,11 +128,13 @@ class ForceWatch:
         """The force without contact, as it was before the contact; 0 until it is known."""
         return sorted(self._before)[int(LOW_SHARE * len(self._before))] if self._before else 0.0
 
-    def _implausible(self, force_n: float, moved_m: float, command: ArmCommand) -> bool:
-        if force_n - self._free_air_n < CONTACT_N or moved_m < self._limits.frozen_travel_m:
+    def _implausible(self, force_n: float, moved_m: float) -> bool:
+        return force_n - self._free_air_n >= CONTACT_N and moved_m >= self._limits.frozen_travel_m
+
+    def _holds(self, force_n: float, command: ArmCommand) -> bool:
+        """Return whether the arm keeps the force the same by itself."""
+        if self._reading is not ForceReading.CONTROLLED:
             return False
-        if self._reading is ForceReading.MEASURED:
-            return True
         if command.force_n is None:
-            return command.normal_m_s != 0.0
-        return abs(command.force_n - force_n) > HELD_SHARE * command.force_n
+            return command.normal_m_s == 0.0
+        return abs(command.force_n - force_n) <= HELD_SHARE * command.force_n
