@@ -1,5 +1,6 @@
 """The arm behind an emulated controller that is a process of its own, seen only through its topics."""
 
+import json
 import os
 import re
 import signal
@@ -7,15 +8,20 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 from geometry_msgs.msg import PoseStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from std_srvs.srv import Trigger
+from texture_msgs import msg, srv
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ExplorationRequest, Phase
 from texture_core.node_process import NodeProcess
 from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros.qos import STATE_QOS
 from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.ros_controllers_params import RosControllersParams
 from texture_exploration.explorer import Explorer
@@ -31,6 +37,15 @@ LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
 HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever
 DEADLINE_S = 60.0
+MANAGED = {
+    'arm': 'managed_arm:ManagedArm',
+    'controller_manager': 'controller_manager',
+    'activate_controllers': 'twist',
+    'deactivate_controllers': 'joints',
+    'watch_signal': False,
+    'state_timeout_s': 2.0,
+    'deadman_s': 1.0,
+}
 MOVING = """
 import time
 from texture_exploration.arms.protocol import ArmCommand
@@ -116,6 +131,40 @@ def test_when_the_process_that_commands_is_killed_the_arm_comes_to_rest(graph, r
         record_property('stopped_s', moved[1] - killed_s)
         print(f'at rest {1e3 * (moved[1] - killed_s):.0f} ms after the death of who commanded')
         assert moved[1] - killed_s < 1.5
+
+
+def end_by_ctrl_c(graph, explorer):
+    explorer.process.send_signal(signal.SIGINT)
+    assert explorer.wait(DEADLINE_S) == 0
+
+
+def end_by_deactivation(graph, _explorer):
+    client = graph.peer.create_client(ChangeState, 'explorer/change_state')
+    graph.until(client.service_is_ready)
+    request = ChangeState.Request()
+    request.transition.id = Transition.TRANSITION_DEACTIVATE
+    answer = client.call_async(request)
+    graph.until(answer.done)
+    assert answer.result().success
+
+
+@pytest.mark.parametrize('end', [end_by_ctrl_c, end_by_deactivation])
+def test_controllers_are_handed_back_with_the_finger_lifted_and_at_rest(graph, monkeypatch, tmp_path, end):
+    log = tmp_path / 'switches'
+    monkeypatch.setenv('MANAGED_LOG', str(log))
+    monkeypatch.setenv('PYTHONPATH', os.pathsep.join([str(Path(__file__).parent), os.environ.get('PYTHONPATH', '')]))
+    states = graph.listen(msg.ExplorationState, 'exploration', STATE_QOS)
+    with NodeProcess('texture_exploration', 'explorer', MANAGED) as explorer:
+        client = graph.peer.create_client(srv.Explore, 'explore')
+        graph.until(client.service_is_ready)
+        client.call_async(srv.Explore.Request(motion='linear_slide', speed_m_s=0.01, force_n=1.0, distance_m=0.1))
+        graph.until(lambda: any(state.phase_name == Phase.SLIDE.value for state in states))
+        end(graph, explorer)
+        taken, given_back = map(json.loads, log.read_text().splitlines())
+    assert (taken['activated'], taken['deactivated']) == (['twist'], ['joints'])
+    assert (given_back['activated'], given_back['deactivated']) == (['joints'], ['twist'])
+    assert given_back['at_rest']
+    assert given_back['height_m'] > 0.0  # in the slide it was pressed into the surface
 
 
 def test_a_hand_over_without_the_messages_of_the_controller_manager_is_refused(graph, monkeypatch):

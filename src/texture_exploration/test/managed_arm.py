@@ -1,0 +1,67 @@
+"""An arm behind a controller manager, for an explorer in a process of its own: `arm:=managed_arm:ManagedArm`.
+
+The topics and the manager are emulated within the process, as the wheels of ROS lack the messages of the manager. Each
+switch is appended to the file MANAGED_LOG, with the height of the finger and whether rest was commanded last.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from texture_exploration.arms.ros_controllers import RosControllersArm
+from texture_exploration.arms.ros_controllers_params import RosControllersParams
+from texture_exploration.arms.ros_controllers_topics import ForceSample, PoseSample
+from texture_simulation.devices.twist_controller import TOOL_DOWN, EmulatedTwistArm
+from texture_simulation.devices.twist_controller_params import TwistControllerParams
+
+
+class ManagedTopics:
+    """Topics of an emulated arm, and a controller manager that writes down what it is asked."""
+
+    def __init__(self, _params: RosControllersParams) -> None:
+        self._arm = EmulatedTwistArm(TwistControllerParams(start_height_m=0.003), time.monotonic_ns())
+        self._log = Path(os.environ['MANAGED_LOG'])
+        self._velocity = (0.0, 0.0, 0.0)
+
+    def newest_pose(self):
+        now_ns = time.monotonic_ns()
+        self._arm.advance(now_ns)
+        return PoseSample(now_ns, 'base', tuple(self._arm.position.tolist()), TOOL_DOWN)
+
+    def newest_force(self):
+        return ForceSample(time.monotonic_ns(), 'tool0_controller', tuple(self._arm.reading_n().tolist()))
+
+    def listeners(self):
+        return 1
+
+    def send_velocity(self, velocity_m_s):
+        self._velocity = velocity_m_s
+        self._arm.command(time.monotonic_ns(), np.array(velocity_m_s))
+
+    def send_force(self, _force_n):
+        pass
+
+    def switch_controllers(self, activate, deactivate):
+        switch = {
+            'activated': [*activate],
+            'deactivated': [*deactivate],
+            'at_rest': not any(self._velocity),
+            'height_m': self._arm.finger().z_m,
+        }
+        with self._log.open('a') as log:
+            print(json.dumps(switch), file=log)
+
+    def close(self):
+        pass
+
+
+class ManagedArm(RosControllersArm):
+    """See the module."""
+
+    def __init__(self, params: RosControllersParams) -> None:
+        super().__init__(params, open_topics=ManagedTopics)
