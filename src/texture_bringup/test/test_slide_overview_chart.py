@@ -3,17 +3,17 @@ from pathlib import Path
 import matplotlib.image
 import numpy as np
 
-from texture_bringup.demo.slide_overview_chart import SlideOverview, picture
-from texture_core.estimates import TextureEstimate
+from texture_bringup.demo.slide_overview_chart import GrowingEvidence, SlideOverview, picture
 
 LABELS = ('cork', 'felt', 'linen')
 TABLE = np.array([[9, 1, 0], [2, 8, 0], [0, 0, 0]])
 
 
 def overview() -> SlideOverview:
-    estimates = [TextureEstimate(0, 'e', 'cork', True, 0.8, LABELS, (0.8, 0.1, 0.1), k, 0.5 * k) for k in (1, 2, 3)]
+    log_odds = np.outer([1.0, 2.0, 3.0], [0.0, 1.5, 2.5])
+    evidence = GrowingEvidence('cork', np.array([0.5, 0.6, 0.7]), LABELS, log_odds, 0.8)
     tone = np.sin(2 * np.pi * 100 * np.arange(2000) / 1000)
-    return SlideOverview('simulated', 'cork', tone, 1000.0, 'count', estimates, LABELS, TABLE)
+    return SlideOverview('simulated', 'cork', tone, 1000.0, 'count', evidence, LABELS, TABLE)
 
 
 def test_the_picture_is_drawn_without_a_display(tmp_path: Path) -> None:

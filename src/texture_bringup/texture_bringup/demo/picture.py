@@ -3,75 +3,100 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from texture_bringup.demo.slide_overview_chart import SlideOverview, picture
+from texture_bringup.demo.slide_overview_chart import GrowingEvidence, SlideOverview, picture
 from texture_core.arrays import Array
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationState, Phase
-from texture_core.signal import TactileSignal
+from texture_core.features import FeatureVector
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_estimation.classification.evidence_rules import running_means
+from texture_estimation.model import TextureModel
 from texture_evaluation.evaluate import EvaluationReport
 from texture_recordings.bags import read_bag
 
+SOURCE = 'simulated Robotiq TSF-85'
 
-def draw(bag: Path, surface: str, report: EvaluationReport, source: str, path: Path, *, note: str = '') -> Path:
+
+def draw(bag: Path, surface: str, model: TextureModel, report: EvaluationReport, path: Path, *, note: str = '') -> Path:
     """Draw an exploration of a surface, and the confusion of all explorations in the bag.
 
     Parameters
     ----------
     bag
-        With the signal, the states and the live estimates.
+        With the signal, the states, the features and the live estimates.
     surface
-        Of which surface: the exploration in which most was trained on the way.
+        Of which surface: the exploration in which the evidence was weakest at first.
+    model
+        That recognised the slides.
     report
         Of the model on this bag.
-    source
-        Where the signal comes from, in words.
-    note
-        Lines below the panels.
     path
         File that is written.
+    note
+        Lines below the panels.
 
     Returns
     -------
     Path
         Of the file.
     """
-    states, estimates, batches = _gather(bag)
-    candidates = [name for name in estimates if states[name][0].surface == surface]
-    name = min(candidates, key=lambda each: _first_share(estimates[each]))
-    samples, rate_hz, unit = _sliding_part(states[name], batches)
-    others = {states[each][0].surface: _sliding_part(states[each], batches)[0] for each in estimates}
+    found = _gather(bag)
+    evidence = {name: _growing(model, found, name) for name in found.estimates}
+    candidates = [name for name in evidence if found.states[name][0].surface == surface]
+    name = min(candidates, key=lambda each: np.sort(evidence[each].log_odds[0])[1])
+    samples, rate_hz, unit = _sliding_part(found.states[name], found.batches)
+    others = {
+        found.states[each][0].surface: _sliding_part(found.states[each], found.batches)[0] for each in found.estimates
+    }
     del others[surface]
     overview = SlideOverview(
-        source, surface, samples, rate_hz, unit, estimates[name], report.labels, report.confusion, others, note
+        SOURCE, surface, samples, rate_hz, unit, evidence[name], report.labels, report.confusion, others, note
     )
     return picture(overview, path)
 
 
-def _first_share(estimates: Sequence[TextureEstimate]) -> float:
-    """Return how probable the final label was at first."""
-    return estimates[0].probabilities[estimates[0].labels.index(estimates[-1].label)]
+@dataclass(frozen=True, eq=False)
+class _Recorded:
+    """What a bag holds: slide states, windows and the newest estimate of each exploration, all vibration batches."""
+
+    states: defaultdict[str, list[ExplorationState]] = field(default_factory=lambda: defaultdict(list))
+    windows: defaultdict[str, list[FeatureVector]] = field(default_factory=lambda: defaultdict(list))
+    estimates: dict[str, TextureEstimate] = field(default_factory=dict)
+    batches: list[TactileSignal] = field(default_factory=list)
 
 
-def _gather(
-    bag: Path,
-) -> tuple[Mapping[str, list[ExplorationState]], Mapping[str, list[TextureEstimate]], list[TactileSignal]]:
-    """Return the slide states and the estimates with evidence of each exploration, and all vibration batches."""
-    states: defaultdict[str, list[ExplorationState]] = defaultdict(list)
-    estimates: defaultdict[str, list[TextureEstimate]] = defaultdict(list)
-    batches: list[TactileSignal] = []
-    for _, _, value in read_bag(bag, ('exploration', 'signal', 'texture')):
+def _growing(model: TextureModel, found: _Recorded, name: str) -> GrowingEvidence:
+    """Return the evidence of one exploration after each of its windows, as the classifier has it."""
+    windows, final, rule = found.windows[name], found.estimates[name], model.recipe.evidence
+    scores = rule.window_evidence(model.predict_log_proba(np.array([window.values for window in windows])))
+    length_s = windows[0].window_s
+    seconds = length_s + np.array([window.start_ns - windows[0].start_ns for window in windows]) / NANOSECONDS
+    effective = seconds / length_s
+    means = running_means(rule, scores, effective)
+    posterior = rule.log_posterior(means, effective[:, None], model.tempering_exponent)
+    best = model.labels.index(final.label)
+    return GrowingEvidence(final.label, seconds, model.labels, posterior[:, [best]] - posterior, final.confidence)
+
+
+def _gather(bag: Path) -> _Recorded:
+    """Return what the bag holds."""
+    found = _Recorded()
+    for _, _, value in read_bag(bag, ('exploration', 'signal', 'features', 'texture')):
         if isinstance(value, TactileSignal):
-            batches.append(value)
+            found.batches.append(value)
+        elif isinstance(value, FeatureVector) and not value.last:
+            found.windows[value.exploration_id].append(value)
         elif isinstance(value, TextureEstimate) and value.probabilities:
-            estimates[value.exploration_id].append(value)
+            found.estimates[value.exploration_id] = value
         elif isinstance(value, ExplorationState) and value.phase is Phase.SLIDE:
-            states[value.exploration_id].append(value)
-    return states, estimates, batches
+            found.states[value.exploration_id].append(value)
+    return found
 
 
 def _sliding_part(states: Sequence[ExplorationState], batches: Sequence[TactileSignal]) -> tuple[Array, float, str]:

@@ -22,8 +22,6 @@ from texture_evaluation.evaluate import EvaluationReport, evaluate
 from texture_evaluation.evaluation_text import percent
 from texture_evaluation.train import train_from_bags
 
-SOURCE = 'simulated Robotiq TSF-85'
-
 
 @dataclass(frozen=True)
 class Places:
@@ -178,7 +176,7 @@ def _report(
     progress.line(f'`texture evaluate` reads the same recording: {windows} of single windows right')
     refusal = f'The same surface at {plan.untrained_speed_m_s:g} m/s: {untrained.message}'
     note = '\n'.join(filter(None, [model.error_bound.reason, refusal]))
-    draw(places.recognition_bag, plan.shown, report, SOURCE, places.picture, note=note)
+    draw(places.recognition_bag, plan.shown, model, report, places.picture, note=note)
     progress.section(f'Done. Look at {places.picture}')
     progress.line(f'recordings, model, figures and the log of the nodes are in {places.folder}/')
     return report

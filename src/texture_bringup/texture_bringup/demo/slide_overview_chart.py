@@ -11,11 +11,36 @@ import numpy as np
 from scipy.signal import welch
 
 from texture_core.arrays import AnyArray, Array, Samples
-from texture_core.estimates import TextureEstimate
 from texture_evaluation.charts import COLOURS, chart, draw_confusion, line_styles
 
-SHOWN_LABELS = 4
+SHOWN_LABELS = 3
 SHOWN_S = 0.5
+MARGIN = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class GrowingEvidence:
+    """How the evidence for one label grows while the finger slides.
+
+    Parameters
+    ----------
+    label
+        The label at the end.
+    seconds : (n_windows,)
+        Sliding time used at the end of each window, s.
+    labels
+        All labels of the model.
+    log_odds : (n_windows, n_labels)
+        Natural logarithm of how much more probable `label` is than each label; 0 for itself.
+    confidence
+        Of the label at the end, as it was reported.
+    """
+
+    label: str
+    seconds: Array
+    labels: Sequence[str]
+    log_odds: Array
+    confidence: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +57,8 @@ class SlideOverview:
         One channel of the slide.
     rate_hz, unit
         Of the samples.
-    estimates
-        The growing evidence, after each window.
+    evidence
+        After each window.
     labels, table
         Confusion of test windows, as `metrics.confusion` counts it.
     others
@@ -47,7 +72,7 @@ class SlideOverview:
     samples: Array
     rate_hz: float
     unit: str
-    estimates: Sequence[TextureEstimate]
+    evidence: GrowingEvidence
     labels: Sequence[str]
     table: AnyArray
     others: Mapping[str, Array] = field(default_factory=dict)
@@ -91,13 +116,19 @@ def _spectrum(axes: Any, overview: SlideOverview) -> None:
 
 
 def _evidence(axes: Any, overview: SlideOverview) -> None:
-    labels = overview.estimates[-1].labels
-    seconds = [estimate.evidence_s for estimate in overview.estimates]
-    probabilities = 100 * np.array([estimate.probabilities for estimate in overview.estimates])
-    shown = np.argsort(-probabilities.max(axis=0))[:SHOWN_LABELS]
-    for column, style in zip(sorted(shown, key=lambda c: -probabilities[-1, c]), line_styles(), strict=False):
-        axes.plot(seconds, probabilities[:, column], marker='.', label=labels[column], **style)
-    axes.set(xlabel='sliding time used (s)', ylabel='probability (%)', ylim=(-3, 103))
+    evidence = overview.evidence
+    others = [column for column in np.argsort(evidence.log_odds[-1]) if evidence.labels[column] != evidence.label]
+    for column, style in zip(others[:SHOWN_LABELS], line_styles(), strict=False):
+        axes.plot(evidence.seconds, evidence.log_odds[:, column], marker='.', label=evidence.labels[column], **style)
+    axes.axhline(0, color='grey', linewidth=0.8)
+    axes.set(xlabel='sliding time used (s)', ylabel=f'log odds of {evidence.label}', ylim=_with_zero(evidence.log_odds))
     axes.set_xlim(left=0)
-    axes.set_title(f'3. Evidence after each window, at the end: {overview.estimates[-1].label}')
-    axes.legend(loc='center right', title='surface')
+    axes.set_title(f'3. Each window adds evidence; reported confidence {evidence.confidence:.2f}')
+    axes.legend(loc='lower right', title='compared with')
+
+
+def _with_zero(values: Array) -> tuple[float, float]:
+    """Return limits that hold all values and 0, with a margin."""
+    low, high = min(0.0, float(values.min())), max(1.0, float(values.max()))
+    margin = MARGIN * (high - low)
+    return low - margin, high + margin
