@@ -118,7 +118,7 @@ def _tested(model: TextureModel, examples: LabelledFeatures) -> tuple[tuple[floa
             estimate = evidence.update(vector)
             taken.append(1e6 * (time.perf_counter() - start))
         right.append(estimate.label == slide.partition('/')[0])
-    return (alone, float(np.mean(right))), np.array(taken[WARM_UP:])
+    return (alone, float(np.mean(right))), np.array(taken[min(WARM_UP, len(taken) // 2) :])
 
 
 def _bytes(examples: LabelledFeatures) -> int:
