@@ -32,7 +32,7 @@ def ablation_chart(numbers: Mapping[str, Any], path: Path) -> Path:
     """
     with chart(path, (11.0, 0.9 + 0.24 * sum(len(own['variants']) for own in numbers.values()))) as figure:
         figure.suptitle(
-            'What recognition could do without (BioTac, 20 materials, slides held out of the first 30)',
+            'Change of accuracy and cost by what is left out (BioTac, 20 materials, slides held out of the first 30)',
             x=0.02, ha='left', fontweight='bold',
         )  # fmt: skip
         heights = [len(own['variants']) for own in numbers.values()]

@@ -67,7 +67,7 @@ def size_chart(
         Of the file.
     """
     with chart(path, (10.0, 7.6)) as figure:
-        figure.suptitle('What a training costs as it grows (made-up examples)', x=0.02, ha='left', fontweight='bold')
+        figure.suptitle('Cost of a training by its size (artificial examples)', x=0.02, ha='left', fontweight='bold')
         grid = figure.subplots(2, 2)
         for axes, (cost, axis) in zip(grid.ravel(), product(COSTS, AXES), strict=True):
             for (learner, found), colour in zip(panels[axis].items(), COLOURS, strict=False):

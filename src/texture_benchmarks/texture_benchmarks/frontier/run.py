@@ -65,7 +65,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
             'share of single windows recognised and computing time of one (µs, median and 99th percentile) by the '
             'length of the window; share of slides recognised over the sliding time, and over its mean when each ends '
             'at a confidence; computing time (s) and memory '
-            f'(MiB) of a training on made-up examples, where {LIMIT_S:.0f} s are enough for it by the size before'
+            f'(MiB) of a training on artificial examples, where {LIMIT_S:.0f} s are enough for it by the size before'
         ),
         data=f'{DATA["biotac20"]}; PAC at 1 kHz',
         split='by time: trained on slides 1-30 of each material, windows 0.5 s apart; tested on slides 31-40',

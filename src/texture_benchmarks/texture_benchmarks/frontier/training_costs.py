@@ -67,7 +67,7 @@ def costs(learner: str, sizes: Sequence[TrainingSize], limit_s: float, seed: int
 
 
 def cost(learner: Learner, size: TrainingSize, seed: int) -> Cost:
-    """Return what one training on made-up examples costs.
+    """Return what one training on artificial examples costs.
 
     Parameters
     ----------

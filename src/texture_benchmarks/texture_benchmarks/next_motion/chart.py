@@ -41,5 +41,5 @@ def slides_chart(
         for share in wanted:
             axes.axhline(100 * share, color='k', linewidth=1, linestyle='--')
         axes.set(xlabel='slides', ylabel='trials with the right texture (%)', xticks=numbers, ylim=(None, 101))
-        axes.legend(loc='lower right', title='next motion')
+        axes.legend(loc='best', title='next motion')
     return Path(path)

@@ -93,7 +93,7 @@ def coverage_chart(nominal: Array, covered: Array, title: str, path: str | Path)
     """
     with chart(path, (5.2, 4.6)) as figure:
         axes = figure.subplots()
-        axes.plot([45, 100], [45, 100], color=COLOURS[6], linewidth=0.8, linestyle='--', label='honest')
+        axes.plot([45, 100], [45, 100], color=COLOURS[6], linewidth=0.8, linestyle='--', label='exact coverage')
         axes.plot(100 * nominal, 100 * covered, marker='o', color=COLOURS[0], label='unseen textures')
         axes.set(xlabel='interval claimed (%)', ylabel='grades of people within it (%)', xlim=(45, 100), ylim=(30, 101))
         axes.set_title(title, fontsize=8)
