@@ -184,6 +184,13 @@ def test_held_out_slides_that_are_no_such_numbers_are_refused_in_one_sentence(sa
     refused(with_entry(saved, entry), "error_bound.*, a number from 0 to 1; train it again with 'texture train'")
 
 
+@pytest.mark.parametrize('entry', [None, [], 'any'])
+def test_a_model_without_the_conditions_of_its_training_is_refused(saved, entry):
+    path = saved.with_suffix('.json')
+    path.write_text(json.dumps({**json.loads(path.read_text()), 'domain': entry}))
+    refused(saved, "no entry 'domain', the conditions of the training; train it again with 'texture train'")
+
+
 @pytest.mark.parametrize('slides', [0, 12, 149])
 def test_the_held_out_slides_of_the_card_limit_the_loaded_model(saved, slides):
     loaded = load_model(with_entry(saved, {'slides': slides, 'max_error_rate': 0.02}))

@@ -373,7 +373,7 @@ def load_model(path: str | Path) -> TextureModel:
             novelty_detector=NoveltyDetector.from_arrays(novelty_detector) if novelty_detector else None,
             next_touch_model=NextTouchModel.from_arrays(gaussians) if gaussians else None,
             examples=TrainingExamples.from_arrays(examples) if examples else None,
-            domain=Domain.from_card(card.get('domain', {})),
+            domain=Domain.from_card(card.get('domain')),
         )
         model.validate()
     added_slides = read_added_slides(target, model.feature_set, model.names)

@@ -136,14 +136,16 @@ class Domain:
         return asdict(self)
 
     @classmethod
-    def from_card(cls, card: Mapping[str, Any]) -> Domain:
-        """Return what `as_card` gave; of a card without a domain, one to which nothing is compared.
+    def from_card(cls, card: Mapping[str, Any] | None) -> Domain:
+        """Return what `as_card` gave.
 
         Raises
         ------
         InvalidData
-            If a range is none.
+            If there is none, or a range is none. A model without a domain would be certain under any conditions.
         """
+        if not isinstance(card, Mapping):
+            raise InvalidData("the model card has no entry 'domain', the conditions of the training")
         intervals = {name: _pair(card[name]) for name in ('speed_m_s', 'force_n') if card.get(name) is not None}
         return cls(
             motions=tuple(map(str, card.get('motions', ()))),
