@@ -14,6 +14,7 @@ from texture_core.errors import InvalidData
 
 # Of each paper on textures the recipe that recognises most slides after 5 s; the fifth paper grades roughness.
 SHOWN: Mapping[str, tuple[str, str]] = {
+    'onset': ('onset', OURS),
     'default': ('default', OURS),
     'fast': ('fast', OURS),
     'hu-log-pca-svm': ('Hu et al.', PAPERS),
