@@ -21,6 +21,26 @@ def test_a_stop_in_any_phase_lifts_the_finger_and_says_aborted(table, phase):
     assert table.arm.state().position[2] == pytest.approx(table.home[2], abs=0.001)
 
 
+def test_a_lift_that_fails_after_a_stop_is_reported_beside_the_stop(make_table):
+    table = make_table(touch=TouchParams(lift_speed_m_s=0.001), limits=SafetyLimits(lift_timeout_s=0.5))
+    table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
+    outcome = table.explore()
+    assert not outcome.success
+    assert outcome.message.startswith(
+        'stopped on request; the finger was not lifted: waited 0.5 s for the finger to be lifted'
+    )
+    assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
+
+
+def test_an_arm_that_hangs_in_the_lift_after_a_stop_is_reported_beside_the_stop(table):
+    table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
+    table.when[Phase.LIFT] = table.arm.freeze
+    outcome = table.explore()
+    assert re.match(
+        r'stopped on request; .*has not answered for 1[34]\d ms; the finger was not lifted', outcome.message
+    )
+
+
 def test_a_stop_while_sliding_leaves_along_the_normal(table):
     table.when[Phase.SLIDE] = lambda: table.exploration.stop('stopped on request')
     table.explore()

@@ -95,6 +95,7 @@ class Exploration:
         self._commanded = ArmCommand()
         self._stop_reason = ''
         self._finish_reason = ''
+        self._abort_reason = ''
         self._slid = False
         self._entered = False  # the workspace
         self._next_state_ns = 0
@@ -134,6 +135,7 @@ class Exploration:
             self._stop_reason or self._violation(arm) or self._signal_fault(self._listening) or self._overdue(now_ns)
         )
         if reason:
+            self._abort_reason = self._abort_reason or reason
             self._motion.abort(reason)
         if self._finish_reason:
             self._motion.finish(self._finish_reason)
@@ -202,7 +204,8 @@ class Exploration:
 
     def _give_up(self, reason: str) -> None:
         """End at once: an arm that does not follow cannot be lifted, only stopped."""
-        self.outcome = ExplorationOutcome(False, reason, self._slid)
+        message = f'{self._abort_reason}; {reason}' if self._abort_reason else reason
+        self.outcome = ExplorationOutcome(False, message, self._slid)
         self._report(
             ExplorationState(
                 stamp_ns=self._clock(),

@@ -96,7 +96,10 @@ class StagedMotion:
                 waited = f'waited {stage.timeout_s:.1f} s for {stage.goal}'
                 raise MotionAborted(f'{waited}; the force is {arm.force_n:.2f} N')
         except MotionAborted as error:
-            if not self._sought(error, stage):
+            if stage is self._lift:
+                before = f'{self._abort_reason}; ' if self._abort_reason else ''
+                self._abort_reason = f'{before}the finger was not lifted: {error}'
+            elif not self._sought(error, stage):
                 self.abort(str(error))
             return None
         return command
