@@ -263,6 +263,15 @@ def test_a_second_program_on_the_bus_is_refused_and_disturbs_nothing(bus, hand):
     until(lambda: all(table[TORQUE] for table in bus.motors.tables.values()))
 
 
+def test_a_second_program_is_refused_before_it_opens_the_line_and_empties_its_buffer(bus, hand, monkeypatch):
+    hand.connect()
+    opened = []
+    monkeypatch.setattr('dynamixel_sdk.PortHandler.openPort', lambda port: opened.append(port) or True)
+    with pytest.raises(DeviceError, match='no other program has it open'):
+        DynamixelHand('leap', str(bus.port.link)).connect()
+    assert not opened
+
+
 def test_a_late_answer_to_a_ping_is_not_taken_for_a_position(bus, hand, monkeypatch):
     answer, write, goals = bus._one, bus.motors.write, []
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import importlib
+import os
 import termios
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -54,6 +55,44 @@ class NoAnswer(DeviceError):
     """A motor that fell silent while it was told something."""
 
 
+class _Lock:
+    """A lock on a serial device, held by a descriptor of its own, from its making until it is closed.
+
+    Two programs on one bus would take each other's answers, and let each other's motors go. The SDK empties the input
+    buffer as it opens the port, answers to another program included; so the lock is taken before.
+
+    Parameters
+    ----------
+    device
+        Path of the device.
+
+    Raises
+    ------
+    OSError
+        If the device cannot be opened, or another program has the lock.
+    """
+
+    def __init__(self, device: str) -> None:
+        self._descriptor: int | None = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self.close()
+            raise
+
+    def __enter__(self) -> _Lock:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release the lock; again without effect."""
+        descriptor, self._descriptor = self._descriptor, None
+        if descriptor is not None:
+            os.close(descriptor)
+
+
 class DynamixelBus:
     """All motors of a profile.
 
@@ -84,10 +123,10 @@ class DynamixelBus:
         self._port: Any = self._sdk.PortHandler(device)
         self._packets: Any = self._sdk.PacketHandler(PROTOCOL)
         with self._line(), contextlib.ExitStack() as on_error:
+            self._lock = on_error.enter_context(_Lock(device))
             on_error.callback(self.close)
             opened = self._port.openPort() and self._port.setBaudRate(profile.baud)
-            if opened:  # two programs on one bus would take each other's answers, and let each other's motors go
-                fcntl.flock(self._port.ser.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if opened:
                 on_error.pop_all()
         if not opened:
             raise DeviceError(f"device '{device}' refuses {profile.baud} baud; correct the profile '{profile.name}'")
@@ -103,6 +142,7 @@ class DynamixelBus:
         """Close the port; never raises."""
         with contextlib.suppress(*LINE_FAULTS):
             self._port.closePort()
+        self._lock.close()
 
     def start(self) -> None:
         """Find and check the motors, set mode and gains; only when all is well, let them hold where they are.
