@@ -48,3 +48,24 @@ def test_classes_of_one_sample_each_have_a_covariance_and_finite_probabilities()
 def test_samples_that_are_all_the_same_say_nothing():
     classes = GaussianClasses.fit(np.full((6, 3), 0.1), np.repeat([0, 1], 3), np.array([3, 3]))
     np.testing.assert_allclose(np.exp(classes.log_probabilities(np.array([0.1, 0.2, 5.0]))), 0.5)
+
+
+def test_of_uncorrelated_features_a_diagonal_covariance_says_the_same(monkeypatch):
+    around = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+    samples = np.concatenate([around, around + np.array([9.0, 5.0])])
+    given = samples, np.repeat([0, 1], 4), np.array([4, 4])
+    full = GaussianClasses.fit(*given)
+    monkeypatch.setattr('texture_estimation.incremental.gaussian_classes.MAX_CORRELATED', 1)
+    diagonal = GaussianClasses.fit(*given)
+    assert diagonal.projection.shape == (2,)
+    np.testing.assert_allclose(diagonal.log_probabilities(samples), full.log_probabilities(samples))
+
+
+def test_more_features_than_a_covariance_could_hold_still_tell_the_classes():
+    n_features = 200_000  # whose covariance would take 320 GB
+    samples = np.random.default_rng(0).normal(size=(6, n_features))
+    samples[3:] += 1.0
+    classes = GaussianClasses.fit(samples, np.repeat([0, 1], 3), np.array([3, 3]))
+    third = classes.with_classes(np.full((1, n_features), 3.0), np.array([1]))
+    at = np.array([[0.0], [1.0], [3.0]]) + np.zeros(n_features)
+    assert third.log_probabilities(at).argmax(axis=1).tolist() == [0, 1, 2]

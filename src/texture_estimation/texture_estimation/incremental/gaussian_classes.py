@@ -15,6 +15,7 @@ from texture_estimation.log_probabilities import log_softmax
 # Chosen on slides 21-30 of recorded materials, five of twenty added to a model of slides 1-20 of the others.
 PRIOR_SAMPLES = 30.0  # the covariance is drawn to its diagonal as by so many further samples
 MIN_VARIANCE = 0.01  # within classes, in that of all samples: few samples may agree by chance
+MAX_CORRELATED = 1024  # features; of more, the covariance would take minutes and gigabytes, and few slides tell it
 CONSTANT = 1e-12  # deviation of a feature that is taken for constant, relative to its largest value
 
 
@@ -28,8 +29,8 @@ class GaussianClasses:
     ----------
     centre : (n_features,)
         Mean of the trained classes.
-    projection : (n_features, n_features)
-        Makes the covariance within the trained classes the identity.
+    projection : (n_features, n_features) or (n_features,)
+        Makes the covariance within the trained classes the identity; a vector holds the diagonal of a diagonal one.
     means : (n_classes, n_features)
         Of the classes, less the centre, projected.
     slides : (n_classes,)
@@ -71,19 +72,15 @@ class GaussianClasses:
         Returns
         -------
         GaussianClasses
+            More than `MAX_CORRELATED` features are taken for uncorrelated.
         """
         means = group_means(samples, classes)
         deviations = samples - means[classes]
         freedom = len(samples) - len(means)
         scale = _scale(samples, deviations, freedom)
-        deviations /= scale
-        own_weight = freedom / (freedom + PRIOR_SAMPLES)
-        covariance = own_weight * (deviations.T @ deviations) / max(freedom, 1)
-        np.fill_diagonal(covariance, 1.0)
-        variances, directions = eigh(covariance)
         centre = means.mean(axis=0)
-        projection = directions / np.sqrt(variances) / scale[:, None]
-        return cls(centre, projection, (means - centre) @ projection, slides)
+        projection = _projection(deviations / scale, freedom, scale)
+        return cls(centre, projection, _projected(means - centre, projection), slides)
 
     def with_classes(self, means: Array, slides: Codes) -> GaussianClasses:
         """Return the Gaussians with further classes, given by their means and numbers of slides.
@@ -93,7 +90,7 @@ class GaussianClasses:
         means : (n_further, n_features)
         slides : (n_further,)
         """
-        further = (means - self.centre) @ self.projection
+        further = _projected(means - self.centre, self.projection)
         return replace(self, means=np.concatenate([self.means, further]), slides=np.concatenate([self.slides, slides]))
 
     def log_probabilities(self, samples: Array) -> Array:
@@ -107,7 +104,7 @@ class GaussianClasses:
         -------
         (..., n_classes)
         """
-        projected = (samples - self.centre) @ self.projection
+        projected = _projected(samples - self.centre, self.projection)
         squares = np.add.reduce(projected * projected, axis=-1, keepdims=True)
         distances = squares - 2.0 * (projected @ self.means.T) + np.add.reduce(self.means * self.means, axis=1)
         variances = (1.0 + 1.0 / self.slides) ** self.uncertainty_exponent
@@ -121,3 +118,20 @@ def _scale(samples: Array, deviations: Array, freedom: int) -> Array:
     within = np.square(deviations).sum(axis=0) / max(freedom, 1)
     scale: Array = np.sqrt(np.where(constant, np.inf, np.maximum(within, MIN_VARIANCE * overall)))
     return scale
+
+
+def _projection(deviations: Array, freedom: int, scale: Array) -> Array:
+    """Return what makes the covariance of these scaled deviations within classes the identity."""
+    if deviations.shape[1] > MAX_CORRELATED:
+        diagonal: Array = 1.0 / scale
+        return diagonal
+    covariance = freedom / (freedom + PRIOR_SAMPLES) * (deviations.T @ deviations) / max(freedom, 1)
+    np.fill_diagonal(covariance, 1.0)
+    variances, directions = eigh(covariance)
+    full: Array = directions / np.sqrt(variances) / scale[:, None]
+    return full
+
+
+def _projected(samples: Array, projection: Array) -> Array:
+    projected: Array = samples * projection if projection.ndim == 1 else samples @ projection
+    return projected
