@@ -187,6 +187,6 @@ def test_the_report_has_a_page_a_chart_and_figures(tmp_path) -> None:
     text = page.read_text()
     assert '| emulator frozen | 1 | 1.5 | 1.5 |' in text
     assert '| sensor | WARN | gone | 3 |' in text
-    assert json.loads(figures.read_text())['recovery_s']['emulator frozen']['times'] == 1
+    assert json.loads(figures.read_text())['numbers']['recovery_s']['emulator frozen']['times'] == 1
     assert len(json.loads(events.read_text())['faults']) == 2
     assert chart.read_bytes().startswith(b'\x89PNG')

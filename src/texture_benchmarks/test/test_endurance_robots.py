@@ -209,7 +209,7 @@ def test_every_parameter_of_a_rig_is_one_of_the_explorer_and_every_fault_has_an_
 def test_the_report_holds_each_exploration_and_what_failed(tmp_path):
     wrong = exploration(contact=replace(KEPT, mean_force_n=6.0))
     page, figures, picture = robot_report.write_robots(record(aborted(fault='protective stop'), wrong), tmp_path)
-    content = json.loads(figures.read_text())
+    content = json.loads(figures.read_text())['numbers']
     assert len(content['explorations']) == 3
     assert [item['holds'] for item in content['requirements'] if 'true mean force' in item['asked']] == [False]
     assert '**no**' in page.read_text()

@@ -14,7 +14,7 @@ from texture_benchmarks.endurance.page import as_page
 from texture_benchmarks.endurance.process_load import cpu_change, lives, work_change
 from texture_benchmarks.endurance.record_counts import endings, messages, recoveries, since, spread
 from texture_benchmarks.endurance.requirements import RequirementResult, check_requirements
-from texture_benchmarks.result import machine
+from texture_benchmarks.result import BenchmarkResult
 
 
 def write(record: EnduranceRecord, out: Path) -> list[Path]:
@@ -22,23 +22,30 @@ def write(record: EnduranceRecord, out: Path) -> list[Path]:
     results = check_requirements(record)
     page = out / 'endurance.md'
     page.write_text('\n'.join(as_page(record, results)) + '\n', encoding='utf-8')
-    figures = _write_json(out / 'endurance.json', as_json(record, results))
-    events = _write_json(out / 'endurance-events.json', events_as_json(record))
-    return [page, figures, events, draw(record, out / 'endurance.png')]
+    events = out / 'endurance-events.json'
+    events.write_text(json.dumps(events_as_json(record), indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
+    chart = draw(record, out / 'endurance.png')
+    return [page, _as_result(record, results, chart).write(out), events, chart]
 
 
-def _write_json(path: Path, content: Any) -> Path:
-    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
-    return path
+def _as_result(record: EnduranceRecord, results: Sequence[RequirementResult], chart: Path) -> BenchmarkResult:
+    return BenchmarkResult(
+        name='endurance',
+        measured='explorations by their ending, recovery after faults (s), memory of each process (bytes), computing '
+        'time (share of a core), samples and feature vectors lost',
+        data='emulated sensor and simulated arm; faults injected at random',
+        split='none: one run; the model is trained on simulated slides',
+        numbers=as_json(record, results),
+        charts=(chart,),
+    )
 
 
 def as_json(record: EnduranceRecord, results: Sequence[RequirementResult]) -> dict[str, Any]:
     """Return the figures."""
     return {
-        'machine': machine(),
         'seed': record.seed,
         'duration_s': record.end_s - record.begin_s,
-        'verdicts': [asdict(result) for result in results],
+        'requirements': [asdict(result) for result in results],
         'endings': endings(record),
         'messages': messages(record),
         'recovery_s': {name: spread(seconds) for name, seconds in recoveries(record).items()},

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections import Counter
@@ -22,33 +21,39 @@ from texture_benchmarks.endurance.robot_requirements import (
     SUCCESS,
     check_robots,
 )
-from texture_benchmarks.result import machine
+from texture_benchmarks.result import BenchmarkResult, machine
 from texture_evaluation.charts import chart
 
 NUMBERS = re.compile(r'-?\d[\w.:-]*')
 PATHS = re.compile(r"'/[^']*'")
 COLOURS = {SUCCESS: '#009E73', ABORTED: '#E69F00', REFUSED: '#56B4E9', LOST: '#D55E00'}
 AGAIN = ', same request again'
+CHART = 'endurance-robots.png'
 
 
 def write_robots(record: RobotRecord, out: Path) -> list[Path]:
     """Write endurance-robots.md, .json and .png into a folder; return them."""
     page = out / 'endurance-robots.md'
     page.write_text('\n'.join(as_page(record)) + '\n', encoding='utf-8')
-    return [page, write_figures(record, out), draw_robots(record, out / 'endurance-robots.png')]
+    return [page, write_figures(record, out), draw_robots(record, out / CHART)]
 
 
 def write_figures(record: RobotRecord, out: Path) -> Path:
     """Write endurance-robots.json into a folder; return it."""
-    figures = out / 'endurance-robots.json'
-    figures.write_text(json.dumps(as_json(record), indent=1, ensure_ascii=False) + '\n', encoding='utf-8')
-    return figures
+    return BenchmarkResult(
+        name='endurance-robots',
+        measured='explorations by robot, fault and ending, true mean force of the successes as a share of the wanted '
+        'force, and what every exit of an explorer leaves behind',
+        data='emulated UR, emulated hand, rails and simulated arm; faults injected in turn',
+        split='none: one run, nothing is trained',
+        numbers=as_json(record),
+        charts=(out / CHART,),
+    ).write(out)
 
 
 def as_json(record: RobotRecord) -> dict[str, Any]:
     """Return the figures, and each exploration and exit with times from the beginning of the run."""
     return {
-        'machine': machine(),
         'seed': record.seed,
         'duration_s': record.end_s - record.begin_s,
         'sessions': record.sessions,
