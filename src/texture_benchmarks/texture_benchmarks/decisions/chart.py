@@ -22,30 +22,31 @@ CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.99
 
 
 def charts(trials: dict[str, Trial], out: Path) -> tuple[Path, ...]:
-    """Draw early decisions, the confidence, and what is taken for unknown."""
-    where = f'BioTac, trained on slides {TRAINED}, tested on {TESTED}'
-    early = {f'{name}: ending at a confidence': _by_confidence(trial.results) for name, trial in trials.items()}
-    early |= {f'{name}: the fitted rule': _point(trial.figures['early']) for name, trial in trials.items()}
+    """Draw early decisions, the calibration, and unknown slides accepted against known ones rejected."""
+    draws = len(next(iter(trials.values())).draws)
+    where = f'BioTac, 20 materials, trained on slides {TRAINED}, tested on {TESTED}'
+    early = {f'{name}: ends at a confidence': _by_confidence(trial.results) for name, trial in trials.items()}
+    early |= {f'{name}: fitted stopping rule': _point(trial.figures['early']) for name, trial in trials.items()}
     return (
         line_chart(
             early,
-            f'Early decisions. {where}',
-            ('mean time of sliding (s)', 'slides right (%)'),
+            f'Early stopping\n{where}',
+            ('mean sliding time (s)', 'slides right (%)'),
             out / 'decisions_early.png',
         ),
         line_chart(
             {
                 **{name: _reliability(trial.results) for name, trial in trials.items()},
-                'as right as it says': (np.array([30.0, 100.0]), np.array([30.0, 100.0])),
+                'perfect calibration': (np.array([30.0, 100.0]), np.array([30.0, 100.0])),
             },
-            f'Confidence and how often it is right. {where}',
-            ('mean confidence (%)', 'right (%)'),
+            f'Calibration of the confidence\n{where}',
+            ('mean confidence (%)', 'estimates that are right (%)'),
             out / 'decisions_calibration.png',
         ),
         line_chart(
             {name: tuple(100.0 * trial.draws[:, :-1].mean(axis=0).T) for name, trial in trials.items()},
-            f'{UNKNOWN} of 20 materials not in the training set, after 2.5 s. {where}',
-            ('known ones taken for unknown (%)', 'unknown ones taken for known (%)'),
+            f'{UNKNOWN} materials unknown, after 2.5 s of sliding; mean of {draws} draws\n{where}',
+            ('slides of known materials rejected (%)', 'slides of unknown materials accepted (%)'),
             out / 'decisions_unknown.png',
         ),
     )

@@ -23,7 +23,7 @@ from texture_features.labelled_features import LabelledFeatures
 from texture_recordings.slide_dataset import SlideDataset
 
 TRAINED, TESTED = '1-30', '31-40'
-UNKNOWN, DRAWS = 5, 10
+UNKNOWN, DRAWS = 5, 3  # each draw is a training of its own
 REJECTED = (0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3)
 QUICK_SLIDES, QUICK_TRAINED, QUICK_TESTED = '1-8,31-32', '1-8', '9-10'
 

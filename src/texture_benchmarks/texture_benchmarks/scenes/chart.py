@@ -12,15 +12,15 @@ from texture_benchmarks.scenes.costs import MANY, DeviceLoad, ScanCost
 from texture_benchmarks.scenes.trial import Ablation, TermEffect
 from texture_evaluation.charts import COLOURS, chart
 
-COLUMNS = 3
+COLUMNS = 2
 
 
 def ablation_chart(ablations: Sequence[Ablation], path: str | Path) -> Path:
-    """Draw for each scene what happens when a term is removed; a panel a scene."""
+    """Draw for each scene how the accuracy changes when a term is left out; one panel for each scene."""
     rows = -(-len(ablations) // COLUMNS)
     most = max(len(ablation.term_effects) for ablation in ablations)
     with chart(
-        path, (13.0, 1.0 + rows * (0.9 + 0.42 * most)), 'What changes when a term of a simulated scene is removed'
+        path, (9.0, 0.9 + rows * (0.8 + 0.27 * most)), 'Change of accuracy when a term of a simulated scene is left out'
     ) as figure:
         panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
         for axes, ablation in zip(panels, ablations, strict=False):
@@ -28,7 +28,7 @@ def ablation_chart(ablations: Sequence[Ablation], path: str | Path) -> Path:
         for axes in panels[len(ablations) :]:
             axes.axis('off')
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc='outside lower center', ncols=3, fontsize=9)
+        figure.legend(handles, labels, loc='outside lower left', title='the term is left out of')
     return Path(path)
 
 
@@ -62,46 +62,32 @@ def cost_chart(
     with chart(path, (11.0, 4.6)) as figure:
         scans, live = figure.subplots(1, 2, width_ratios=[1.5, 1.0])
         places = np.arange(len(costs))
-        scans.barh(places - 0.2, [cost.together_ms for cost in costs.values()], 0.38, color=COLOURS[0])
-        scans.barh(places + 0.2, [cost.alone_ms for cost in costs.values()], 0.38, color=COLOURS[4])
-        for place, (_, sticks) in zip(places, costs, strict=True):
-            scans.plot([target_ms[sticks]] * 2, [place - 0.45, place + 0.45], color=COLOURS[5], linewidth=2)
+        together, alone = ([getattr(cost, which) for cost in costs.values()] for which in ('together_ms', 'alone_ms'))
+        scans.barh(places - 0.2, together, 0.38, color=COLOURS[0], label=f'each of {MANY} slides at once')
+        scans.barh(places + 0.2, alone, 0.38, color=COLOURS[4], label='one slide alone')
+        targets = [target_ms[sticks] for _, sticks in costs]
+        scans.vlines(targets, places - 0.45, places + 0.45, color=COLOURS[5], linewidth=2, label='target')
         scans.set_yticks(places, [f'{name}\nstick-slip' if sticks else name for name, sticks in costs])
-        scans.set(xscale='log', xlabel='computing time of a slide of 0.5 s (ms)')
-        scans.set_title(f'1. Offline: dark each of {MANY} at once, light alone; red: allowed')
+        scans.set(xscale='log', xlabel='computing time of a slide of 0.5 s (ms)', title='1. Slides computed offline')
         scans.invert_yaxis()
+        scans.legend(loc='upper center', bbox_to_anchor=(0.5, -0.13), ncols=3)
         places = np.arange(len(loads))
         live.barh(places, [100 * load.cpu for load in loads.values()], 0.6, color=COLOURS[0])
-        live.axvline(100 * target_cpu, color=COLOURS[5], linewidth=2)
+        live.axvline(100 * target_cpu, color=COLOURS[5], linewidth=2, label='target')
         names = [f'{name}\n{load.rate_hz / 1000:g} kHz × {load.channels}' for name, load in loads.items()]
         live.set_yticks(places, names)
-        live.set(xlabel='computing time (% of one core); red: allowed')
-        live.set_title('2. Emulated devices in real time')
+        live.set(xlabel='computing time (% of one core)', title='2. Emulated devices in real time')
         live.invert_yaxis()
+        live.legend(loc='upper center', bbox_to_anchor=(0.5, -0.13))
     return Path(path)
 
 
 def _ablation(axes: Any, ablation: Ablation) -> None:
     places = np.arange(len(ablation.term_effects))
     series = (
-        (
-            'if the world had no such term',
-            [term_effect.easier for term_effect in ablation.term_effects],
-            COLOURS[0],
-            -0.16,
-        ),
-        (
-            'if only what is used for training had none',
-            [term_effect.unprepared for term_effect in ablation.term_effects],
-            COLOURS[1],
-            0.16,
-        ),
-        (
-            "by the paper's method, if the world had none",
-            [term_effect.paper for term_effect in ablation.term_effects],
-            COLOURS[2],
-            0.0,
-        ),
+        ('training and test slides', [effect.easier for effect in ablation.term_effects], COLOURS[0], -0.2),
+        ('training slides only', [effect.unprepared for effect in ablation.term_effects], COLOURS[1], 0.2),
+        ("both, with the paper's method", [effect.paper for effect in ablation.term_effects], COLOURS[2], 0.0),
     )
     for label, differences, colour, shift in series:
         known = [(place + shift, item) for place, item in zip(places, differences, strict=True) if item]
@@ -111,7 +97,7 @@ def _ablation(axes: Any, ablation: Ablation) -> None:
             xerr=[100 * item.half if np.isfinite(item.half) else 0.0 for _, item in known],
             fmt='o',
             color=colour,
-            markersize=5,
+            markersize=4,
             capsize=2,
             label=label,
         )
@@ -119,10 +105,12 @@ def _ablation(axes: Any, ablation: Ablation) -> None:
     axes.set_yticks(places, [_named(term_effect) for term_effect in ablation.term_effects])
     axes.set_ylim(len(places) - 0.5, -0.5)
     axes.set(xlabel='change of accuracy (percentage points)')
-    axes.set_title(f'{ablation.scene}: {100 * ablation.accuracy:.0f} % right, {ablation.slide_us:.0f} µs a slide')
+    axes.set_title(
+        f'{ablation.scene}: {100 * ablation.accuracy:.0f} % right, {ablation.slide_us:.0f} µs a slide', fontsize=9
+    )
 
 
 def _named(term_effect: TermEffect) -> str:
-    """Return the term, marked unless it decides, with what it adds to the time of a slide."""
-    mark = '' if term_effect.verdict == 'decides' else f' ({term_effect.verdict})'
-    return f'{term_effect.term.replace("_", " ")}{mark}\ncosts {term_effect.cost_us:.0f} µs'
+    """Return the term, its verdict if it does not decide, and what it adds to the computing time of a slide."""
+    mark = '' if term_effect.verdict == 'decides' else f'{term_effect.verdict}, '
+    return f'{term_effect.term.replace("_", " ")} ({mark}{term_effect.cost_us:+.0f} µs)'

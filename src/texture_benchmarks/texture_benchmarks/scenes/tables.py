@@ -34,7 +34,7 @@ def cost_table(
         kind = f'`{name}`, stick-slip' if sticks else f'`{name}`'
         times = (f'{value:.2f}' for value in (cost.together_ms, cost.worst_ms, cost.alone_ms))
         rows.append((kind, *times, f'{target_ms[sticks]:g}', device))
-    headings = ('scene', 'each of many at once (ms)', 'dearest surface (ms)', 'alone (ms)', 'allowed (ms)')
+    headings = ('scene', 'each of many at once (ms)', 'slowest surface (ms)', 'alone (ms)', 'target (ms)')
     return _table((*headings, 'device in real time (% of a core)'), rows)
 
 
@@ -53,8 +53,15 @@ def _term_row(scene: str, effect: TermEffect) -> tuple[str, ...]:
 def term_table(ablations: Sequence[Ablation]) -> str:
     """Return for each term of each scene what it costs, and how the accuracy changes when it is removed."""
     rows = [_term_row(ablation.scene, effect) for ablation in ablations for effect in ablation.term_effects]
-    headings = ('scene', 'term', 'costs (µs a slide)', 'change if nowhere (points)', 'change if held out (points)')
-    return _table((*headings, "the paper's method, if nowhere", 'verdict'), rows)
+    headings = (
+        'scene',
+        'term',
+        'computing time (µs a slide)',
+        'left out of training and test (points)',
+        'left out of training only (points)',
+        "left out of both, the paper's method (points)",
+    )
+    return _table((*headings, 'verdict'), rows)
 
 
 def added_table(added: Sequence[Ablation]) -> str:
@@ -66,9 +73,9 @@ def added_table(added: Sequence[Ablation]) -> str:
             rows.append((f'`{term_effect.term}`', f'{term_effect.cost_us:.0f}', known, novel, term_effect.verdict))
     headings = (
         'effect',
-        'costs (µs a slide)',
-        'change if in test and training (points)',
-        'further change if not in training (points)',
+        'computing time (µs a slide)',
+        'added to training and test (points)',
+        'further change if left out of training (points)',
     )
     return _table((*headings, 'verdict'), rows)
 
