@@ -170,7 +170,7 @@ class EvidenceAccumulator:
         best, decided = listed.index(confidence), listed.count(confidence) == 1
         within = not self._deviation
         novelty_score, known = self._novelty_score(model, mean, best, effective_windows)
-        known = known and within
+        known = known and within and model.active_confidence_floor.reached(confidence, effective_windows)
         bound = model.error_bound_of(best)
         certain = decided and known and bound.shown and model.certain(confidence, effective_windows, novelty_score)
         reported = bound.limited(probabilities)

@@ -23,6 +23,7 @@ from texture_estimation.learners.learner import Predictor, hidden_layer
 from texture_estimation.learners.mlp_predictor import MlpPredictor
 from texture_estimation.log_probabilities import is_tied, log_softmax
 from texture_estimation.next_motion.next_touch_model import NextTouchModel
+from texture_estimation.open_set.confidence_floor import ConfidenceFloor
 from texture_estimation.open_set.domain import Domain
 from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.open_set.novelty import NoveltyDetector, SlideNovelty, space_means
@@ -66,6 +67,8 @@ class TextureModel:
         Conformal prediction sets.
     novelty_detector
         Rejects unknown surfaces; with None no surface is rejected.
+    confidence_floor
+        Smallest confidence of known surfaces.
     next_touch_model
         Class-conditional Gaussians of each motion, to choose the next touch; None if all slides were alike.
     examples
@@ -104,6 +107,7 @@ class TextureModel:
     stopping_rule: StoppingRule = field(default_factory=StoppingRule)
     prediction_sets: PredictionSets = field(default_factory=PredictionSets)
     novelty_detector: NoveltyDetector | None = None
+    confidence_floor: ConfidenceFloor = field(default_factory=ConfidenceFloor)
     next_touch_model: NextTouchModel | None = None
     examples: TrainingExamples | None = None
     added_slides: tuple[AddedSlide, ...] = ()
@@ -125,6 +129,11 @@ class TextureModel:
         ]
         numbers = np.array([self.labels.index(added.label) for added in self.added_slides])
         return self.novelty_detector.with_slides(means, numbers)
+
+    @cached_property
+    def active_confidence_floor(self) -> ConfidenceFloor:
+        """Smallest confidence of known surfaces; none with added slides, whose labels make all others less probable."""
+        return ConfidenceFloor() if self.added_slides else self.confidence_floor
 
     @cached_property
     def active_domain(self) -> Domain:
@@ -288,6 +297,7 @@ class TextureModel:
             raise ModelMismatch(f'it answers {answer.shape} numbers, its card names {len(self.labels)} labels')
         self.prediction_sets.members(np.exp(answer), 1.0)
         self.stopping_rule.certain(0.5, 1.0)
+        self.confidence_floor.reached(0.5, 1.0)
         if self.novelty_detector is not None:
             novelty = SlideNovelty(self.novelty_detector.distances, len(self.labels))
             novelty.add(nothing, self.activations(nothing), 0, 1.0)
@@ -314,6 +324,7 @@ class TextureModel:
             'stopping_rule': asdict(self.stopping_rule),
             'error_bound': asdict(self.error_bound),
             'prediction_sets': asdict(self.prediction_sets),
+            'confidence_floor': asdict(self.confidence_floor),
             'domain': self.domain.as_card(),
             'motions': [asdict(motion) for motion in self.next_touch_model.gaussians] if self.next_touch_model else [],
             'training': dict(self.training),
@@ -371,6 +382,7 @@ def load_model(path: str | Path) -> TextureModel:
             stopping_rule=StoppingRule(**card['stopping_rule']),
             prediction_sets=PredictionSets(**{name: _tuples(value) for name, value in card['prediction_sets'].items()}),
             novelty_detector=NoveltyDetector.from_arrays(novelty_detector) if novelty_detector else None,
+            confidence_floor=ConfidenceFloor.from_card(card),
             next_touch_model=NextTouchModel.from_arrays(gaussians) if gaussians else None,
             examples=TrainingExamples.from_arrays(examples) if examples else None,
             domain=Domain.from_card(card.get('domain')),

@@ -90,6 +90,14 @@ class DecisionParams(TrainingParams):
         low=0.0,
         high=0.5,
     )
+    low_confidence_rejection_rate: float = param(
+        0.0,
+        'Fraction of slides over known textures that may be rejected as unknown because their label is too improbable '
+        'for the length of the slide; a larger one makes wrong labels under disturbances rarer at the end of a slide; '
+        '0: none. It needs a false_rejection_rate above 0.',
+        low=0.0,
+        high=0.5,
+    )
     novelty_scores: list[str] = param(  # noqa: RUF009 – it gives a field
         list(SCORES),
         'Names the scores that are summed to the novelty score: distances to training slides by the features, by the '

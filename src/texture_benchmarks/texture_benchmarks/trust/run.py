@@ -197,6 +197,7 @@ def _numbers(
         'wrong_known': metrics.wrong_known(clean),
         'unknown': metrics.unknown(clean),
         'stopping_rule': asdict(model.stopping_rule),
+        'confidence_floor': asdict(model.confidence_floor),
         'above_allowed': [row for row, outcome in outcomes.items() if outcome.worst_wrong > MAX_WRONG_KNOWN],
         'outcomes': {name: asdict(outcome) for name, outcome in outcomes.items()},
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from texture_estimation.classification.novelty_training import SlideTrace, fit_n
 from texture_estimation.learners.learner import Codes, Fitted
 from texture_estimation.log_probabilities import is_tied, log_loss
 from texture_estimation.open_set import prediction_sets, stopping_rule
+from texture_estimation.open_set.confidence_floor import ConfidenceFloor, fit_confidence_floor
 from texture_estimation.open_set.novelty import NoveltyDetector
 from texture_estimation.recipe import Recipe
 from texture_features.labelled_features import LabelledFeatures
@@ -113,8 +114,10 @@ def fit_open_set(
     examples: LabelledFeatures,
     slides: Sequence[HeldOutSlide],
     tempering_exponent: float,
-) -> tuple[stopping_rule.StoppingRule, NoveltyDetector | None]:
-    """Return when a slide may end, and the novelty detector; None if none is asked for or there are too few slides.
+) -> tuple[stopping_rule.StoppingRule, NoveltyDetector | None, ConfidenceFloor]:
+    """Return when a slide may end, the novelty detector, and the smallest confidence of known surfaces.
+
+    Without a novelty detector, as none is asked for or there are too few slides, there is no smallest confidence.
 
     Parameters
     ----------
@@ -131,7 +134,7 @@ def fit_open_set(
 
     Returns
     -------
-    (StoppingRule, NoveltyDetector or None)
+    (StoppingRule, NoveltyDetector or None, ConfidenceFloor)
     """
     decisions = recipe.training
     found = None
@@ -146,13 +149,16 @@ def fit_open_set(
             scores=decisions.novelty_scores,
         )
     if found is None:
-        return _fit_stopping(slides, recipe.evidence, tempering_exponent, decisions.max_error_rate), None
+        rule = _fit_stopping(slides, recipe.evidence, tempering_exponent, decisions.max_error_rate)
+        return rule, None, ConfidenceFloor()
     detector, traces = found
     courses = [_course(trace, detector, recipe.evidence, tempering_exponent) for trace in traces]
+    floor = _fit_floor(courses, decisions.low_confidence_rejection_rate)
+    courses = [_with_floor(course, floor) for course in courses]
     rule = stopping_rule.fit_open_set_rule(
         courses, decisions.max_error_rate, decisions.max_disturbed_error_rate, decisions.early_novelty_score
     )
-    return rule, detector
+    return rule, detector, floor
 
 
 def _course(
@@ -169,6 +175,20 @@ def _course(
         novelty_scores=novelty_scores,
         disturbance=trace.disturbance,
     )
+
+
+def _fit_floor(courses: Sequence[stopping_rule.SlideCourse], rate: float) -> ConfidenceFloor:
+    """Return the smallest confidence of undisturbed slides that end with the right label, but for this fraction."""
+    right = [course for course in courses if course.right[-1] and not course.disturbance]
+    return fit_confidence_floor(
+        [course.confidences for course in right], [course.effective_windows for course in right], rate
+    )
+
+
+def _with_floor(course: stopping_rule.SlideCourse, floor: ConfidenceFloor) -> stopping_rule.SlideCourse:
+    """Return a course that is known only where its confidence reaches the floor, too."""
+    steps = zip(course.confidences.tolist(), course.effective_windows.tolist(), strict=True)
+    return replace(course, known=course.known & np.array([floor.reached(*step) for step in steps]))
 
 
 def _fit_stopping(

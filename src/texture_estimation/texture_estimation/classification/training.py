@@ -63,7 +63,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
     slides_held_out = held_out_slides(fitted, codes, groups, recipe.evidence, overlap)
     tempering_exponent = fit_tempering_exponent(slides_held_out, recipe.evidence)
     decisions = recipe.training
-    rule, novelty_detector = fit_open_set(trained, fitted, examples, slides_held_out, tempering_exponent)
+    rule, novelty_detector, floor = fit_open_set(trained, fitted, examples, slides_held_out, tempering_exponent)
     return TextureModel(
         name=name or recipe.name,
         labels=tuple(labels.tolist()),
@@ -75,6 +75,7 @@ def train(recipe: Recipe, examples: LabelledFeatures, name: str = '') -> Texture
         stopping_rule=rule,
         prediction_sets=fit_prediction_sets(slides_held_out, recipe.evidence, tempering_exponent, decisions.coverage),
         novelty_detector=novelty_detector,
+        confidence_floor=floor,
         next_touch_model=_fit_next_touch_model(examples),
         training={
             'windows': len(codes),
