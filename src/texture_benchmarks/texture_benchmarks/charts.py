@@ -183,7 +183,7 @@ def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], 
 def front_chart(
     panels: Mapping[str, Mapping[str, tuple[float, float]]], title: str, axis_labels: tuple[str, str], path: str | Path
 ) -> Path:
-    """Draw methods by cost and share of successes, a panel for each data set, and the front that no other betters.
+    """Draw methods by cost and share of successes, with the front that no other betters; a row for each data set.
 
     Parameters
     ----------
@@ -201,12 +201,12 @@ def front_chart(
     Path
         Of the file.
     """
-    with chart(path, (5.6 * len(panels) + 0.6, 4.8), title) as figure:
-        rows = figure.subplots(1, len(panels), squeeze=False)[0]
+    with chart(path, (7.4, 0.6 + 4.0 * len(panels)), title) as figure:
+        rows = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
         for axes, (name, points) in zip(rows, panels.items(), strict=True):
-            axes.set(xlabel=axis_labels[0], title=name, xscale='log', ylim=(0, 101))
+            axes.set(ylabel=axis_labels[1], title=name, xscale='log', ylim=(0, 101))
             _front(axes, points)
-        rows[0].set_ylabel(axis_labels[1])
+        rows[-1].set_xlabel(axis_labels[0])
     return Path(path)
 
 

@@ -72,6 +72,7 @@ SPLITS: Mapping[str, str] = {
     'one force out': 'each in turn is tested and held out',
     'one speed out': 'each in turn is tested and held out',
 }
+SPLIT_TITLES: Mapping[str, str] = {LATER: 'later slides tested', 'one speed out': 'tested at a speed held out'}
 MINIROCKET = 'MiniRocket'
 SLOW = re.compile('-ann|MiniRocket')
 # Published with the data, for all of its 50 slides a material: windows of 0.5 s of PAC at 1 kHz, five random folds by
@@ -326,7 +327,7 @@ def result_of(name: str, numbers: Mapping[str, Any], options: BenchmarkOptions) 
             'computing time of a training (s); time from window to estimate (µs). Windows of '
             f'{LENGTH_S} s that do not overlap, trained on as tested; recipes that vote over shorter parts keep '
             f'those, and train on parts {LENGTH_S} s apart; recipes named "overlapping" train on windows '
-            f'{OVERLAPPING_S} s apart. Recipes as shipped, but on biotac20 without speed, force '
+            f'{OVERLAPPING_S} s apart. Recipes as released, but on biotac20 without speed, force '
             'and stretching: there they belong to the session and not to the surface'
         ),
         data='; '.join(text for name, text in DATA.items() if name in sets),
@@ -433,11 +434,11 @@ def _note(options: BenchmarkOptions) -> str:
 
 def _chart(numbers: Mapping[str, Any], path: Path) -> Path:
     panels = {
-        f'{name}, split {split}': {
+        f'{name}, {SPLIT_TITLES.get(split, split)}': {
             recipe: (cell['latency_us']['median'], cell['window_accuracy']) for recipe, cell in of_split.items()
         }
         for name, of_setting in numbers.items()
         for split, of_split in list(of_setting.items())[-1:]
     }
-    title = 'Accuracy over computing time of all recipes'
-    return front_chart(panels, title, ('time of a window (µs)', 'single windows, or votes, recognised (%)'), path)
+    title = 'Accuracy of all recipes over computing time; orange: most accurate for the time'
+    return front_chart(panels, title, ('computing time of a window (µs)', 'single windows recognised (%)'), path)
