@@ -8,6 +8,7 @@ from typing import Any
 from texture_benchmarks.charts import confusion_chart, evidence_chart
 from texture_benchmarks.imported_data import imported
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
+from texture_benchmarks.shared_models import trained_once
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.evaluate import EvaluationReport, evaluate
 from texture_evaluation.metrics import curve
@@ -21,7 +22,7 @@ QUICK_MATERIALS = ('material01', 'material02', 'material03')
 def run(options: BenchmarkOptions) -> BenchmarkResult:
     """Train on the first 30 slides of each material, test on the last 10."""
     with imported(options, 'biotac20', materials=QUICK_MATERIALS if options.quick else ()) as bags:
-        reports = {recipe: _report(recipe, bags) for recipe in RECIPES}
+        reports = {recipe: _report(recipe, bags, options) for recipe in RECIPES}
     return BenchmarkResult(
         name='biotac20',
         measured='share of windows and slides recognised; confusion counts single windows',
@@ -32,8 +33,9 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
 
 
-def _report(recipe: str, bags: list[Path]) -> EvaluationReport:
-    return evaluate(train_from_bags(recipe, bags, TRAINED), bags, TESTED)
+def _report(recipe: str, bags: list[Path], options: BenchmarkOptions) -> EvaluationReport:
+    model = trained_once(options, f'{recipe}-{TRAINED}', lambda: train_from_bags(recipe, bags, TRAINED))
+    return evaluate(model, bags, TESTED)
 
 
 def _numbers(recipe: str, report: EvaluationReport) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from texture_benchmarks.result import BenchmarkOptions
+from texture_benchmarks.shared_models import trained_once
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.classification.training import train
 from texture_estimation.model import TextureModel
@@ -60,7 +61,7 @@ def try_recipe(recipe: Recipe, bags: list[Path], options: BenchmarkOptions) -> T
     dataset = SlideDataset.from_bags(bags, topics=recipe.feature_set.topics)
     later = dataset.select(last)
     trained = training_examples(recipe, dataset.select(first))
-    model = train(recipe, trained)
+    model = trained_once(options, f'{recipe.name}-{first}', lambda: train(recipe, trained))
     report = evaluate_dataset(model, later)
     tested = later.features(recipe.feature_set)
     unknown, draws = (1, 2) if options.quick else (UNKNOWN, DRAWS)
