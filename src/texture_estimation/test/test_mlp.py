@@ -6,8 +6,10 @@ from sklearn.neural_network import MLPClassifier
 
 from texture_estimation import log_probabilities
 from texture_estimation.learners import mlp
+from texture_estimation.learners.augmented_examples import AugmentedExamples
 from texture_estimation.learners.mlp import Mlp, _first_weights, _slopes
 from texture_estimation.log_probabilities import log_loss, log_softmax
+from texture_features.augmentation.augmentation import Augmentation
 
 
 def test_slopes_are_the_derivatives_of_the_cross_entropy():
@@ -91,3 +93,18 @@ def test_a_training_that_would_take_too_long_makes_fewer_steps(examples, monkeyp
         5 * 500,
         5 * 450,
     )  # four slides of each: four folds, and all
+
+
+def test_networks_of_the_calibration_make_half_of_the_limited_steps_of_an_augmented_training(examples, monkeypatch):
+    codes, groups = (np.unique(of, return_inverse=True)[1] for of in (examples.labels, examples.groups))
+    counts = []
+    step = mlp._Adam.step
+    monkeypatch.setattr(mlp._Adam, 'step', lambda self, *args: (counts.append(1), step(self, *args))[1])
+    monkeypatch.setattr(mlp, 'MAX_WORK', 900 * (examples.values.shape[1] + 4))
+    none, n_features = np.zeros(0, dtype=np.intp), examples.values.shape[1]
+    nothing = np.zeros((0, n_features))
+    augmented = AugmentedExamples(
+        nothing.astype(np.float32), none, none, none, np.zeros(n_features), nothing, none, Augmentation()
+    )
+    Mlp(hidden=4, epochs=2000).fit(examples.values, codes, groups, augmented)
+    assert len(counts) == 4 * 450 + 900

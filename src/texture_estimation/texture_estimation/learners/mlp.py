@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -90,7 +89,7 @@ class Mlp:
         """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
 
         With augmented examples, the number of passes counts those over the undisturbed ones. A network for the
-        calibration makes half of them.
+        calibration makes half of the passes, or half of the steps where these are limited.
 
         Parameters
         ----------
@@ -115,13 +114,13 @@ class Mlp:
             return Fitted(fitted, None, 'not calibrated, as a label has a single window')
         folds_of, note = split
         scores = np.empty((len(y), n_labels))
-        short = self if augmented is None else dataclasses.replace(self, epochs=-(-self.epochs // 2))
+        share = 1.0 if augmented is None else 0.5
         folds = []
         for part in np.unique(folds_of):
             held = folds_of == part
             slides = np.unique(groups[held])
             rest = augmented.without(slides) if augmented else None
-            folds.append(FoldFit(slides, short._fit(X[~held], y[~held], n_labels, rest)))
+            folds.append(FoldFit(slides, self._fit(X[~held], y[~held], n_labels, rest, share)))
             scores[held] = self.predictor(folds[-1].parameters)(X[held])
         best = minimize_scalar(lambda log_t: _loss_at(scores, y, math.exp(log_t)), bounds=(-2.0, 4.0), method='bounded')
         temperature = math.exp(best.x)
@@ -138,8 +137,10 @@ class Mlp:
         names = MlpPredictor.__dataclass_fields__
         return MlpPredictor(*(np.asarray(parameters[name], dtype=np.float64, order='F') for name in names))
 
-    def _fit(self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None) -> dict[str, Array]:
-        """Return the layers, with the standardisation worked into them."""
+    def _fit(
+        self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0
+    ) -> dict[str, Array]:
+        """Return the layers after a share of the steps, with the standardisation worked into them."""
         mean, scale = X.mean(axis=0), X.std(axis=0)
         scale[scale <= 1e-12 * np.abs(mean)] = np.inf  # what is constant tells nothing
         inputs, rng = np.empty(X.shape, np.float32), np.random.default_rng(self.seed)
@@ -150,7 +151,7 @@ class Mlp:
             if augmented
             else _Batches(inputs, y, rng)
         )
-        weights = self._descend(drawn, inputs.shape, n_labels, rng)
+        weights = self._descend(drawn, inputs.shape, n_labels, rng, share)
         hidden, hidden_offset, output, output_offset = (part.astype(np.float64) for part in weights)
         hidden /= scale[:, None]
         return {
@@ -160,16 +161,19 @@ class Mlp:
             'output_offset': output_offset,
         }
 
-    def _steps(self, n_examples: int, work: int) -> int:
+    def _steps(self, n_examples: int, work: int, share: float) -> int:
         """Return the number of batches, fewer where each costs much: with so many features and labels."""
-        return min(max(self.epochs * -(-n_examples // BATCH), MIN_STEPS), max(round(MAX_WORK / work), MIN_STEPS))
+        passes, most = math.ceil(share * self.epochs), round(share * MAX_WORK / work)
+        return min(max(passes * -(-n_examples // BATCH), MIN_STEPS), max(most, MIN_STEPS))
 
-    def _descend(self, drawn: _Draws, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator) -> Weights:
-        """Return the weights after all passes over so many examples, (n, n_features)."""
+    def _descend(
+        self, drawn: _Draws, shape: tuple[int, ...], n_labels: int, rng: np.random.Generator, share: float
+    ) -> Weights:
+        """Return the weights after this share of all passes over so many examples, (n, n_features)."""
         n_examples, n_features = shape
         weights = _first_weights(n_features, self.hidden, n_labels, rng)
         truth = np.eye(n_labels, dtype=np.float32)
-        steps = self._steps(n_examples, n_features + n_labels)
+        steps = self._steps(n_examples, n_features + n_labels, share)
         adam = _Adam(weights)
         for step in range(steps):
             inputs, codes = drawn.draw(min(BATCH, n_examples))

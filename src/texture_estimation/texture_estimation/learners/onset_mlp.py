@@ -80,14 +80,16 @@ class OnsetMlp(Mlp):
             int(parameters['onset_column']),
         )
 
-    def _fit(self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None) -> dict[str, Array]:
+    def _fit(
+        self, X: Array, y: Codes, n_labels: int, augmented: AugmentedExamples | None, share: float = 1.0
+    ) -> dict[str, Array]:
         """Return the layers of the network and that of the onset."""
         blind = X.copy()
         first: Codes = np.zeros(0, dtype=np.intp)
         if self.column != UNBOUND:
             first = np.flatnonzero(X[:, self.column] > 0.0)
             blind[:, self.column] = 0.0  # what is constant tells nothing
-        network = super()._fit(blind, y, n_labels, augmented)
+        network = super()._fit(blind, y, n_labels, augmented, share)
         values, codes = X[first].astype(np.float64), y[first]
         if augmented is not None and len(first):
             values, codes = self._with_copies(values, codes, augmented)
