@@ -1,3 +1,4 @@
+import math
 import re
 
 import pytest
@@ -197,6 +198,53 @@ def test_a_sensor_that_falls_silent_lifts_the_finger_within_150_ms(table, phase)
     if phase is not Phase.LIFT:
         lifted_ns = next(s.stamp_ns for s in table.states if s.phase is Phase.LIFT)
         assert (lifted_ns - fell_silent[0]) * 1e-9 == pytest.approx(0.12, abs=0.02)
+
+
+def watch_with_heights(table, first_sample_s):
+    """Let samples come from a time after the start on; return the times, s, and the heights above the start, m."""
+    watch = SignalWatch(0.5, lambda: table.now_ns)
+    table.signal_fault = watch.signal_fault
+    start_ns, go_on, seen = table.now_ns, table.pace, []
+
+    def pace():
+        time_s = (table.now_ns - start_ns) * 1e-9
+        if time_s >= first_sample_s:
+            watch.on_samples()
+        seen.append((time_s, table.arm.state().position[2] - table.home[2]))
+        go_on()
+
+    table.pace = pace
+    return seen
+
+
+def test_the_finger_rests_until_the_first_sample_and_then_explores(table):
+    seen = watch_with_heights(table, first_sample_s=0.3)
+    assert table.explore().success
+    assert {height for time_s, height in seen if time_s <= 0.3} == {0.0}
+    assert min(height for _, height in seen) < -0.001
+
+
+def test_without_a_sample_the_finger_is_never_lowered(table):
+    seen = watch_with_heights(table, first_sample_s=math.inf)
+    outcome = table.explore()
+    assert outcome.message.startswith("no samples have come on 'signal' for 5")
+    assert seen[-1][0] >= 0.5
+    assert min(height for _, height in seen) == 0.0
+    assert Phase.APPROACH not in table.phases
+
+
+def test_a_stop_ends_the_wait_for_the_first_sample(table):
+    seen = watch_with_heights(table, first_sample_s=math.inf)
+    go_on = table.pace
+
+    def pace():
+        go_on()
+        if seen[-1][0] >= 0.1:
+            table.exploration.stop('stopped on request')
+
+    table.pace = pace
+    assert table.explore().message == 'stopped on request'
+    assert min(height for _, height in seen) == 0.0
 
 
 def test_a_machine_that_slept_does_not_take_the_sensor_for_silent(table):

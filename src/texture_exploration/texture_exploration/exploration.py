@@ -96,6 +96,7 @@ class Exploration:
         self._stop_reason = ''
         self._finish_reason = ''
         self._abort_reason = ''
+        self._signal_seen = False
         self._slid = False
         self._entered = False  # the workspace
         self._next_state_ns = 0
@@ -137,6 +138,9 @@ class Exploration:
         if reason:
             self._abort_reason = self._abort_reason or reason
             self._motion.abort(reason)
+        if self._awaits_samples():
+            self._arm.command(ArmCommand())
+            return False
         if self._finish_reason:
             self._motion.finish(self._finish_reason)
         step = self._motion.step(now_ns, arm)
@@ -145,6 +149,11 @@ class Exploration:
         self._force_watch.note(step.phase, arm, step.command)
         self._publish_state(now_ns, step, arm)
         return step.phase in ENDED
+
+    def _awaits_samples(self) -> bool:
+        """Return whether the finger rests until the sensor delivers; silence from before the request counts."""
+        self._signal_seen = self._signal_seen or bool(self._abort_reason) or not self._signal_fault(WITHOUT_GAPS)
+        return not self._signal_seen
 
     def _violation(self, arm: ArmState) -> str:
         """Return which limit was passed; a finger that was pushed out of the workspace may come home first."""
