@@ -37,7 +37,7 @@ def test_every_search_ends_with_a_recipe_evaluated_by_its_learner_and_the_charts
         assert figures['evaluations'] == 10
         assert 0.0 < figures['fitness_exact'] <= 1.0
         assert figures['halves_evaluated'] <= figures['halves_of_all']
-    whole = result.numbers['searches']['linear, SVM, no individual given up']
+    whole = result.numbers['searches']['linear, SVM, without racing']
     assert whole['halves_evaluated'] == whole['halves_of_all']
     assert all(chart.is_file() for chart in result.charts)
 

@@ -34,7 +34,7 @@ def convergence_chart(searches: Mapping[str, Sequence[Generation]], title: str, 
             best = [100 * one.best.fitness for one in history]
             label = name if len(searches) <= NAMED else None
             axes.step([one.number for one in history], best, where='mid', label=label, **style)
-        axes.set(xlabel='generation', ylabel='fitness of the best, as the search sees it (%)')
+        axes.set(xlabel='generation', ylabel='fitness of the best individual (%)')
         if len(searches) <= NAMED:
             axes.legend(loc='lower right')
     return Path(path)

@@ -50,7 +50,7 @@ FRONT = SearchParams(objective='front')
 CASES: Mapping[str, SearchCase] = {
     'linear, SVM': SearchCase('ets-linear-svm', 'ets-svm', 'linear', 60.0),
     'linear, ANN': SearchCase('ets-linear-ann', 'ets-ann', 'linear', 60.0),
-    'linear, SVM, no individual given up': SearchCase(
+    'linear, SVM, without racing': SearchCase(
         'ets-linear-svm', 'ets-svm', 'linear', None, SearchParams(race=False)
     ),
     'linear, SVM, front': SearchCase('ets-linear-svm', 'ets-svm-points', 'linear', None, FRONT),
