@@ -22,10 +22,8 @@ VARIANTS: Mapping[str, Changes] = {
     'with log_bands': {'log_bands': {}},
     'log_bands instead of moments': {'moments': None, 'log_bands': {}},
     '16 bands': {'mean_log_bands': {'bands': 16}},
-    '24 bands': {'mean_log_bands': {'bands': 24}},
     'segments overlap by 0.62': {'mean_log_bands': {'overlap': 0.625}},
     'segments overlap by 0.5': {'mean_log_bands': {'overlap': 0.5}},
-    '10 lags': {'power_autocorrelation': {'lags': 10}},
     '8 lags': {'power_autocorrelation': {'lags': 8}},
     '64 units': {'mlp': {'hidden': 64}},
     '128 units': {'mlp': {'hidden': 128}},
@@ -36,7 +34,6 @@ HALVED = 'sampled at 500 Hz'
 SLOW_VARIANTS: Mapping[str, Changes] = {
     SHIPPED: {},
     'without power_autocorrelation': {'power_autocorrelation': None},
-    'segments overlap by 0.62': {'mean_log_bands': {'overlap': 0.625}},
     'without log_variance': {'log_variance': None},
     'without log_difference_variance': {'log_difference_variance': None},
     'vibration alone': {'log_variance': None, 'log_difference_variance': None},

@@ -50,9 +50,7 @@ FRONT = SearchParams(objective='front')
 CASES: Mapping[str, SearchCase] = {
     'linear, SVM': SearchCase('ets-linear-svm', 'ets-svm', 'linear', 60.0),
     'linear, ANN': SearchCase('ets-linear-ann', 'ets-ann', 'linear', 60.0),
-    'linear, SVM, without racing': SearchCase(
-        'ets-linear-svm', 'ets-svm', 'linear', None, SearchParams(race=False)
-    ),
+    'linear, SVM, without racing': SearchCase('ets-linear-svm', 'ets-svm', 'linear', None, SearchParams(race=False)),
     'linear, SVM, front': SearchCase('ets-linear-svm', 'ets-svm-points', 'linear', None, FRONT),
     'linear, ANN, front': SearchCase('ets-linear-ann', 'ets-ann-points', 'linear', None, FRONT),
     'ten textures, SVM': SearchCase('ets-fine-svm', 'ets-fine-svm', 'fine', 300.0),
