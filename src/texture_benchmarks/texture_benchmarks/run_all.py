@@ -30,10 +30,11 @@ SIDE_BY_SIDE = (
     'segmentation',
     'clock',
 )
-# These take half a minute or more for other things than recognition, or nine and more for it; without them all
-# benchmarks take half an hour.
+# These take half a minute or more for other things than recognition, or nine and more of one core for
+# it; without them all benchmarks take half an hour.
 LONG = frozenset(
     {
+        'frontier',
         'recipes',
         'optimise',
         'optimise_large',
