@@ -175,8 +175,8 @@ def border_chart(border: Mapping[str, Array], chosen: Array, path: str | Path) -
         axes.set(
             xlabel='delay of the loop (ms)',
             ylabel='gain (m/s per N)',
-            title='Force control at 250 Hz is unstable above the lines: eigenvalues (lines), simulation (dots)\n'
-            'The gains that are chosen by themselves are dotted',
+            title='Stability limit of the force control at 250 Hz: eigenvalues (lines), simulation (dots)\n'
+            'Dotted: the gain that the controller chooses',
         )
         axes.legend(loc='center left', bbox_to_anchor=(1.0, 0.5), title='stiffness')
     return Path(path)

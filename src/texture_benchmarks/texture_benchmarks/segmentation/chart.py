@@ -47,7 +47,7 @@ def error_strength_chart(trials: Mapping[str, Sequence[SegmentationTrial]], targ
                 strength = [trial.strength for trial in listed]
                 axes.plot(strength, np.maximum(errors, 0.1), '.', color=colour, label=scene, alpha=0.6, markersize=5)
             axes.axhline(1000 * target_s, color='k', linewidth=1, linestyle='--')
-            axes.set(xscale='log', yscale='log', title=name, xlabel='power of the slide, in that of the noise')
+            axes.set(xscale='log', yscale='log', title=name, xlabel='power of the slide, as a multiple of the noise')
         _left(figure.axes[0], 'error (ms)')
         figure.axes[1].legend(loc='upper right', fontsize=8, ncols=2, bbox_to_anchor=(1.0, 1.06))
     return Path(path)

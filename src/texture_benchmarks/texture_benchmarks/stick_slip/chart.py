@@ -67,17 +67,17 @@ def cost_chart(costs: Costs, path: str | Path) -> Path:
                     axes.annotate('default', (row['ms'], 100 * row['error']), (7, 7), textcoords='offset points')
         axes.axvline(costs.target_ms, color='black', linestyle='--', linewidth=1)
         axes.set(
-            xlabel='time of one core for a scan of 0.5 s (ms); dashed: allowed',
+            xlabel='computing time of a slide of 0.5 s (ms); dashed: target',
             ylabel='error of the force (% of its vibration)',
         )
-        axes.set_title('Stick-slip at 0.05 m/s, 1.5 N: what accuracy costs')
+        axes.set_title('Stick-slip at 0.05 m/s and 1.5 N: error and computing time of the integrators')
         axes.legend(loc='upper center', bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8)
     return Path(path)
 
 
 def border_chart(borders: Borders, path: str | Path) -> Path:
     """Draw the longest stable step over the stiffness: lines predicted, markers found; a panel for each phase."""
-    with chart(path, (9.0, 4.6), 'Longest stable step: lines predicted, markers found') as figure:
+    with chart(path, (9.0, 4.6), 'Longest stable step: predicted (lines) and simulated (markers)') as figure:
         panels = dict(zip(('stick', 'slide'), figure.subplots(1, 2, sharey=True), strict=True))
         methods = list(dict.fromkeys(method for _, method in borders.predicted_s))
         for (phase, method), predicted in borders.predicted_s.items():
@@ -107,16 +107,16 @@ def vibration_chart(vibration: Vibration, path: str | Path) -> Path:
             )
         over_time.set(xlabel='time (s)', ylabel='force on the skin (N)', title='1. From rest, 1.5 N')
         over_time.legend(loc='upper center', bbox_to_anchor=(0.5, -0.16), ncols=3, fontsize=8)
-        period.loglog(vibration.speed_m_s, 1000 * vibration.formula_s, color='black', label='slow drag, by formula')
+        period.loglog(vibration.speed_m_s, 1000 * vibration.formula_s, color='black', label='formula for slow drags')
         period.loglog(vibration.speed_m_s, 1000 * vibration.period_s, 'o', color=COLOURS[0], label='simulated')
         period.set(xlabel='speed (m/s)', ylabel='period (ms)', title='2. Faster drag, shorter period')
         period.set_yticks(PERIODS_MS, [str(period_ms) for period_ms in PERIODS_MS])
         period.minorticks_off()
         period.legend(loc='upper right', fontsize=8)
-        swing.plot(vibration.speed_m_s, vibration.from_rest_n, 'o-', color=COLOURS[0], label='started from rest')
-        swing.plot(vibration.speed_m_s, vibration.from_sliding_n, '^--', color=COLOURS[1], label='started sliding')
+        swing.plot(vibration.speed_m_s, vibration.from_rest_n, 'o-', color=COLOURS[0], label='from rest')
+        swing.plot(vibration.speed_m_s, vibration.from_sliding_n, '^--', color=COLOURS[1], label='from sliding')
         swing.axvline(vibration.critical_m_s, color='black', linestyle='--', linewidth=1)
         swing.set(xlabel='speed (m/s); dashed: critical, predicted', ylabel='swing of the force (N)')
         swing.set_title('3. Fast drag is quiet')
-        swing.legend(loc='best', fontsize=8)
+        swing.legend(loc='upper center', bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8)
     return Path(path)

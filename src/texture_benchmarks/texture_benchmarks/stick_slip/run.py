@@ -53,7 +53,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     )
     return BenchmarkResult(
         name='stick_slip',
-        measured=f'ms of one core for a scan of {SCAN_S} s; error: rms of the force on the skin over {compared_s} s '
+        measured=f'ms of one core for a slide of {SCAN_S} s; error: rms of the force on the skin over {compared_s} s '
         'against Radau, as share of the rms of its vibration; border: longest stable step, predicted and found',
         data=f'simulated drag at {SPEED_M_S} m/s and {FORCE_N} N; border of sliding at {SLIDE_M_S} m/s and {FORCE_N} N',
         split='none: nothing is trained',
