@@ -77,7 +77,10 @@ def classify_slide(node, exploration_id):
 def test_a_texture_is_added_and_removed_from_the_command_line(classifier, capsys):
     assert classify_slide(classifier, 'slide-1') in ('cork', 'felt', '')
     assert main(['add', 'silk']) == 0
-    assert "added 'silk' from 'slide-1'; 3 textures, 1 slide added" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "added 'silk' from 'slide-1'; 3 textures, 1 slide added since the training; 'silk' has 8 windows" in printed
+    assert main(['add', 'silk']) == 2
+    assert "'slide-1' was added as 'silk' already" in capsys.readouterr().err
     assert classify_slide(classifier, 'slide-2') == 'silk'
     assert main(['add', 'silk', 'slide-9']) == 2
     assert 'Can be added: slide-1, slide-2' in capsys.readouterr().err

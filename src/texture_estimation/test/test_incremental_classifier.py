@@ -95,14 +95,15 @@ def test_a_trained_model_that_was_saved_again_keeps_its_examples_but_other_featu
 
 def test_what_cannot_be_trained_is_refused_with_a_sentence(model, silk):
     incremental_classifier = IncrementalClassifier(model)
-    with pytest.raises(InvalidData, match='explore first'):
+    with pytest.raises(InvalidData, match='no exploration was classified with this model; explore first'):
         incremental_classifier.add('silk')
     measured(incremental_classifier, silk, 'foreign', feature_set='other')
     measured(incremental_classifier, np.full((3, 6), np.nan), 'broken')
-    with pytest.raises(InvalidData, match='Can be added: none'):
-        incremental_classifier.add('silk')
+    for name in ('', 'broken', 'foreign'):
+        with pytest.raises(InvalidData, match=f"'{name or 'broken'}' has no usable window: .* Can be added: none"):
+            incremental_classifier.add('silk', name)
     measured(incremental_classifier, silk)
-    with pytest.raises(InvalidData, match=r"exploration 'e9'.* Can be added: e1"):
+    with pytest.raises(InvalidData, match=r"no exploration 'e9' is among the last 20. Can be added: e1$"):
         incremental_classifier.add('silk', 'e9')
     with pytest.raises(InvalidData, match='no label'):
         incremental_classifier.add('  ')
@@ -149,6 +150,32 @@ def test_one_exploration_cannot_stand_under_two_labels(model, silk):
         incremental_classifier.add('satin')
     incremental_classifier.remove_last()
     assert incremental_classifier.add('satin') == 12
+
+
+def test_the_same_exploration_is_added_once_also_after_a_restart(model, silk, tmp_path):
+    path = model.save(tmp_path / 'surfaces')
+    for _ in range(2):
+        incremental_classifier = IncrementalClassifier(load_model(path), path)
+        measured(incremental_classifier, silk)
+        if not incremental_classifier.model.added_slides:
+            incremental_classifier.add('silk')
+        for name in ('', 'e1'):
+            with pytest.raises(
+                InvalidData, match="'e1' was added as 'silk' already; explore again, and add that slide"
+            ):
+                incremental_classifier.add('silk', name)
+        assert len(incremental_classifier.model.added_slides) == len(load_model(path).added_slides) == 1
+    incremental_classifier.remove_last()
+    assert incremental_classifier.add('silk') == 12
+
+
+def test_the_slide_before_one_without_windows_is_not_added_in_its_place(model, silk):
+    incremental_classifier = IncrementalClassifier(model)
+    measured(incremental_classifier, silk)
+    measured(incremental_classifier, [], 'short')
+    with pytest.raises(InvalidData, match=r"'short' has no usable window: .* Can be added: e1$"):
+        incremental_classifier.add('felt')
+    assert incremental_classifier.add('silk', 'e1') == 12
 
 
 def test_an_added_slide_widens_the_domain_until_it_is_removed_also_after_a_restart(model, silk, tmp_path):

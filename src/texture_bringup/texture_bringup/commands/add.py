@@ -1,4 +1,4 @@
-"""`texture add`: add what was explored last as examples of a texture; or undo it."""
+"""`texture add`: add the slide that was explored last to a texture; or undo it."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ def run(options: argparse.Namespace) -> int:
             print(operator.remove_last_added())
             return 0
         examples, message = operator.add(options.label, options.exploration)
-    print(f'{message}; {examples} examples of it')
+    print(f"{message}; '{options.label.strip()}' has {examples} windows now")
     return 0

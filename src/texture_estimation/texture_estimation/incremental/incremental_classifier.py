@@ -67,25 +67,21 @@ class IncrementalClassifier:
 
     def observe(self, vector: FeatureVector) -> None:
         """Keep a window, so that its exploration can be added."""
+        windows = self._recent_windows_of(vector.exploration_id)
         if vector.last or vector.feature_set != self.model.feature_set or not np.isfinite(vector.values).all():
             return
-        windows = self._recent_windows.setdefault(vector.exploration_id, [])
-        self._recent_windows.move_to_end(vector.exploration_id)
         windows.append(vector.values)
         del windows[:-WINDOWS]
-        self._conditions.setdefault(vector.exploration_id, RunningConditions()).update(vector)
-        while len(self._recent_windows) > EXPLORATIONS:
-            oldest, _ = self._recent_windows.popitem(last=False)
-            del self._conditions[oldest]
+        self._conditions[vector.exploration_id].update(vector)
 
     def add(self, label: str, exploration_id: str = '') -> int:
-        """Add an exploration, the last one if '', as examples of a label; return their number now.
+        """Add the windows of an exploration, the last one if '', to a label; return the number of its windows now.
 
         Raises
         ------
         InvalidData
-            If there is no label or a forbidden one, nothing usable was measured in that exploration, or it already
-            stands under another label.
+            If there is no label or a forbidden one, nothing usable was measured in that exploration, or it was added
+            before, under this label or another one.
         OSError
             If the slide cannot be stored; it has not been added then.
         """
@@ -93,19 +89,46 @@ class IncrementalClassifier:
         if not label:
             raise InvalidData('no label was given; name the texture to add')
         name = exploration_id or next(reversed(self._recent_windows), '')
-        if name not in self._recent_windows:
-            known = ', '.join(self._recent_windows) or 'none'
-            raise InvalidData(f"exploration '{name}' has no usable window; explore first. Can be added: {known}")
-        self._refuse_second_label(name, label)
+        self._refuse_without_window(name)
+        self._refuse_second_time(name, label)
         added_slide = AddedSlide(label, name, np.stack(self._recent_windows[name]), self._conditions[name].get())
         if self._path is not None:
             self._store(self._path, added_slide)
         self.model = self.model.with_added_slides((*self.model.added_slides, added_slide))
         return len(self.model.examples_of(label))
 
-    def _refuse_second_label(self, exploration_id: str, label: str) -> None:
+    def _recent_windows_of(self, exploration_id: str) -> list[Array]:
+        """Return the kept windows of an exploration, which counts as the newest one, also while it has none."""
+        windows = self._recent_windows.setdefault(exploration_id, [])
+        self._conditions.setdefault(exploration_id, RunningConditions())
+        self._recent_windows.move_to_end(exploration_id)
+        while len(self._recent_windows) > EXPLORATIONS:
+            oldest, _ = self._recent_windows.popitem(last=False)
+            del self._conditions[oldest]
+        return windows
+
+    def _refuse_without_window(self, exploration_id: str) -> None:
+        if self._recent_windows.get(exploration_id):
+            return
+        if not self._recent_windows:
+            raise InvalidData('no exploration was classified with this model; explore first')
+        reason = (
+            f"exploration '{exploration_id}' has no usable window: its slide was too short, its samples were lost, or "
+            'its features do not fit the model'
+            if exploration_id in self._recent_windows
+            else f"no exploration '{exploration_id}' is among the last {EXPLORATIONS}"
+        )
+        usable = ', '.join(name for name, windows in self._recent_windows.items() if windows) or 'none'
+        raise InvalidData(f'{reason}. Can be added: {usable}')
+
+    def _refuse_second_time(self, exploration_id: str, label: str) -> None:
+        """Refuse an exploration that was added before: counted twice, one slide would raise the confidence."""
         others = [kept.label for kept in self.model.added_slides if kept.exploration_id == exploration_id != '']
-        if others and label not in others:
+        if label in others:
+            raise InvalidData(
+                f"exploration '{exploration_id}' was added as '{label}' already; explore again, and add that slide"
+            )
+        if others:
             raise InvalidData(
                 f"exploration '{exploration_id}' was added as '{others[-1]}'; it cannot be '{label}', too: "
                 'undo that first, or explore again'
