@@ -176,7 +176,19 @@ def test_a_slide_without_windows_ends_with_a_reason(model, examples):
     [estimate] = predict(model, vectors(examples)[-1:])
     assert estimate.final
     assert estimate.label == ''
-    assert 'no window could be used' in estimate.message
+    assert estimate.message == (
+        'no window could be used: the slide was shorter than the 0.5 s of a window, or its samples were lost; '
+        'slide longer or more slowly'
+    )
+
+
+def test_the_time_that_is_left_out_at_the_start_counts_to_the_slide_that_is_needed(model, examples):
+    windows = dataclasses.replace(model.recipe.feature_set.windows, length_s=0.4, skip_s=0.25)
+    recipe = dataclasses.replace(
+        model.recipe, feature_set=dataclasses.replace(model.recipe.feature_set, windows=windows)
+    )
+    [estimate] = predict(dataclasses.replace(model, recipe=recipe), vectors(examples)[-1:])
+    assert 'shorter than 0.65 s, the first 0.25 s and a window' in estimate.message
 
 
 def test_without_a_model_the_final_estimate_says_so(examples):

@@ -15,13 +15,13 @@ from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.incremental.slide_moments import SlideMoments
 from texture_estimation.log_probabilities import is_tied
 from texture_estimation.model import TextureModel
+from texture_estimation.no_window import no_window
 from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.open_set.novelty import SlideNovelty
 from texture_features.slide_conditions import RunningConditions
 
 UNTEMPERED = 1.0
 NO_MODEL = "no model is loaded; set the parameter 'model' of the classifier to the path of a trained one"
-NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
 
 
 def single_decisions(model: TextureModel, values: Array) -> list[str]:
@@ -156,7 +156,7 @@ class EvidenceAccumulator:
                 frame_id=vector.frame_id,
                 final=final,
                 model=model.name if model else '',
-                message=self._message or (NO_WINDOW if final else ''),
+                message=self._message or (no_window(model.recipe.feature_set.windows) if model and final else ''),
             )
         # The effective number of windows follows from the sliding time that they cover, whatever their weights.
         effective_windows = self._evidence_ns / self._window_ns

@@ -8,11 +8,11 @@ from texture_core.estimates import RoughnessEstimate
 from texture_core.features import FeatureVector
 from texture_core.signal import NANOSECONDS
 from texture_estimation.fingerprint import fingerprint_difference
+from texture_estimation.no_window import no_window
 from texture_estimation.roughness.model import NORMAL_90, RoughnessModel
 from texture_estimation.roughness.regressor import ROUGH, SMOOTH
 
 NO_MODEL = "no model is loaded; set the parameter 'model' of the roughness_estimator to the path of a trained one"
-NO_WINDOW = 'no window could be used: the slide was too short, or its samples were lost'
 SILENT = 'no grade: the surface resembles no training surface'
 # The scatter of the windows of a texture, known from the training, counts as so many windows.
 PRIOR_WINDOWS = 4.0
@@ -112,7 +112,7 @@ class RoughnessAccumulator:
                 frame_id=vector.frame_id,
                 final=vector.last,
                 model=model.name if model else '',
-                message=self._message or (NO_WINDOW if vector.last else ''),
+                message=self._message or (no_window(model.recipe.feature_set.windows) if model and vector.last else ''),
             )
         shared, scatter = self._variances(model)
         std = math.sqrt(shared + scatter)
