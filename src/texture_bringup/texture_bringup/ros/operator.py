@@ -220,7 +220,7 @@ class Operator:
         return str(future.result().message)
 
     def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
-        """Add an exploration, the last one if '', to a texture; return its number of examples and a message.
+        """Add an exploration, the last one if '', to a texture; return its number of windows and a message.
 
         Parameters
         ----------
@@ -234,7 +234,7 @@ class Operator:
         Returns
         -------
         (int, str)
-            Number of examples of the texture, and a sentence.
+            Number of windows of the texture, of the training and added, and a sentence.
 
         Raises
         ------
