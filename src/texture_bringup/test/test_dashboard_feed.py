@@ -72,6 +72,40 @@ def test_taxels_are_shown_from_their_rest_and_a_touch_does_not_move_it() -> None
     assert json.loads(feed.frame(0.0))['taxels']['values'] == [30.0, 0.0]
 
 
+def test_noise_without_contact_stays_pale_and_a_touch_does_not() -> None:
+    feed, rng = Feed(), np.random.default_rng(0)
+    names = tuple(f'taxel_0_{k}' for k in range(12))
+    for k in range(300):
+        feed.on_static(batch(k, rng.normal(500.0, 8.0, 12), 60.0, names))
+    taxels = json.loads(feed.frame(0.0))['taxels']
+    assert 5 * 8.0 < taxels['least_range'] < 20 * 8.0
+    assert np.abs(taxels['values']).max() < taxels['least_range'] / 2
+    feed.on_static(batch(300, [np.inf] * 12, 60.0, names))
+    feed.on_state(sliding('a'))
+    for k in range(301, 400):
+        feed.on_static(batch(k, [900.0] * 12, 60.0, names))
+    touched = json.loads(feed.frame(0.0))['taxels']
+    assert min(touched['values']) > touched['least_range'] == taxels['least_range']
+
+
+@pytest.mark.parametrize(
+    ('reports', 'expected'),
+    [
+        ([], 'no estimate yet, and no classifier reports on /diagnostics'),
+        ([('classifier', 'OK', 'classifying')], 'no estimate yet'),
+        ([('classifier', 'WARN', 'no model is loaded; set it')], 'no estimate yet: no model is loaded; set it'),
+    ],
+)
+def test_before_an_estimate_the_page_shows_why_there_is_none(reports, expected) -> None:
+    feed = Feed()
+    for name, level, message in reports:
+        feed.node_statuses.update(name, level, message, 0.0)
+    feed.on_state(sliding('a'))
+    assert json.loads(feed.frame(1.0))['texture']['missing'] == expected
+    feed.on_texture(TextureEstimate(2, 'a', 'felt', True, 0.9))
+    assert json.loads(feed.frame(1.0))['texture']['missing'] == ''
+
+
 def test_an_empty_frame_is_json_without_nan() -> None:
     frame = json.loads(Feed().frame(0.0), parse_constant=pytest.fail)
     assert frame['state']['phase'] == 'idle'

@@ -143,7 +143,7 @@ function drawTaxels(taxels) {
     at('taxel-range').textContent = 'this sensor has no slow channels';
     return;
   }
-  const most = Math.max(1e-9, ...values.map((value) => Math.abs(value ?? 0)));
+  const most = Math.max(1e-9, taxels.least_range ?? 0, ...values.map((value) => Math.abs(value ?? 0)));
   at('taxel-range').textContent = `relative to the level before contact, ±${most.toPrecision(3)} ${unit}`;
   const rows = 1 + Math.max(...places.map((place) => place[0]));
   const columns = 1 + Math.max(...places.map((place) => place[1]));
@@ -171,8 +171,7 @@ function showTexture(texture) {
   const seen = texture.windows ? `${texture.windows} windows, ${texture.evidence_s.toFixed(1)} s` : '';
   const sure = texture.label && texture.confidence !== null ? `confidence ${texture.confidence.toFixed(2)}` : '';
   const strange = texture.label && !texture.known ? 'unknown: it resembles no trained texture' : '';
-  const missing = texture.label || texture.message ? '' : 'no estimate yet; without a model nothing is recognised';
-  at('estimate-note').textContent = [sure, seen, strange, texture.message, missing].filter(Boolean).join(' · ');
+  at('estimate-note').textContent = [sure, seen, strange, texture.message, texture.missing].filter(Boolean).join(' · ');
   const bars = texture.labels.slice(0, BARS).map((label, k) => [label, texture.probabilities[k]]);
   fill(at('evidence'), bars, ([label, probability]) => {
     const bar = element('div', '', 'bar');

@@ -105,7 +105,15 @@ class Feed:
 
     def _image(self) -> dict[str, Any]:
         taxels = self._taxels
-        return {'values': _numbers(taxels.image), 'places': taxels.places, 'unit': taxels.unit}
+        least = {'least_range': _number(taxels.least_range)}
+        return {'values': _numbers(taxels.image), 'places': taxels.places, 'unit': taxels.unit, **least}
+
+    def _missing(self, what: str, name: str) -> str:
+        """Return that there is no estimate yet and what its node says, if that node is not well."""
+        status = self.node_statuses.newest(name)
+        if status is None:
+            return f'no {what} yet, and no {name} reports on /diagnostics'
+        return f'no {what} yet' + ('' if status.level == 'OK' else f': {status.message}')
 
     def _shown_state(self) -> dict[str, Any]:
         return {name: _plain(value) for name, value in asdict(self._state).items()}
@@ -115,6 +123,7 @@ class Feed:
         estimate = self._texture
         pairs = sorted(zip(estimate.probabilities, estimate.labels, strict=False), reverse=True)[:MAX_LABELS]
         shown = {name: _plain(value) for name, value in asdict(estimate).items()}
+        shown['missing'] = '' if estimate.label or estimate.message else self._missing('estimate', 'classifier')
         shown['labels'] = [label for _, label in pairs]
         shown['probabilities'] = _numbers(probability for probability, _ in pairs)
         return shown

@@ -48,6 +48,10 @@ class NodeStatuses:
         if len(self._lights) > MAX_LIGHTS:
             del self._lights[next(iter(self._lights))]
 
+    def newest(self, name: str) -> NodeStatus | None:
+        """Return what a node said last; None if it never did."""
+        return self._lights.get(name)
+
     def shown(self, time_s: float) -> list[dict[str, str]]:
         """Return name, colour and sentence of each light, by name."""
         return [{'name': name, **_look(light, time_s - light.time_s)} for name, light in sorted(self._lights.items())]
