@@ -52,6 +52,7 @@ class ExplorationState:
     y_m: float = math.nan
     z_m: float = math.nan
     frame_id: str = ''
+    tangential_force_n: float = math.nan
 
 
 @dataclass(frozen=True)

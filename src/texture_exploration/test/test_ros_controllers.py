@@ -1,6 +1,7 @@
 """The arm behind ROS controllers without ROS: an emulated arm at the other end of its topics, in simulated time."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -141,6 +142,21 @@ def test_offset_and_weight_of_the_tool_are_removed_in_free_air_and_the_force_is_
     robot.zero_force()
     robot.pass_time(0.1)
     assert robot.driven.state().force_n == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize('friction', [0.15, 0.6])
+def test_the_tangential_force_is_friction_times_the_normal_force_and_unknown_at_rest(friction):
+    robot = Robot(replace(NO_NOISE, friction=friction))
+    robot.driven.connect()
+    robot.zero_force()
+    assert math.isnan(robot.driven.state().tangential_force_n)
+    while robot.driven.state().position[2] > 0.001:
+        robot.pass_time(0.1, ArmCommand(normal_m_s=-0.01))
+    robot.pass_time(3.0, ArmCommand(force_n=3.0))
+    robot.pass_time(0.8, ArmCommand(tangential_m_s=(0.016, -0.012), force_n=3.0))
+    state = robot.driven.state()
+    assert state.force_n > 2.0
+    assert state.tangential_force_n == pytest.approx(friction * state.force_n, rel=0.05)
 
 
 def test_the_weight_is_removed_also_when_the_tool_has_turned_since_the_zero():

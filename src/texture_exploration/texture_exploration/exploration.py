@@ -198,6 +198,7 @@ class Exploration:
                 steady_s=step.steady_s,
                 speed_m_s=(vx * vx + vy * vy) ** 0.5,
                 force_n=arm.force_n,
+                tangential_force_n=arm.tangential_force_n,
                 direction_rad=step.direction_rad,
                 progress=step.progress,
                 surface=self.request.surface,

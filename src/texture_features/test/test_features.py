@@ -24,7 +24,8 @@ def tone(frequency_hz, n_samples=1000, amplitude=1.0):
 
 def windows(samples, speed_m_s=0.1, force_n=2.0):
     leading = np.asarray(samples).shape[:-2]
-    return WindowBatch(np.asarray(samples), RATE_HZ, np.full(leading, speed_m_s), np.full(leading, force_n))
+    speed, force = np.full(leading, speed_m_s), np.full(leading, force_n)
+    return WindowBatch(np.asarray(samples), RATE_HZ, speed, force, tangential_force_n=0.5 * force)
 
 
 @EVERY
@@ -66,6 +67,7 @@ SCALING = {
     'ordinal_patterns': SAME,
     'speed': SAME,
     'force': SAME,
+    'friction': SAME,
     'slide_onset': SAME,
 }
 

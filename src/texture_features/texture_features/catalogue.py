@@ -9,6 +9,7 @@ from texture_features.features.arc_length import ArcLength
 from texture_features.features.centred_log_ratio import CentredLogRatio
 from texture_features.features.correlation import Correlation
 from texture_features.features.force import Force
+from texture_features.features.friction import Friction
 from texture_features.features.hjorth import Hjorth
 from texture_features.features.log_bands import LogBands
 from texture_features.features.log_difference_variance import LogDifferenceVariance
@@ -76,5 +77,6 @@ FEATURES: Mapping[str, type[Feature]] = {
     'relative_changes': RelativeChanges,
     'speed': Speed,
     'force': Force,
+    'friction': Friction,  # Roberge et al., future work
     'slide_onset': SlideOnset,
 }

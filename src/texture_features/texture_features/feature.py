@@ -27,6 +27,8 @@ class WindowBatch:
         Sampling rate, > 0.
     speed_m_s, force_n : (...)
         Mean speed and normal force in each window; NaN if unknown.
+    tangential_force_n : (...)
+        Mean force of the surface against the direction of travel; NaN if unknown.
     elapsed_s : (...)
         From the start of the slide to that of each window; infinite if unknown.
     joined
@@ -48,6 +50,7 @@ class WindowBatch:
     joined: tuple[WindowBatch, ...] = ()
     channels: tuple[str, ...] = ()
     elapsed_s: Array = field(default_factory=lambda: np.array(np.inf))
+    tangential_force_n: Array = field(default_factory=lambda: np.array(np.nan))
     _memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

@@ -23,6 +23,7 @@ from texture_core.window import Window
 from texture_features.catalogue import FEATURES
 from texture_features.feature import Feature, WindowBatch
 from texture_features.features.force import Force
+from texture_features.features.friction import Friction
 from texture_features.features.slide_onset import SlideOnset
 from texture_features.features.speed import Speed
 from texture_features.recipe_entry import choose
@@ -36,7 +37,8 @@ CHUNK = 64
 InputLayout = tuple[tuple[float, tuple[str, ...]], ...]  # rate and channels of each input
 
 
-MOTION_FEATURES = (Speed, Force, SlideOnset)
+MOTION = ('speed_m_s', 'force_n', 'tangential_force_n', 'elapsed_s')  # of a window, whatever its input
+MOTION_FEATURES = (Speed, Force, Friction, SlideOnset)
 JOINT = '+'  # between the topics of a joint input
 AGAIN = '#'  # between a topic and the name of a further description of it
 RAW, SUBTRACTED = 'raw', 'tared'
@@ -208,12 +210,9 @@ class FeatureSet:
                 skipped=event.skipped,
             )
         inputs = [event.windows[name] for name in self.window_names]
-        speed, force, elapsed = np.array(event.speed_m_s), np.array(event.force_n), np.array(event.elapsed_s)
+        motion: dict[str, Any] = {name: np.array(getattr(event, name)) for name in MOTION}
         values = self._values(
-            [
-                WindowBatch(item.samples, item.rate_hz, speed, force, channels=item.channels, elapsed_s=elapsed)
-                for item in inputs
-            ]
+            [WindowBatch(item.samples, item.rate_hz, channels=item.channels, **motion) for item in inputs]
         )
         return self._vector(event, _layout(inputs), values)
 
@@ -250,18 +249,14 @@ class FeatureSet:
         )
 
     def _extract_alike(self, events: Sequence[CutWindow]) -> list[FeatureVector]:
-        speed = np.array([event.speed_m_s for event in events])
-        force = np.array([event.force_n for event in events])
-        elapsed = np.array([event.elapsed_s for event in events])
+        motion: dict[str, Any] = {name: np.array([getattr(event, name) for event in events]) for name in MOTION}
         inputs = [events[0].windows[name] for name in self.window_names]
         stacked = [
             WindowBatch(
                 np.stack([event.windows[name].samples for event in events]),
                 item.rate_hz,
-                speed,
-                force,
                 channels=item.channels,
-                elapsed_s=elapsed,
+                **motion,
             )
             for name, item in zip(self.window_names, inputs, strict=True)
         ]

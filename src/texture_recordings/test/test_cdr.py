@@ -1,3 +1,5 @@
+import math
+
 import pytest
 
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
@@ -8,7 +10,9 @@ from texture_recordings.cdr import TYPES, decode, encode
 @pytest.mark.parametrize(
     'value',
     [
-        ExplorationState(1, 'e', 'circular', Phase.SLIDE, 0.5, 0.1, 2.0, 0.0, 0.5, 'cork', 0.1, 0.0, 2e-3, 'surface'),
+        ExplorationState(
+            1, 'e', 'circular', Phase.SLIDE, 0.5, 0.1, 2.0, 0.0, 0.5, 'cork', 0.1, 0.0, 2e-3, 'surface', 0.6
+        ),
         TextureEstimate(
             1, 'e', 'cork', True, 0.9, ('cork', 'felt'), (0.9, 0.1), True, ('cork',), 3, 0.7, frame_id='tip'
         ),
@@ -18,3 +22,11 @@ from texture_recordings.cdr import TYPES, decode, encode
 )
 def test_a_value_comes_back_equal_to_the_type_of_each_field(value: object) -> None:
     assert decode(encode(value), TYPES[type(value)]) == value
+
+
+def test_a_recording_from_before_the_tangential_force_has_none() -> None:
+    state = ExplorationState(1, 'e', 'circular', Phase.SLIDE, 0.5, 0.1, 2.0, z_m=2e-3, tangential_force_n=0.6)
+    before = encode(state)[:-8]
+    found = decode(before, TYPES[ExplorationState])
+    assert math.isnan(found.tangential_force_n)
+    assert (found.force_n, found.z_m) == (2.0, 2e-3)

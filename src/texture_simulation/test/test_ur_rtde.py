@@ -139,6 +139,15 @@ def test_a_surface_that_drops_is_not_touched_any_more_until_it_is_back(controlle
     assert forces == [pytest.approx(2.0), 0.0, pytest.approx(2.0)]
 
 
+def test_another_sample_has_another_friction(controller):
+    dashboard = DashboardSession(controller, lambda _seconds: None, lambda _seconds: None)
+    plane = controller.robot.surface
+    dashboard.receive(b'emulate friction 1.1\n')
+    force_n = plane.force_n(plane.origin - (0.0, 0.0, 0.001), np.array([0.05, 0.0, 0.0]))
+    assert force_n == pytest.approx([-1.1 * 2.0, 0.0, 2.0])
+    assert dashboard.receive(b'emulate friction wet\n') == b"came 'wet'; a number of newtons per N is needed\n"
+
+
 def test_a_script_starts_when_its_last_line_is_there(controller):
     script = ScriptSession(controller)
     script.receive(b'def rtde_control():\n  if True:\n')

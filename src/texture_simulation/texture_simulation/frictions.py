@@ -9,6 +9,7 @@ import numpy as np
 
 from texture_core.arrays import Array
 from texture_simulation.stick_slip.friction import StickSlip
+from texture_simulation.stick_slip.stribeck import steady_force_n
 from texture_simulation.stick_slip.tip_drag import TipDrag
 from texture_simulation.surfaces.sliding_friction import SlidingDrag, SlidingFriction
 from texture_simulation.trajectory import Trajectory
@@ -76,3 +77,27 @@ def make_drag(friction: Any, rate_hz: float, rng: np.random.Generator, batch_sha
         Follows the path from its first point on.
     """
     return DRAGS[type(friction)](friction, rate_hz, rng, batch_shape)
+
+
+def sliding_coefficient(friction: StickSlip | SlidingFriction, speed_m_s: Array) -> Array:
+    """Return tangential over normal force of a finger that slides steadily.
+
+    Parameters
+    ----------
+    friction
+        One of `FRICTIONS`.
+    speed_m_s : (...)
+        Speed along the surface.
+
+    Returns
+    -------
+    (...)
+        The Stribeck curve at the speed, without dimension.
+
+    Examples
+    --------
+    >>> sliding_coefficient(SlidingFriction(static=0.6, kinetic=0.5), np.array([10.0])).round(3).tolist()  # fast
+    [0.5]
+    """
+    curve = friction.curve() if isinstance(friction, SlidingFriction) else friction
+    return steady_force_n(curve, speed_m_s, 1.0)

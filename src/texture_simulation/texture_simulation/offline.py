@@ -12,6 +12,7 @@ from texture_core.catalogue import find
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_simulation.effects.protocols import SlideEffect
+from texture_simulation.frictions import sliding_coefficient
 from texture_simulation.scene import Scene
 from texture_simulation.sensors.catalogue import SENSORS
 from texture_simulation.sensors.model import SensorKind, SimulatedStream
@@ -137,11 +138,25 @@ def simulate_exploration(
     )
     streams = kind.make(scene.of_finger(finger), scene.surface(surface), rng, finger=finger).streams(path)
     timeline = _ExplorationTimeline(
-        exploration_id, surface, speed_m_s, force_n, slide_s, start_ns, direction_rad, radius_m
+        exploration_id,
+        surface,
+        speed_m_s,
+        force_n,
+        slide_s,
+        start_ns,
+        direction_rad,
+        radius_m,
+        _tangential_n(scene, surface, float(speed[0]), float(force[0])),
     )
     return timeline.states(), {
         stream.topic: _batches(streams[stream.topic], stream, start_ns) for stream in kind.streams
     }
+
+
+def _tangential_n(scene: Scene, surface: str, speed_m_s: float, force_n: float) -> float:
+    """Return what a wrist sensor without errors would measure; NaN of a surface whose friction nobody states."""
+    friction = scene.surface(surface).friction
+    return math.nan if friction is None else force_n * float(sliding_coefficient(friction, np.array(speed_m_s)))
 
 
 def _profile(speed_m_s: float, force_n: float, slide_s: float, kind: SensorKind) -> tuple[Array, Array]:
@@ -167,6 +182,7 @@ class _ExplorationTimeline:
     start_ns: int
     direction_rad: float
     radius_m: float
+    tangential_force_n: float
 
     def states(self) -> list[ExplorationState]:
         """Return the state at each change of phase, and regularly while sliding."""
@@ -198,6 +214,7 @@ class _ExplorationTimeline:
             speed_m_s=self.speed_m_s,
             force_n=self.force_n,
             direction_rad=self.direction_rad + turned_rad,
+            tangential_force_n=self.tangential_force_n,
         )
 
 

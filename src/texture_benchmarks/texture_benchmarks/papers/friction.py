@@ -16,10 +16,9 @@ from texture_benchmarks.papers.simulated_trials import Slides, gather
 from texture_benchmarks.papers.trial import evaluate_method, recipe_of, reduced
 from texture_core.arrays import Array
 from texture_core.errors import InvalidParameter
+from texture_simulation.frictions import sliding_coefficient
 from texture_simulation.scene import Scene, load_scene
 from texture_simulation.simulated_slide import SimulatedSlide
-from texture_simulation.stick_slip.friction import StickSlip
-from texture_simulation.stick_slip.stribeck import steady_force_n
 
 SCENE, TASK, RECIPES = 'sticky', 'six sheets', ('ets-linear-svm', 'ets-linear-ann')
 SPEEDS_M_S, FORCES_N, SLIDE_S = (0.10, 0.15, 0.20), (1.0, 2.5, 5.0), 0.5
@@ -95,19 +94,12 @@ def measured_friction(scene: Scene, slides: Slides, error_n: float, rng: np.rand
     (n_slides, 1)
     """
     normal_n, speed_m_s = slides.views[0].force_n, slides.views[0].speed_m_s
-    curves = [_curve(scene.surfaces[name].friction) for name in slides.surfaces]
-    coefficients = np.array([steady_force_n(curve, speed_m_s, 1.0) for curve in curves])
+    frictions = [scene.surfaces[name].friction for name in slides.surfaces]
+    coefficients = np.array([sliding_coefficient(friction, speed_m_s) for friction in frictions])
     tangential_n = coefficients[slides.codes, np.arange(len(slides.codes))] * normal_n
     wrong_n = error_n * rng.standard_normal((2, len(normal_n)))
     ratio: Array = (tangential_n + wrong_n[0]) / np.maximum(normal_n + wrong_n[1], LEAST_N)
     return ratio[:, None]
-
-
-def _curve(friction: object) -> StickSlip:
-    if isinstance(friction, StickSlip):
-        return friction
-    curve: StickSlip = friction.curve()  # type: ignore[attr-defined]  # of SlidingFriction
-    return curve
 
 
 def _with(name: str, error_n: float) -> str:

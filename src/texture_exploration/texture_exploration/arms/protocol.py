@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -15,8 +16,10 @@ class ArmState:
     """Position, velocity and normal force of the fingertip in the frame of the surface.
 
     `time_ns` is when the arm measured it, of CLOCK_MONOTONIC; `position` in m, `velocity` in m/s; `force_n` is the
-    force normal to the surface, positive when pressing. `fault` says why the arm cannot move; '' if it can. For
-    `watchdog_s` at most the arm goes on with its last velocity when it hears nothing more; 0 if it does not say.
+    force normal to the surface, positive when pressing; `tangential_force_n` the force of the surface against the
+    direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
+    cannot move; '' if it can. For `watchdog_s` at most the arm goes on with its last velocity when it hears nothing
+    more; 0 if it does not say.
     """
 
     time_ns: int
@@ -25,6 +28,7 @@ class ArmState:
     force_n: float
     fault: str = ''
     watchdog_s: float = 0.0
+    tangential_force_n: float = math.nan
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from texture_exploration.arms.protocol import ArmState, Vector
 from texture_exploration.arms.ros_controllers_params import RosControllersParams
 from texture_exploration.arms.ros_controllers_topics import ForceSample, PoseSample
 from texture_exploration.arms.surface_frame import SurfaceFrame
+from texture_exploration.arms.tangential_force import tangential_force_n
 
 GRAVITY_M_S2 = 9.81
 VELOCITY_OVER_NS = 30_000_000
@@ -49,6 +50,7 @@ class ToolState:
         self._position: Vector = (math.nan, math.nan, math.nan)
         self._velocity = REST
         self._force_n = math.nan
+        self._force_vector_n: Vector = (math.nan, math.nan, math.nan)  # zeroed, without the weight, not smoothed
         self._reading_n: Array | None = None  # of the sensor, as it came
         self._stamps_ns = {'pose': -1, 'force': -1}
         self._track: deque[tuple[int, Vector]] = deque()
@@ -98,10 +100,11 @@ class ToolState:
         self._reading_n = reading
         # What the sensor shows of the weight turns with it; what is left in free air is its offset.
         unweighted = reading - to_base.T @ np.array([0.0, 0.0, -params.tool_mass_kg * GRAVITY_M_S2])
-        normal_n = self._normal_n(to_base, unweighted)
+        normal_n = self._at_surface(to_base, unweighted)[2]
         zeroings = self.zero.zeroings
         self.zero.update(now_ns, self._position, normal_n, unweighted, moving=moving)
-        zeroed_n = self._normal_n(to_base, unweighted - self.zero.offset_n)
+        self._force_vector_n = self._at_surface(to_base, unweighted - self.zero.offset_n)
+        zeroed_n = self._force_vector_n[2]
         if self.zero.zeroings != zeroings:
             self._force_n = zeroed_n  # what was smoothed had another zero
         elif not repeated:  # a frozen reading must stay one to the last bit
@@ -109,7 +112,14 @@ class ToolState:
 
     def state(self, fault: str) -> ArmState:
         """Return the newest state; its time is that of the older of pose and force."""
-        return ArmState(min(self.pose_ns, self.force_ns), self._position, self._velocity, self._force_n, fault)
+        return ArmState(
+            min(self.pose_ns, self.force_ns),
+            self._position,
+            self._velocity,
+            self._force_n,
+            fault,
+            tangential_force_n=tangential_force_n(self._force_vector_n, self._velocity),
+        )
 
     def _is_new(self, kind: str, stamp_ns: int) -> bool:
         """Return whether a sample differs from the one before; a broadcaster may repeat what it had."""
@@ -117,8 +127,8 @@ class ToolState:
         self._stamps_ns[kind] = stamp_ns
         return new
 
-    def _normal_n(self, to_base: Array, force_n: Array) -> float:
-        return self._frame.direction((to_base @ force_n).tolist())[2]
+    def _at_surface(self, to_base: Array, force_n: Array) -> Vector:
+        return self._frame.direction((to_base @ force_n).tolist())
 
     def _smoothed(self, force_n: float, passed_s: float) -> float:
         smoothing_s = self._params.force_smoothing_s

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from texture_core.errors import DeviceError
 from texture_exploration.arms.protocol import ArmCommand, ArmState, ForceReading
 from texture_exploration.arms.surface_frame import SurfaceFrame
+from texture_exploration.arms.tangential_force import tangential_force_n
 from texture_exploration.arms.ur_link import WorkerLink
 from texture_exploration.arms.ur_messages import RECOVER, STOP, UrCommand, UrReport
 from texture_exploration.arms.ur_params import UrArmParams
@@ -100,13 +101,15 @@ class UrArm:
         """Return the newest state."""
         report = self._report()
         frame = self._frame
+        velocity, force = frame.direction(report.velocity_m_s), frame.direction(report.force_n)
         return ArmState(
             time_ns=report.time_ns,
             position=frame.place(report.position_m),
-            velocity=frame.direction(report.velocity_m_s),
-            force_n=frame.direction(report.force_n)[2],
+            velocity=velocity,
+            force_n=force[2],
             fault=self._fault(report),
             watchdog_s=report.watchdog_s,
+            tangential_force_n=tangential_force_n(force, velocity),
         )
 
     def command(self, command: ArmCommand) -> None:

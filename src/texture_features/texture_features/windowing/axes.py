@@ -79,6 +79,10 @@ class DirectedWindow(Protocol):
         """Mean normal force."""
 
     @property
+    def tangential_force_n(self) -> float:
+        """Mean force of the surface against the direction of travel."""
+
+    @property
     def direction_rad(self) -> float:
         """Mean direction of travel."""
 
@@ -123,6 +127,7 @@ class AxisJoiner(Generic[T]):
     ...     direction_rad: float
     ...     speed_m_s: float
     ...     force_n: float = 1.0
+    ...     tangential_force_n: float = 0.5
     ...     windows: dict = dataclasses.field(default_factory=lambda: {'signal': 'samples'})
     >>> joiner = AxisJoiner(['signal@x', 'signal@y'])
     >>> joiner.add(Slide(0.0, 0.02))  # waits for its partner
@@ -168,6 +173,7 @@ class AxisJoiner(Generic[T]):
             windows={name: parts[axis].windows[topic] for name, (topic, axis) in self._sources.items()},
             speed_m_s=sum(part.speed_m_s for part in several) / len(several),
             force_n=sum(part.force_n for part in several) / len(several),
+            tangential_force_n=sum(part.tangential_force_n for part in several) / len(several),
             direction_rad=math.nan if len(several) > 1 else window.direction_rad,
         )
 

@@ -20,7 +20,7 @@ LOST_SHARE = 0.5  # of the mean force; below, a state without guarantee is one i
 
 @dataclass(frozen=True)
 class CoveredSpan:
-    """A covered stretch of time with the mean speed and force in it.
+    """A covered stretch of time with the mean speed and forces in it.
 
     Examples
     --------
@@ -34,6 +34,7 @@ class CoveredSpan:
     speed_m_s: float
     force_n: float
     direction_rad: float
+    tangential_force_n: float = math.nan
 
 
 class SlideCoverage:
@@ -77,8 +78,8 @@ class SlideCoverage:
         self._hop_ns = hop_ns
         self._next_ns = state.stamp_ns + skip_ns
         self._intervals: deque[list[int]] = deque()
-        # stamp, end of the covered time known with this state, speed, force, direction
-        self._states: deque[tuple[int, int, float, float, float]] = deque(maxlen=MAX_STATES)
+        # each with the end of the covered time known with it
+        self._states: deque[tuple[int, ExplorationState]] = deque(maxlen=MAX_STATES)
         self._promising = False
         self._withdrawn = False
         self._force = _WeightedMean()
@@ -89,7 +90,7 @@ class SlideCoverage:
         stamp = state.stamp_ns
         start = stamp
         if self._states:
-            before = self._states[-1][0]
+            before = self._states[-1][1].stamp_ns
             if stamp < before:
                 return False
             start = before if stamp - before <= LINK_NS and not self._withdrawn else stamp
@@ -99,7 +100,7 @@ class SlideCoverage:
         if self._withdrawn and state.force_n < LOST_SHARE * self._force.value:
             self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
         self._force.add(state.force_n, float(state.steady_s > 0))
-        self._states.append((stamp, self._intervals[-1][1], state.speed_m_s, state.force_n, state.direction_rad))
+        self._states.append((self._intervals[-1][1], state))
         return True
 
     @property
@@ -134,21 +135,23 @@ class SlideCoverage:
 
     def _span(self, start: int, end: int) -> CoveredSpan:
         states = self._states
-        while len(states) > 1 and states[1][0] <= start and states[0][1] < end:
+        while len(states) > 1 and states[1][1].stamp_ns <= start and states[0][0] < end:
             states.popleft()
         speeds = _WeightedMean()
         forces = _WeightedMean()
+        tangential = _WeightedMean()
         directions = _MeanDirection()
-        for number, (stamp, covered, speed, force, direction) in enumerate(states):
+        for number, (covered, state) in enumerate(states):
             enough = covered >= end
-            until = end if enough else min(states[number + 1][0], end)
-            weight = until - max(stamp, start)
-            speeds.add(speed, weight)
-            forces.add(force, weight)
-            directions.add(direction, weight)
+            until = end if enough else min(states[number + 1][1].stamp_ns, end)
+            weight = until - max(state.stamp_ns, start)
+            speeds.add(state.speed_m_s, weight)
+            forces.add(state.force_n, weight)
+            tangential.add(state.tangential_force_n, weight)
+            directions.add(state.direction_rad, weight)
             if enough or until >= end:
                 break
-        return CoveredSpan(start, end, speeds.value, forces.value, directions.value)
+        return CoveredSpan(start, end, speeds.value, forces.value, directions.value, tangential.value)
 
 
 class _WeightedMean:

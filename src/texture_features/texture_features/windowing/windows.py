@@ -75,6 +75,7 @@ class CutWindow:
     skipped: int = 0
     motion: str = ''
     direction_rad: float = math.nan
+    tangential_force_n: float = math.nan
     elapsed_s: float = math.inf  # from the start of the slide to that of the window; infinite where nobody says
 
 
@@ -307,6 +308,7 @@ class WindowCutter:
             skipped=slide.skipped,
             motion=slide.motion,
             direction_rad=span.direction_rad,
+            tangential_force_n=span.tangential_force_n,
             elapsed_s=(span.start_ns - slide.start_ns) / NANOSECONDS,
         )
 

@@ -19,11 +19,14 @@ class ContactPlane:
     ----------
     drop_m
         The whole surface lies lower by this: set while the finger slides, the surface is lost as behind an edge.
+    friction
+        Coefficient of Coulomb friction: another sample has another one.
     """
 
     def __init__(self, params: UrControllerParams) -> None:
         self._params = params
         self.drop_m = 0.0
+        self.friction = params.friction
         self.origin = np.array([params.surface_x_m, params.surface_y_m, params.surface_z_m])
 
     def force_n(self, position_m: Array, velocity_m_s: Array) -> Array:
@@ -44,7 +47,7 @@ class ContactPlane:
             return np.zeros(3)
         along = velocity_m_s - (velocity_m_s @ normal) * normal
         speed = math.sqrt(along @ along)
-        force: Array = pressing * normal - self._params.friction * pressing * along / max(speed, STICTION_M_S)
+        force: Array = pressing * normal - self.friction * pressing * along / max(speed, STICTION_M_S)
         return force
 
     def _depth_and_normal(self, position_m: Array) -> tuple[float, Array]:

@@ -2,7 +2,8 @@
 
 Beside the real commands it obeys the fault switches of the emulator: `emulate protective stop`,
 `emulate offline SECONDS`, `emulate slow SECONDS`, which lets stops, the end of force control and zeroing be
-acknowledged so much later, and `emulate drop METRES`, which lowers the surface under the finger by so much.
+acknowledged so much later, `emulate drop METRES`, which lowers the surface under the finger by so much, and
+`emulate friction COEFFICIENT`, as of another sample under the finger.
 `load NAME` and `play` start a program of somebody else, which takes no commands.
 """
 
@@ -116,6 +117,10 @@ class DashboardSession:
         plane = self._controller.robot.surface
         return self._with_number(argument, partial(setattr, plane, 'drop_m'), 'The surface was moved', 'metres')
 
+    def _emulate_friction(self, argument: str) -> str:
+        plane = self._controller.robot.surface
+        return self._with_number(argument, partial(setattr, plane, 'friction'), 'The friction was set', 'newtons per N')
+
     def _with_seconds(self, argument: str, use: Callable[[float], None], done: str) -> str:
         return self._with_number(argument, use, done, 'seconds')
 
@@ -168,4 +173,5 @@ ANSWERS: Mapping[str, Answer] = {
     'emulate slow': DashboardSession._emulate_slow,
     'emulate speed': DashboardSession._emulate_speed,
     'emulate drop': DashboardSession._emulate_drop,
+    'emulate friction': DashboardSession._emulate_friction,
 }

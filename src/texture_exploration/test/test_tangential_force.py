@@ -1,0 +1,27 @@
+"""The force along the surface, from a force vector and a velocity."""
+
+import math
+
+import pytest
+
+from texture_exploration.arms.tangential_force import SLIDING_M_S, tangential_force_n
+
+
+@pytest.mark.parametrize('turned_rad', [0.0, 0.7, 2.0, math.pi, -1.3])
+def test_coulomb_friction_is_its_coefficient_times_the_normal_force_whichever_way_the_finger_goes(turned_rad):
+    along = math.cos(turned_rad), math.sin(turned_rad)
+    force = (-0.3 * 2.0 * along[0], -0.3 * 2.0 * along[1], 2.0)
+    assert tangential_force_n(force, (0.05 * along[0], 0.05 * along[1], 0.01)) == pytest.approx(0.6)
+
+
+def test_a_force_across_the_direction_of_travel_is_no_friction():
+    assert tangential_force_n((0.0, 1.5, 2.0), (0.05, 0.0, 0.0)) == 0.0
+
+
+def test_what_pushes_the_finger_onwards_is_negative():
+    assert tangential_force_n((0.5, 0.0, 2.0), (0.05, 0.0, 0.0)) == -0.5
+
+
+@pytest.mark.parametrize('speed_m_s', [0.0, 0.9 * SLIDING_M_S, math.nan])
+def test_a_finger_that_does_not_slide_has_none(speed_m_s):
+    assert math.isnan(tangential_force_n((-0.6, 0.0, 2.0), (speed_m_s, 0.0, 0.5)))
