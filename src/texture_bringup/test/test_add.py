@@ -99,6 +99,19 @@ def test_a_texture_is_removed_by_its_label_from_the_command_line(classifier, cap
     assert classify_slide(classifier, 'slide-6') != 'oak'
 
 
+def test_parameters_of_a_running_node_are_set_from_the_command_line(classifier, capsys):
+    for value, sentence in (
+        ('modle:=x', "no parameter of classifier 'modle'; did you mean 'model'?"),
+        ('model:=/nowhere', "refused parameter 'model': "),
+        ('model', ':='),
+    ):
+        assert main(['set', 'classifier', value]) == 2
+        assert sentence in capsys.readouterr().err
+    assert classifier._evidence.model is not None
+    assert main(['set', 'classifier', 'model:=']) == 0
+    assert classifier._evidence.model is None
+
+
 @pytest.mark.parametrize('arguments', [['add'], ['add', 'silk', '--undo']])
 def test_what_to_add_must_be_given(arguments, capsys):
     assert main(arguments) == 2

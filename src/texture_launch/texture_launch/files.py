@@ -45,6 +45,6 @@ def given_arguments(texts: Iterable[str]) -> dict[str, str]:
     for text in texts:
         name, mark, value = text.partition(':=')
         if not (name and mark):
-            raise InvalidLaunch(f"launch argument '{text}' has no value; write NAME:=VALUE")
+            raise InvalidLaunch(f"argument '{text}' has no value; write NAME:=VALUE")
         given[name] = value
     return given

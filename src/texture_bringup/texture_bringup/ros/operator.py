@@ -20,6 +20,8 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
+from texture_bringup.ros.parameter_texts import parameter_from_text
+from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData, InvalidParameter, LaunchFailed, MotionAborted
 from texture_core.estimates import RoughnessEstimate, TextureEstimate
 from texture_core.exploration import ExplorationRequest, ExplorationState
@@ -316,12 +318,57 @@ class Operator:
         InvalidParameter
             If it refuses one, with its reason.
         """
+        client = self._parameters_of(node, deadline_s)
+        self._set(node, client, [Parameter(name, value=value) for name, value in values.items()])
+
+    def set_from_texts(self, node: str, texts: Mapping[str, str], deadline_s: float = 10.0) -> None:
+        """Set parameters of a node from texts, which are read as the types that the node has declared.
+
+        Parameters
+        ----------
+        node
+            Name of the node.
+        texts
+            Values by the names of the parameters.
+        deadline_s
+            Longest time to wait for the node.
+
+        Raises
+        ------
+        LaunchFailed
+            If the node does not answer.
+        UnknownName
+            If it has no such parameter, with the nearest name.
+        InvalidParameter
+            If a text is no value of the type, or the node refuses it, with its reason.
+        """
+        client = self._parameters_of(node, deadline_s)
+        known = self._answer(node, client.list_parameters([], 10)).result.names
+        for name in texts:
+            if name not in known:
+                raise unknown_name(name, known, f'parameter of {node}')
+        values = self._answer(node, client.get_parameters(list(texts))).values
+        self._set(
+            node,
+            client,
+            [parameter_from_text(*pair, one.type) for pair, one in zip(texts.items(), values, strict=True)],
+        )
+
+    def _parameters_of(self, node: str, deadline_s: float) -> AsyncParameterClient:
         if node not in self._settings:
             self._settings[node] = AsyncParameterClient(self._node, node)
         client = self._settings[node]
         self._until(client.services_are_ready, deadline_s, f"node '{node}' does not answer; is it running?")
-        answer = self._result(client.set_parameters([Parameter(name, value=value) for name, value in values.items()]))
-        for name, outcome in zip(values, answer.results, strict=True):
+        return client
+
+    def _answer(self, node: str, future: Future) -> Any:
+        """Return the answer of a node that may run without an explorer."""
+        self._until(future.done, SILENT_S, f"node '{node}' does not answer")
+        return future.result()
+
+    def _set(self, node: str, client: AsyncParameterClient, parameters: Sequence[Parameter]) -> None:
+        answer = self._answer(node, client.set_parameters(list(parameters)))
+        for name, outcome in zip((one.name for one in parameters), answer.results, strict=True):
             if not outcome.successful:
                 raise InvalidParameter(f"node '{node}' refused parameter '{name}': {outcome.reason}")
 
