@@ -141,7 +141,10 @@ def windows_of(recipe, factor=1.0, seed=0, slides=3, constant=False):
                     measured = 10.0**number * lfilter([1.0], [1.0, -0.45 * number], noise, axis=0)
                     samples = (factor * (np.full_like(noise, 0.1) if constant else measured)).astype(np.float32)
                     windows[topic] = Window(samples.astype(np.float64), rate_hz, ('a', 'b'), 0, 0.1, 2.0)
-                events.append(CutWindow(place, f'{surface}/{slide}', length_s, length_s, windows, 0.1, 2.0))
+                exploration_id = f'{surface}/{slide}'
+                events.append(
+                    CutWindow(place, exploration_id, length_s, length_s, windows, 0.1, 2.0, tangential_force_n=1.0)
+                )
     return LabelledFeatures.from_vectors(recipe.feature_set.extract_many(events), surfaces)
 
 

@@ -2,9 +2,13 @@
 
 import math
 
+import numpy as np
 import pytest
 
+from texture_core.rotation import rotation_matrix
 from texture_exploration.arms.tangential_force import SLIDING_M_S, tangential_force_n
+from texture_exploration.arms.ur import UrArm, UrArmParams
+from texture_exploration.arms.ur_messages import Counts, UrReport
 
 
 @pytest.mark.parametrize('turned_rad', [0.0, 0.7, 2.0, math.pi, -1.3])
@@ -25,3 +29,23 @@ def test_what_pushes_the_finger_onwards_is_negative():
 @pytest.mark.parametrize('speed_m_s', [0.0, 0.9 * SLIDING_M_S, math.nan])
 def test_a_finger_that_does_not_slide_has_none(speed_m_s):
     assert math.isnan(tangential_force_n((-0.6, 0.0, 2.0), (speed_m_s, 0.0, 0.5)))
+
+
+class Link:
+    """A worker that said once what the controller measured."""
+
+    def __init__(self, report):
+        self.report = report
+
+    def check(self):
+        """Live."""
+
+
+def test_the_ur_arm_reports_it_in_the_frame_of_a_tilted_surface(monkeypatch):
+    axes = rotation_matrix((0.2, -0.4, 0.0))
+    velocity, force = axes @ np.array([0.03, 0.04, 0.0]), axes @ np.array([-0.36, -0.48, 2.0])  # 0.3 of 2 N
+    report = UrReport(1, (0.4, 0.0, 0.1), tuple(velocity), tuple(force), 0.1, 1, True, False, False, True, Counts())
+    arm = UrArm(UrArmParams(surface_rx_rad=0.2, surface_ry_rad=-0.4))
+    monkeypatch.setattr(arm, '_link', Link(report))
+    state = arm.state()
+    assert (state.force_n, state.tangential_force_n) == pytest.approx((2.0, 0.6))

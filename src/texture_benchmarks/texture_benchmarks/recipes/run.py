@@ -62,6 +62,7 @@ RATE_HZ, FOLDS, LAST_TRAINED = 1000.0, 5, 30
 QUICK_MATERIALS, QUICK_SLIDES, QUICK_FOLDS, QUICK_LAST_TRAINED = ('material01', 'material02', 'material03'), '1-6', 2, 4
 FIRST, QUICK_FIRST = LAST_TRAINED / 40, QUICK_LAST_TRAINED / 6  # fraction of the slides of each material
 QUICK_FASTER_M_S = 0.05
+NEEDS_TANGENTIAL_FORCE = frozenset({'friction-svm'})
 QUICK_RECIPES = ('default', 'ets-linear-svm-vote', 'kaboli-pa', 'jamali-naive-bayes-5, overlapping')
 NEAREST = {'ties': 'nearest'}
 OVERLAPPING_S = 0.25  # apart, by half
@@ -283,8 +284,13 @@ def _shipped(options: BenchmarkOptions) -> Sequence[str]:
 
 
 def of_one_finger(recipes: Iterable[str]) -> list[str]:
-    """Return the recipes, in the order of their names, without those of several fingers: no recorded data has these."""
-    return sorted(name for name in recipes if not {'/', '@'} & set(''.join(load_recipe(name).feature_set.window_names)))
+    """Return the recipes by name, without those of several fingers or of friction: no recorded data has these."""
+    return sorted(
+        name
+        for name in recipes
+        if name not in NEEDS_TANGENTIAL_FORCE
+        and not {'/', '@'} & set(''.join(load_recipe(name).feature_set.window_names))
+    )
 
 
 def _numbers(settings: Mapping[str, Setting], names: Sequence[str], options: BenchmarkOptions) -> dict[str, Any]:
