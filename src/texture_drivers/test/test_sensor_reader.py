@@ -5,6 +5,7 @@ import numpy as np
 
 from texture_core.errors import DeviceError
 from texture_core.signal import TactileSignal
+from texture_drivers import sensor_reader
 from texture_drivers.sensor_health import SensorHealth
 from texture_drivers.sensor_reader import SensorReader
 
@@ -71,6 +72,21 @@ def test_a_sensor_that_is_gone_is_opened_again_and_reported_of_once() -> None:
         'it is not there',
         'the sensor delivers samples',
     ]
+    assert reader.fault == ''
+
+
+def test_a_sensor_that_appears_soon_after_the_start_gives_no_warning(monkeypatch) -> None:
+    monkeypatch.setattr(sensor_reader, 'RETRY_S', 0.001)
+    monkeypatch.setattr(sensor_reader, 'QUIET_ATTEMPTS', 3)
+    _, _, told = run('XXX..xX..', 4)
+    assert [sentence.split('.')[0] for sentence in told] == [
+        'the sensor delivers samples',
+        'it is gone',
+        'it is not there',
+        'the sensor delivers samples',
+    ]
+    _, reader, told = run('XXXXXX..', 2)
+    assert [sentence.split('.')[0] for sentence in told] == ['it is not there', 'the sensor delivers samples']
     assert reader.fault == ''
 
 

@@ -11,6 +11,8 @@ from texture_core.protocols import Sensor
 from texture_core.signal import TactileSignal
 
 RETRY_S = 0.2
+# So often a sensor that was never there is tried without a warning, for 5 s: its device may appear after the node.
+QUIET_ATTEMPTS = 25
 Deliver = Callable[[str, TactileSignal], None]
 LogSentence = Callable[[str], None]
 Action = Callable[[], None]
@@ -26,7 +28,8 @@ class SensorReader:
     deliver
         Called with topic and batch, in the thread.
     warn, inform
-        Called with one sentence when the sensor goes, not at each retry, and when it comes back.
+        Called with one sentence when the sensor goes, not at each retry, and when it comes back. A sensor that was
+        never there is warned of after `QUIET_ATTEMPTS`.
     """
 
     def __init__(
@@ -35,6 +38,8 @@ class SensorReader:
         self.sensor = sensor
         self.fault = 'not opened yet'  # '' while all is well
         self.published: dict[str, int] = dict.fromkeys(sensor.expected_rates_hz, 0)
+        self._quiet_attempts = QUIET_ATTEMPTS
+        self._warned = ''  # of this fault
         self._deliver = deliver
         self._warn = warn
         self._inform = inform
@@ -65,19 +70,27 @@ class SensorReader:
     def _read_until_gone(self) -> None:
         try:
             self.sensor.open()
+            self._quiet_attempts = 0
             while not self._stop.is_set():
                 for topic, batches in self.sensor.read().items():
                     self._deliver_all(topic, batches)
                 while self._actions:
                     self._actions.popleft()()
         except DeviceError as error:
-            if self.fault != str(error):
-                self._warn(f'{error}. Trying again every {RETRY_S} s')
             self.fault = str(error)
+            self._warn_once(self.fault)
+
+    def _warn_once(self, fault: str) -> None:
+        """Warn of a fault that was not warned of yet, except in the first attempts."""
+        if self._quiet_attempts:
+            self._quiet_attempts -= 1
+        elif self._warned != fault:
+            self._warned = fault
+            self._warn(f'{fault}. Trying again every {RETRY_S} s')
 
     def _deliver_all(self, topic: str, batches: Sequence[TactileSignal]) -> None:
         if batches and self.fault:  # before the first batch is out: who has it may ask for a tare at once
-            self.fault = ''
+            self.fault = self._warned = ''
             self._inform('the sensor delivers samples')
         for batch in batches:
             self._deliver(topic, batch)

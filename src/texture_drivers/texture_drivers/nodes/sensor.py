@@ -149,7 +149,8 @@ class SensorNode(LifecycleNode):
         self._start_tare()
         response.success = True
         response.message = (
-            'taring: the baseline comes on the topics that end with _baseline, or a fault on /diagnostics'
+            'the tare has begun; it is done when the baseline comes on the topics that end with _baseline, and '
+            'has failed if /diagnostics reports it'
         )
         return response
 
