@@ -405,7 +405,8 @@ def test_touches_that_are_forgotten_are_made_again(robot):
     for _ in range(2):
         put_on_surface(robot, 0.0, 0.0)
         explorer.touch_surface()
-        explorer.forget_touches()
+        assert explorer.forget_touches() == 1
+    assert explorer.forget_touches() == 0
     assert 'touch 1 taken' in explorer.touch_surface()
 
 

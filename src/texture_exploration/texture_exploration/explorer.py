@@ -268,8 +268,8 @@ class Explorer:
         least_n = self.touch.contact_force_n
         return '' if force_n >= least_n else f' (less than {least_n:g} N: see that the finger touches)'
 
-    def forget_touches(self) -> None:
-        """Begin the touches of the surface again; the surface stays as it is.
+    def forget_touches(self) -> int:
+        """Begin the touches of the surface again; return how many are forgotten. The surface stays as it is.
 
         Raises
         ------
@@ -278,7 +278,7 @@ class Explorer:
         """
         with self._lock:
             self._surface_bound()
-            self._touches.forget()
+            return self._touches.forget()
 
     def _surface_bound(self) -> SurfaceBound:
         if not isinstance(self.arm, SurfaceBound):

@@ -96,9 +96,10 @@ class SurfaceTouches:
     def __len__(self) -> int:
         return len(self._places)
 
-    def forget(self) -> None:
-        """Begin again."""
-        self._places = []
+    def forget(self) -> int:
+        """Begin again; return how many touches there were."""
+        count, self._places = len(self._places), []
+        return count
 
     def add(self, place: Sequence[float], normal: Sequence[float], along: Sequence[float]) -> SurfaceFit | None:
         """Take a touch; return the plane, None if there are too few.

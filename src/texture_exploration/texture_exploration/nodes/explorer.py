@@ -285,8 +285,10 @@ class ExplorerNode(LifecycleNode):
         return response
 
     def _on_forget_touches(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._explorer.forget_touches()
-        response.success, response.message = True, 'the touches are forgotten; the surface stays as it is'
+        count = self._explorer.forget_touches()
+        touches = 'the touch is' if count == 1 else f'{count} touches are'
+        forgotten = f'{touches} forgotten' if count else 'no touch was taken, so none is forgotten'
+        response.success, response.message = True, f'{forgotten}; the surface stays as it is'
         return response
 
     def _on_estimate(self, message: msg.TextureEstimate | msg.RoughnessEstimate) -> None:
