@@ -11,7 +11,7 @@ from texture_estimation.open_set.error_bound import ErrorBound
 from texture_estimation.recipe import load_recipe
 
 RECIPE = load_recipe('default')
-WORD = 'never certain'
+WORD = 'too few slides for early stopping'
 ANY_ERROR_RATE = ErrorBound(0, 1.0)  # allows any, so nothing has to be shown
 
 
@@ -43,11 +43,11 @@ def test_early_stopping_needs_the_slides_that_show_its_error_rate(error_rate, ne
 
 def test_the_reason_names_the_slides_that_are_needed_and_those_that_were_there():
     assert ErrorBound(12, 0.02).reason == (
-        'never certain: at most 2 % wrong decisions need 149 slides or more to be held out of the training; '
-        'with 12 the confidence is 0.78 at most'
+        'too few slides for early stopping: at most 2 % wrong decisions need 149 slides or more to be held out of the '
+        'training; with 12 the confidence is 0.78 at most'
     )
     assert ErrorBound(0, 0.02).reason.endswith('149 slides or more to be held out of the training')
-    assert ErrorBound(600, 0.0).reason == 'never certain: at most 0 % wrong decisions cannot be shown'
+    assert ErrorBound(600, 0.0).reason == 'no early stopping: at most 0 % wrong decisions cannot be shown'
 
 
 def test_a_limited_confidence_keeps_the_order_of_the_labels_and_the_sum_of_the_probabilities():

@@ -24,7 +24,7 @@ def model() -> TextureModel:
 def test_the_training_says_when_its_slides_are_too_few_to_be_certain(model: TextureModel) -> None:
     lines = summary(model, Path('model.skops'))
     assert lines[0] == "recipe 'tiny' trained on 2 surfaces: cork, felt"
-    assert 'never certain: at most 2 % wrong decisions need 149 slides or more' in lines[2]
+    assert 'too few slides for early stopping: at most 2 % wrong decisions need 149 slides or more' in lines[2]
     assert 'with 6 the confidence is 0.61 at most' in lines[2]
 
 

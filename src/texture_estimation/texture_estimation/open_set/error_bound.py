@@ -98,9 +98,10 @@ class ErrorBound:
             return ''
         rate = f'at most {PERCENT * self.max_error_rate:g} % wrong decisions'
         if math.isinf(self.slides_needed):
-            return f'never certain: {rate} cannot be shown'
+            return f'no early stopping: {rate} cannot be shown'
         limit = f'; with {self.slides} the confidence is {self.highest_confidence:.2f} at most' if self.slides else ''
-        return f'never certain: {rate} need {self.slides_needed:g} slides or more to be held out of the training{limit}'
+        needed = f'{self.slides_needed:g} slides or more to be held out of the training'
+        return f'too few slides for early stopping: {rate} need {needed}{limit}'
 
     def limited(self, probabilities: Array) -> Array:
         """Return the probabilities, mixed with equal ones just so much that none is above the highest confidence.

@@ -47,8 +47,8 @@ class PredictionSets:
         if self.thresholds:
             return ''
         return (
-            f'no prediction set: a coverage of {100 * self.coverage:g} % needs {slides_needed(self.coverage)} slides '
-            'or more to be held out of the training'
+            f'too few slides for a prediction set: a coverage of {100 * self.coverage:g} % needs '
+            f'{slides_needed(self.coverage)} slides or more to be held out of the training'
         )
 
     def members(self, probabilities: Array, effective_windows: float) -> list[int]:
