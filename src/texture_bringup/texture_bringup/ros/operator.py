@@ -79,7 +79,7 @@ class Operator:
     ) -> None:
         self._guard = guard
         self._context = Context()
-        self._context.init(domain_id=domain_id)
+        self._context.init(args=[], domain_id=domain_id)  # not those of the command: NAME:=VALUE would remap
         self._node = Node('operator', namespace=namespace or None, context=self._context, enable_rosout=False)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
