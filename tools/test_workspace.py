@@ -1,5 +1,6 @@
 """The set-up of the workspace, as far as it decides something."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -35,3 +36,12 @@ def test_an_interface_is_built_only_where_no_prefix_has_it(tmp_path: Path) -> No
 
 def test_the_interfaces_of_the_set_up_are_hidden_from_a_workspace_that_holds_the_repository() -> None:
     assert (workspace.INTERFACES.parent / 'COLCON_IGNORE').is_file()
+
+
+@pytest.mark.parametrize(
+    'file', sorted([*workspace.ROOT.glob('src/*/CMakeLists.txt'), *workspace.INTERFACES.rglob('CMakeLists.txt')])
+)
+def test_no_package_asks_for_a_version_that_cmake_deprecates_with_a_warning(file: Path) -> None:
+    found = re.search(r'cmake_minimum_required\(VERSION (\d+)\.(\d+)\)', file.read_text())
+    assert found is not None
+    assert (int(found[1]), int(found[2])) >= (3, 10)

