@@ -248,7 +248,7 @@ def test_a_command_of_the_pages_has_the_arguments_that_it_takes(page: str, line:
 def launch_arguments(name: str) -> set[str]:
     """Return the arguments that a launch file of the suite declares, with those of the files it includes."""
     text = (ROOT / 'src/texture_bringup/launch' / f'{name}.launch.xml').read_text()
-    own = set(re.findall(r'<arg name="(\w+)" default', text))
+    own = set(re.findall(r'<arg name="(\w+)" (?:default|description)=', text))
     included = re.findall(r'<include file="\S+ texture_bringup\)/launch/(\w+)\.launch', text)
     return own.union(*(launch_arguments(name) for name in included))
 

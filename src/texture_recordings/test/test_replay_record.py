@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from texture_msgs import msg
 
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.node_process import NodeProcess
+from texture_core.ros.local_graph import LocalGraph
+from texture_core.ros.qos import SENSOR_QOS
 from texture_core.signal import TactileSignal
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import read_bag
@@ -74,6 +77,17 @@ def test_the_rate_and_the_chosen_slides_are_kept(tmp_path: Path) -> None:
     with node('replay', 51, bag=str(source), rate=2.0, slides='2', subscribers=0, start_delay_s=0.0) as replay:
         assert replay.wait(60.0) == 0, replay.output
     assert 'published 100 exploration, 100 signal: 1.0 s in 0.5 s' in replay.output
+
+
+def test_a_bag_is_not_replayed_where_another_node_publishes_the_same(tmp_path: Path) -> None:
+    source = write(tmp_path / 'source')
+    with LocalGraph(100) as graph:
+        graph.peer.create_publisher(msg.TactileSignal, '/left/signal', SENSOR_QOS)
+        with node('replay', 100, bag=str(source), subscribers=0, start_delay_s=30.0) as replay:
+            assert replay.wait(60.0) == 2, replay.output
+    assert "another node publishes '/left/signal'" in replay.output
+    assert f'`texture launch replay bag:={source} namespace:=replay`' in replay.output
+    assert 'published' not in replay.output
 
 
 @pytest.mark.parametrize(

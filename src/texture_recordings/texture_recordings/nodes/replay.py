@@ -22,6 +22,7 @@ from texture_core.ros.parameters import declare
 from texture_core.ros.run import run
 from texture_core.ros.time import to_stamp
 from texture_recordings.bags import RawMessage, find_bags, read_named, topics_in
+from texture_recordings.ros.sole_publisher import refuse_other_publishers
 from texture_recordings.ros.topics import TOPICS
 from texture_recordings.schedule import Schedule
 from texture_recordings.slides import find_slides
@@ -111,8 +112,9 @@ class ReplayNode(Node):
     def _play(self) -> None:
         try:
             self._wait_for_subscribers()
+            self._refuse_others()
             self._begin_clock()
-            self._stop.wait(self._params.start_delay_s)
+            self._wait_alone()
             self._publish_all()
         except TextureError as error:
             self._error = error
@@ -128,6 +130,15 @@ class ReplayNode(Node):
                     f"within {self._params.deadline_s} s '{missing[0]}' did not get {self._params.subscribers} "
                     "subscription(s); start what shall listen, or set 'subscribers' to 0"
                 )
+
+    def _wait_alone(self) -> None:
+        """Wait for the start delay, in which other publishers are still being discovered."""
+        deadline = time.monotonic() + self._params.start_delay_s
+        while time.monotonic() < deadline and not self._stop.wait(POLL_S):
+            self._refuse_others()
+
+    def _refuse_others(self) -> None:
+        refuse_other_publishers(self, self._outputs.values(), self._params.bag)
 
     def _begin_clock(self) -> None:
         """Publish the time of the first message, so that no node is at time 0 when it comes."""
