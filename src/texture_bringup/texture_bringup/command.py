@@ -36,8 +36,12 @@ class Module(Protocol):
 
 @cache
 def installed() -> Mapping[str, EntryPoint]:
-    """Return the sub-commands of all installed packages, by name in the order of the alphabet."""
-    return {entry.name: entry for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name)}
+    """Return the sub-commands of all installed packages, by name in the order of the alphabet.
+
+    The name of a module holds no hyphen, so the module `touch_surface` is the sub-command `touch-surface`.
+    """
+    found = sorted(entry_points(group=GROUP), key=lambda entry: entry.name)
+    return {entry.name.replace('_', '-'): entry for entry in found}
 
 
 def summary(command: EntryPoint) -> str:
@@ -99,7 +103,7 @@ def _complete() -> None:
 
 def overview() -> str:
     """Return the help of the command itself."""
-    lines = [f'  {name:<12}{summary(command)}' for name, command in installed().items()]
+    lines = [f'  {name:<16}{summary(command)}' for name, command in installed().items()]
     head = 'usage: texture COMMAND [...]\n\nRecognise surfaces by sliding a tactile finger over them.\n'
     return '\n'.join([head, *lines, '\nMore of each: texture COMMAND --help'])
 

@@ -39,6 +39,8 @@ GONE_S = 10.0
 SILENT_S = 75.0
 # So long until a goal is taken: that takes no time, unless the request has been lost with an explorer that just died.
 ACCEPT_S = 15.0
+# So long a service is looked for, and so long its answer may take: an arm needs seconds to recover.
+OFFERED_S, ANSWER_S = 10.0, 60.0
 # After so much silence the explorer is asked again: one that was started again says that it knows of nothing.
 RETRY_PERIOD_S = 5.0
 # What this process sees, the other processes see soon after.
@@ -220,6 +222,39 @@ class Operator:
         future = self._stop.call_async(Trigger.Request())
         self._until(future.done, deadline_s, 'the explorer does not answer')
         return str(future.result().message)
+
+    def call(self, service: str, advice: str) -> tuple[bool, str]:
+        """Call a service without values, and return whether it succeeded and its sentence.
+
+        Parameters
+        ----------
+        service
+            Name of the service, a `std_srvs/Trigger`.
+        advice
+            What to do when no node offers it.
+
+        Returns
+        -------
+        (bool, str)
+            `success` and `message` of the answer.
+
+        Raises
+        ------
+        LaunchFailed
+            If no node offers the service within `OFFERED_S`, or the answer takes longer than `ANSWER_S`.
+        """
+        client = self._node.create_client(Trigger, service)
+        try:
+            name = f"the service '{self._node.resolve_service_name(service)}'"
+            self._until(client.service_is_ready, OFFERED_S, f'no node offers {name}; {advice}')
+            future = client.call_async(Trigger.Request())
+            self._until(
+                future.done, ANSWER_S, f'{name} does not answer; look at the robot, and at the output of its node'
+            )
+        finally:
+            self._node.destroy_client(client)
+        answer = future.result()
+        return bool(answer.success), str(answer.message)
 
     def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
         """Add an exploration, the last one if '', to a texture; return its number of windows and a message.
