@@ -7,10 +7,13 @@ from unittest import mock
 
 import pytest
 import rclpy
+from rclpy.action import ActionClient, ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Empty
 from std_srvs.srv import Trigger
+from texture_msgs.action import Explore
 
 from texture_core.ros.waiting_executor import WaitingExecutor
 
@@ -58,6 +61,37 @@ def spin_until(executor, condition):
     while not condition():
         assert time.monotonic() < deadline
         executor.spin_once(timeout_sec=0.05)
+
+
+def test_the_result_of_an_action_that_ends_at_the_shutdown_is_sent(world):
+    node, executor = world
+
+    def slide(goal):
+        node.told.wait(DEADLINE_S)
+        goal.abort()
+        return Explore.Result(message='the finger was lifted')
+
+    server = ActionServer(node, Explore, 'slide', slide, callback_group=ReentrantCallbackGroup())
+    asking = Node('asking')
+    client, reader = ActionClient(asking, Explore, 'slide'), SingleThreadedExecutor()
+    reader.add_node(asking)
+
+    def both_until(condition):
+        spin_until(executor, lambda: reader.spin_once(timeout_sec=0.05) or condition())
+
+    both_until(client.server_is_ready)
+    accepted = client.send_goal_async(Explore.Goal())
+    both_until(accepted.done)
+    result = accepted.result().get_result_async()
+    both_until(lambda: any(future._callbacks for future in server._result_futures.values()))
+    node.told.set()
+    executor.shutdown(DEADLINE_S)
+    spin_until(reader, result.done)
+    assert result.result().result.message == 'the finger was lifted'
+    reader.shutdown()
+    client.destroy()
+    asking.destroy_node()
+    server.destroy()
 
 
 def test_others_are_heard_while_many_wait(world):

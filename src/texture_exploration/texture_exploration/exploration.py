@@ -28,11 +28,24 @@ NO_SLIDE_OBSERVED = (
 
 @dataclass(frozen=True)
 class ExplorationOutcome:
-    """How an exploration ended; `slid` is true if the finger slid, so that there are samples."""
+    """How an exploration ended.
+
+    Attributes
+    ----------
+    success
+        Whether it was done as requested.
+    message
+        What happened, in a sentence.
+    slid
+        Whether the finger slid, so that there are samples.
+    lifted
+        Whether the finger was lifted at the end; an arm with a fault can only be stopped.
+    """
 
     success: bool
     message: str
     slid: bool
+    lifted: bool = True
 
 
 def no_signal_watch(_listening: Listening) -> str:
@@ -80,7 +93,7 @@ class Exploration:
     ) -> None:
         self.exploration_id = exploration_id
         self.request = request
-        self.outcome = ExplorationOutcome(False, 'it broke off through an internal error; see the log', False)
+        self.outcome = ExplorationOutcome(False, 'it broke off through an internal error; see the log', False, False)
         self.ended = threading.Event()
         self.gaps = 0
         self.state = ExplorationState(clock(), exploration_id, request.motion, Phase.IDLE)
@@ -215,7 +228,7 @@ class Exploration:
     def _give_up(self, reason: str) -> None:
         """End at once: an arm that does not follow cannot be lifted, only stopped."""
         message = f'{self._abort_reason}; {reason}' if self._abort_reason else reason
-        self.outcome = ExplorationOutcome(False, message, self._slid)
+        self.outcome = ExplorationOutcome(False, message, self._slid, lifted=False)
         self._report(
             ExplorationState(
                 stamp_ns=self._clock(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -13,6 +14,8 @@ from rclpy.executors import (
     SingleThreadedExecutor,
     TimeoutException,
 )
+
+ANSWER_POLL_S = 0.02
 
 
 class WaitingExecutor(SingleThreadedExecutor):
@@ -26,6 +29,20 @@ class WaitingExecutor(SingleThreadedExecutor):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self._aside: list[Any] = []  # tasks in threads of their own
+
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """Send the answers of what has waited, for `timeout_sec` at most, and run no callback any more.
+
+        The result of an action is sent by a callback that follows the one of the goal; rclpy's executor drops it.
+        """
+        deadline_s = time.monotonic() + (timeout_sec or 0.0)
+        while self._unanswered() and time.monotonic() < deadline_s:
+            self.spin_once(timeout_sec=ANSWER_POLL_S)
+        return super().shutdown(timeout_sec)
+
+    def _unanswered(self) -> bool:
+        with self._tasks_lock:
+            return self._context.ok() and any(not task.done() for task, _entity, _node in self._tasks)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Let one callback begin; raise what a callback has raised."""

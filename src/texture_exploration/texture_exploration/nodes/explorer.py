@@ -32,6 +32,7 @@ from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.protocol import Rebootable, SurfaceBound
 from texture_exploration.estimates import EarlyStoppingParams, ExplorationEstimates
 from texture_exploration.exploration import Exploration, no_signal_watch
+from texture_exploration.exploration_end import STILL_MOVING, ExplorationEnd
 from texture_exploration.exploration_ids import ExplorationIds
 from texture_exploration.explorer import Explorer
 from texture_exploration.listening import Listening
@@ -80,6 +81,7 @@ class ExplorerNode(LifecycleNode):
         self._follow_parameters()
         self._ids = ExplorationIds(np.random.default_rng())
         self._open: dict[str, ExplorationEstimates] = {}  # explorations whose caller still waits, by id
+        self._last_end: ExplorationEnd | None = None
         self._publishing = threading.Lock()
         self._closing = False
         self._states = self.create_publisher(msg.ExplorationState, 'exploration', STATE_QOS)
@@ -166,10 +168,13 @@ class ExplorerNode(LifecycleNode):
 
     def shutdown(self) -> None:
         """Lift the finger, let the arm go, leave nobody waiting."""
-        self._closing = True
+        self._closing, current = True, self._explorer.current
         for estimates in list(self._open.values()):
             estimates.cancel()
         self._explorer.close()
+        if current is not None:  # said here, while this node can still log
+            outcome = current.outcome if current.ended.is_set() else STILL_MOVING
+            self._log_end(ExplorationEnd(current.exploration_id, outcome))
 
     def _make_explorer(self) -> Explorer:
         arm_class = find(ARMS, declare(self, ArmParams).arm, 'arm')
@@ -232,9 +237,13 @@ class ExplorerNode(LifecycleNode):
         result.success, result.message = exploration.outcome.success, exploration.outcome.message
         result.exploration_id = exploration.exploration_id
         result.texture, result.roughness = to_msg(estimates.texture), to_msg(estimates.roughness)
+        self._last_end = ExplorationEnd(exploration.exploration_id, exploration.outcome)
         if not self._closing:
-            self.get_logger().info(f'{exploration.exploration_id}: {result.message}')
+            self._log_end(self._last_end)
         return result
+
+    def _log_end(self, end: ExplorationEnd) -> None:
+        getattr(self.get_logger(), end.severity)(end.sentence)
 
     def _give_feedback(self, goal: Any, exploration: Exploration) -> None:
         """Publish feedback to the client; stop when it cancels."""
@@ -336,11 +345,17 @@ class ExplorerNode(LifecycleNode):
         stamp_ns = self.get_clock().now().nanoseconds - age_ns
         return replace(state, stamp_ns=stamp_ns, frame_id=self._frames.surface_frame_id)
 
+    def _not_lifted(self) -> str:
+        """Return how the last exploration ended if its finger was not lifted, '' if it was or another is running."""
+        end = self._last_end
+        return end.sentence if end and not end.outcome.lifted and self._explorer.current is None else ''
+
     def _report(self) -> DiagnosticReport:
         current, fault = self._explorer.current, self._explorer.fault()
         numbers = {
             'phase': current.state.phase.value if current else Phase.IDLE.value,
             'exploration': current.exploration_id if current else '',
+            'last_end': self._last_end.sentence if self._last_end else 'none',
             'arm_fault': fault or 'none',
             'arm_state_age_s': self._explorer.arm_age_s(),
             **self._explorer.counts,
@@ -350,7 +365,7 @@ class ExplorerNode(LifecycleNode):
             return 'WARN', 'the explorer is not active: it has no control of the arm', numbers
         if fault:
             return 'ERROR', fault, numbers
-        warning = self._explorer.warning()
+        warning = self._explorer.warning() or self._not_lifted()
         return ('WARN', warning, numbers) if warning else ('OK', 'the arm answers', numbers)
 
 
