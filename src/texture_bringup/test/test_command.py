@@ -92,11 +92,13 @@ def test_the_arguments_of_a_launch_file_are_shown(capsys) -> None:
         (['launch', 'emulator', 'surfcae:=glass'], "did you mean 'surface'?"),
         (['launch', 'emulator', 'surface'], 'write NAME:=VALUE'),
         (['launch', 'replay'], 'give bag:=VALUE'),
+        (['replay', 'my_bag', '--rate', 'nan'], '--rate is nan; allowed is 0.01 to 1000.0'),
         (['scene', 'ets_lnear'], "no scene 'ets_lnear'; did you mean 'ets_linear'?"),
         (['scene', 'hu', 'linen_9'], 'Known: linen_1, linen_2, linen_3, linen_4, linen_5'),
         (['scene', 'hu', 'linen_1', '--speed', '-1'], 'speed_m_s'),
         (['identify', 'm', '--slides', '0'], '--slides is 0'),
         (['identify', '/nowhere'], "model card '/nowhere.json' cannot be read"),
+        (['identify', '/nowhere.skops'], "'/nowhere.skops' was given"),
     ],
 )
 def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:
@@ -105,6 +107,13 @@ def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sent
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count('\n') == 1
+
+
+def test_a_launch_needs_a_file_and_no_arguments(capsys) -> None:
+    with pytest.raises(SystemExit):
+        main(['launch'])
+    said = capsys.readouterr().err
+    assert 'required: file\n' in said
 
 
 def test_the_arguments_shown_are_also_those_of_included_files(capsys) -> None:

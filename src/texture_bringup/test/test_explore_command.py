@@ -2,12 +2,14 @@
 
 import pytest
 
-from texture_bringup.commands.explore import explored
+from texture_bringup.command import main
+from texture_bringup.commands.explore import explored, texture_text
 from texture_core.errors import MotionAborted
 from texture_core.estimates import TextureEstimate
 from texture_core.exploration import ExplorationRequest, ExplorationState, Phase
 from texture_core.program import run_program
 
+OUTSIDE = 'outside what was trained: speed 0.02 m/s, trained 0.05 m/s'
 ENDED = 'the exploration has ended: cancelled by the client'
 
 
@@ -36,3 +38,22 @@ def test_what_ended_an_exploration_stands_on_lines_of_its_own_below_the_progress
     assert progress.strip() == ''  # the terminal returns to the beginning of the line before it draws
     assert below[0].startswith('slide')
     assert below[1:] == lines
+
+
+@pytest.mark.parametrize(
+    ('known', 'message', 'text'),
+    [
+        (True, '', 'glass, confidence 0.78 after 2.9 s'),
+        (False, OUTSIDE, f'unknown (nearest: glass, confidence 0.78 after 2.9 s): {OUTSIDE}'),
+        (False, '', 'unknown (nearest: glass, confidence 0.78 after 2.9 s): it resembles none of the known textures'),
+    ],
+)
+def test_an_estimate_that_is_not_known_leads_with_that_and_says_why(known, message, text):
+    estimate = TextureEstimate(0, 'one', 'glass', known, 0.78, evidence_s=2.9, message=message)
+    assert texture_text(estimate) == text
+
+
+def test_the_help_lists_the_motions(capsys):
+    with pytest.raises(SystemExit):
+        main(['explore', '--help'])
+    assert 'linear_slide, ' in ' '.join(capsys.readouterr().out.split())

@@ -360,7 +360,7 @@ def load_model(path: str | Path) -> TextureModel:
         With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
     """
     target = model_files.stem(path)
-    card, content = model_files.read(target)
+    card, content = model_files.read(path)
     if 'regressor' in card.get('recipe', {}):
         raise ModelMismatch(f"model '{target}' estimates roughness; load it in the roughness_estimator")
     with model_files.usable(target):

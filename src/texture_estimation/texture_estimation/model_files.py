@@ -101,7 +101,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], bytes]:
         If a file is missing, damaged, or does not belong to the other.
     """
     target = stem(path)
-    card = _read_card(target.with_name(f'{target.name}.json'))
+    card = _read_card(target.with_name(f'{target.name}.json'), path)
     return card, _read_parameters(target.with_name(f'{target.name}.skops'), str(card.get('sha256')))
 
 
@@ -219,11 +219,13 @@ def replace(path: Path, content: bytes) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _read_card(path: Path) -> dict[str, Any]:
+def _read_card(path: Path, given: str | Path) -> dict[str, Any]:
     try:
         card = load_json(path, MAX_CARD_BYTES)
     except (OSError, ValueError) as error:
-        raise ModelMismatch(f"model card '{path}' cannot be read: {error}; give the path of a trained model") from error
+        raise ModelMismatch(
+            f"model card '{path}' cannot be read: {error}; '{given}' was given; give the path of a trained model"
+        ) from error
     if not isinstance(card, dict) or card.get('format') != FORMAT or not isinstance(card.get('recipe'), dict):
         raise ModelMismatch(f"'{path}' is not the card of a model of format {FORMAT}; give the path of a trained model")
     return card

@@ -84,6 +84,17 @@ def test_a_refusal_names_the_allowed_range():
     assert refusal(force_n=-1.0) == 'linear_slide: force_n is -1; allowed is 0.1 to 6 N'
 
 
+def test_a_default_that_is_refused_is_called_one():
+    request, slow = ExplorationRequest('linear_slide'), SafetyLimits(max_speed_m_s=0.02)
+    with pytest.raises(MotionRefused, match=r'speed_m_s is 0\.05 \(the default of the motion\); allowed is 0\.002 to'):
+        linear_slide(request, (0.0, 0.0, 0.01), TouchParams(), slow)
+
+
+def test_a_distance_beyond_both_limits_is_refused_with_the_smaller_one_at_once():
+    assert 'distance_m is 2, which' in refusal(distance_m=2.0, speed_m_s=0.05)
+    assert 'at most 0.192 m' in refusal(distance_m=2.0, speed_m_s=0.05)
+
+
 def test_numbers_that_are_none_are_refused():
     assert 'distance_m is nan' in refusal(distance_m=math.nan)
     assert 'direction_rad is inf' in refusal(direction_rad=math.inf)

@@ -190,12 +190,13 @@ class SafetyLimits:
             If a number is out of its range, or belongs to another motion.
         """
         numbers: dict[str, Any] = {name: getattr(request, name) or value for name, value in defaults.items()}
-        request = replace(request, **numbers)
+        given, request = request, replace(request, **numbers)
         for name in defaults:
             low_name, high_name, unit = RANGES[name]
             value, low, high = getattr(request, name), getattr(self, low_name), getattr(self, high_name)
             if not low <= value <= high:
-                raise MotionRefused(f'{request.motion}: {name} is {value:g}; allowed is {low:g} to {high:g} {unit}')
+                shown = stated(getattr(given, name), value)
+                raise MotionRefused(f'{request.motion}: {name} is {shown}; allowed is {low:g} to {high:g} {unit}')
         self.refuse_unused(request, RANGES.keys() - defaults.keys())
         if not abs(request.direction_rad) <= MAX_DIRECTION_RAD:
             allowed = f'allowed is -{MAX_DIRECTION_RAD:g} to {MAX_DIRECTION_RAD:g} rad'
@@ -248,6 +249,11 @@ class SafetyLimits:
 
 
 # What can be asked for: its limits in SafetyLimits and its unit.
+def stated(given: float, value: float) -> str:
+    """Return a number of a request in words; a `given` of 0 stands for the default of the motion."""
+    return f'{value:g}' if given else f'{value:g} (the default of the motion)'
+
+
 RANGES = {
     'speed_m_s': ('min_speed_m_s', 'max_speed_m_s', 'm/s'),
     'force_n': ('min_force_n', 'max_force_n', 'N'),

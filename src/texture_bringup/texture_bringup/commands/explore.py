@@ -24,13 +24,14 @@ NUMBERS = (
     ('turns', 'turns', '', 'turns of a circular motion'),
     ('duration', 'duration_s', 's', 'duration of an in-hand slide'),
 )
+UNLIKE = 'it resembles none of the known textures'
 BAR = 24
 TIMEOUT_S = 300.0
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
-    parser.add_argument('motion', help='how to move, such as linear_slide')
+    parser.add_argument('motion', help=f'how to move: {", ".join(MOTIONS)}')
     for option, _, unit, meaning in NUMBERS:
         shown = f'{meaning}, {unit}' if unit else meaning
         parser.add_argument(f'--{option}', type=float, default=0.0, help=f'{shown}; 0: the default of the motion')
@@ -127,15 +128,22 @@ def show_progress(state: ExplorationState, texture: TextureEstimate) -> None:
         return
     share = state.progress if state.progress >= 0 else 0.0
     bar = '█' * round(BAR * share)
-    print(f'\r{state.phase.value:<9}|{bar:<{BAR}}| {texture_text(texture):<60}', end='', file=sys.stderr, flush=True)
+    print(f'\r{state.phase.value:<9}|{bar:<{BAR}}| {progress_text(texture):<60}', end='', file=sys.stderr, flush=True)
 
 
 def texture_text(estimate: TextureEstimate) -> str:
-    """Return a texture estimate in words."""
+    """Return a texture estimate in words, with the reason if it is not known."""
+    if not estimate.label or estimate.known:
+        return progress_text(estimate)
+    return f'{progress_text(estimate)}: {estimate.message or UNLIKE}'
+
+
+def progress_text(estimate: TextureEstimate) -> str:
+    """Return a texture estimate in so few words that they fit the line of the progress."""
     if not estimate.label:
         return estimate.message or 'none yet'
-    known = '' if estimate.known else ', but it resembles none of the known textures'
-    return f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s{known}'
+    nearest = f'{estimate.label}, confidence {estimate.confidence:.2f} after {estimate.evidence_s:.1f} s'
+    return nearest if estimate.known else f'unknown (nearest: {nearest})'
 
 
 def roughness_text(estimate: RoughnessEstimate) -> str:

@@ -188,7 +188,7 @@ def load_roughness_model(path: str | Path) -> RoughnessModel:
         With one sentence, if a file is missing, damaged, foreign or does not belong to the other.
     """
     target = model_files.stem(path)
-    card, content = model_files.read(target)
+    card, content = model_files.read(path)
     if 'regressor' not in card.get('recipe', {}):
         raise ModelMismatch(f"model '{target}' classifies textures; load it in the classifier")
     with model_files.usable(target):

@@ -16,8 +16,8 @@ from texture_launch.supervisor import Supervisor
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the sub-command."""
-    parser.add_argument('file', help="path of a launch file, or the name of one of the suite's, such as bench")
-    parser.add_argument('arguments', nargs='*', metavar='NAME:=VALUE', help='arguments of the launch file')
+    parser.add_argument('file', help="path of a launch file, or the name of one of the suite's, such as emulator")
+    parser.add_argument('arguments', nargs='*', default=[], metavar='NAME:=VALUE', help='arguments of the launch file')
     parser.add_argument('--parent', type=int, help=argparse.SUPPRESS)
     parser.add_argument(
         '--together',

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 
+from texture_core.parameters import check_option
 from texture_core.ros.run_node import run_node
-from texture_recordings.nodes.replay import ReplayNode
+from texture_recordings.nodes.replay import ReplayNode, ReplayParams
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +18,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Play the bag once."""
+    """Play the bag once.
+
+    Raises
+    ------
+    InvalidParameter
+        If the rate is out of its range.
+    """
+    check_option(ReplayParams, 'rate', options.rate)
     parameters = {'bag': options.bag, 'rate': options.rate, 'slides': options.slides}
     run_node(ReplayNode, parameters, options.namespace)
     return 0
