@@ -35,6 +35,7 @@ def features_at(item: InputFeatures, level: float) -> list[Array]:
             np.array(0.05),
             np.array(1.0),
             channels=CHANNELS,
+            tangential_force_n=np.array(0.3),
         )
         for _ in item.window_names
     ]

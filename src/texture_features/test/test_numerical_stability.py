@@ -23,5 +23,5 @@ DIFFICULT = {
 @pytest.mark.parametrize('name', FEATURES)
 @pytest.mark.parametrize('samples', DIFFICULT.values(), ids=DIFFICULT)
 def test_values_are_finite(name, samples):
-    window = WindowBatch(samples, RATE_HZ, np.asarray(0.1), np.asarray(2.0))
+    window = WindowBatch(samples, RATE_HZ, np.asarray(0.1), np.asarray(2.0), tangential_force_n=np.asarray(0.5))
     assert np.isfinite(FEATURES[name]()(window)).all()
