@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 from texture_core.catalogue import unknown_name
+from texture_core.errors import UnknownName
 
 SOURCE_TREE = Path(__file__).resolve().parents[2]
 
@@ -50,6 +51,8 @@ def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix
     if path.is_file():
         return path
     shipped = {item.stem: item for item in folder(package, subfolder).glob(f'*{suffix}')}
+    if name_or_path not in shipped and (path.suffix == suffix or len(path.parts) > 1):
+        raise UnknownName(f"there is no file '{name_or_path}' in '{Path.cwd()}'; give the path of a {kind} that exists")
     if name_or_path not in shipped:
         raise unknown_name(name_or_path, shipped, kind)
     return shipped[name_or_path]

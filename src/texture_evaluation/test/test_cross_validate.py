@@ -146,6 +146,22 @@ def test_impossible_splits_are_refused_with_a_sentence() -> None:
         cross_validate(RECIPE, tones(), LeaveOneGroupOut(), groups=np.zeros(3))
 
 
+def test_a_surface_that_is_tested_but_never_trained_is_refused() -> None:
+    dataset = tones()
+    with pytest.raises(InvalidData, match=r"tested but never trained.*'cork'.*set `session`.*stratified"):
+        cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=dataset.labels)
+
+
+def test_a_surface_that_some_folds_train_may_be_missing_in_another() -> None:
+    dataset = tones()
+    one = dataset.names[0]  # the fold of `other` leaves all slides of cork but this one out
+    groups = np.array(
+        ['first' if name == one else 'rest' if label == 'cork' else name.split('/')[1]
+         for name, label in zip(dataset.names, dataset.labels, strict=True)]
+    )  # fmt: skip
+    assert len(cross_validate(RECIPE, dataset, LeaveOneGroupOut(), groups=groups).folds) > 2
+
+
 def test_a_fold_without_two_surfaces_to_train_on_says_which() -> None:
     dataset = tones().select(labels=['cork', 'felt'])
     only = np.array(['x' if label == 'cork' else 'y' for label in dataset.labels])

@@ -22,6 +22,7 @@ from texture_evaluation.cross_validation.cross_validation import CrossValidation
 from texture_evaluation.cross_validation.splits import parse_split
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.evaluation_text import sentence, summary, table
+from texture_evaluation.output_files import model_files, refuse_chart_format, refuse_inputs
 from texture_recordings.slide_dataset import SlideDataset
 
 
@@ -32,7 +33,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         'bags', nargs='+', help='labelled bags, or folders of bags; with --cross-validate more recipes may come first'
     )
     parser.add_argument('--json', metavar='FILE', help='write the figures there, too')
-    parser.add_argument('--chart', metavar='FILE', help='with --cross-validate: draw the recipes there, as PNG')
+    parser.add_argument(
+        '--chart', metavar='FILE', help='with --cross-validate: draw the recipes there; .png, .svg or .pdf'
+    )
     parser.add_argument(
         '--cross-validate',
         metavar='SPLIT',
@@ -50,6 +53,7 @@ def run(options: argparse.Namespace) -> int:
     """Evaluate, print the figures, and write them if asked to."""
     if options.cross_validate:
         return run_cross_validation(options)
+    refuse_inputs([options.json], [*model_files(options.model), *options.bags])
     model = load_model(options.model)
     if options.channels == 'fast':
         _refuse_slow_channels(model)
@@ -65,6 +69,7 @@ def run_cross_validation(options: argparse.Namespace) -> int:
     """Cross-validate one recipe or several, print tables and comparisons, and write and draw them if asked to."""
     split = parse_split(options.cross_validate, options.seed)
     names, bags = recipes_and_bags([options.model, *options.bags])
+    _check_outputs(options, [*names, *bags])
     recipes = [with_channels(load_recipe(name), options.channels or 'all') for name in names]
     topics = dict.fromkeys(topic for recipe in recipes for topic in recipe.feature_set.topics)
     dataset = SlideDataset.from_bags(bags, options.slides, topics=tuple(topics))
@@ -82,6 +87,13 @@ def run_cross_validation(options: argparse.Namespace) -> int:
         title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
         print(comparison_chart(results, title, options.chart))
     return 0
+
+
+def _check_outputs(options: argparse.Namespace, inputs: Sequence[str]) -> None:
+    """Refuse files that cannot be written or would be lost before hours of training, not after them."""
+    refuse_inputs([options.json, options.chart], inputs)
+    if options.chart:
+        refuse_chart_format(options.chart)
 
 
 def _write_figures(results: Sequence[CrossValidation], compared: Sequence[PairedComparison], path: str) -> None:

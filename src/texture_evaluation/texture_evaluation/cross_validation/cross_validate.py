@@ -16,7 +16,7 @@ from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.model import TextureModel
 from texture_estimation.recipe import Recipe
 from texture_evaluation.cross_validation.cross_validation import CrossValidation, FoldResult
-from texture_evaluation.cross_validation.slide_splits import slide_groups, split_slides
+from texture_evaluation.cross_validation.slide_splits import SPLIT_ADVICE, refuse_untrained, slide_groups, split_slides
 from texture_evaluation.cross_validation.splits import Splitter
 from texture_evaluation.metrics import SlideResult
 from texture_evaluation.train import training_examples
@@ -88,7 +88,8 @@ def cross_validate(
     Raises
     ------
     InvalidData
-        If a split is impossible, no slide has a window, or a fold has fewer than two surfaces to train on.
+        If a split is impossible, no slide has a window, a fold has fewer than two surfaces to train on, or a surface is
+        tested but never trained.
 
     Examples
     --------
@@ -100,6 +101,7 @@ def cross_validate(
     """
     columns = slide_groups(dataset, groups)
     splits = split_slides(dataset, splitter, columns)
+    refuse_untrained(dataset.labels, splits)
     features = features or FoldFeatures.of(recipe, dataset)
     names = dataset.names
     folds = Parallel(n_jobs=n_jobs)(
@@ -148,6 +150,6 @@ def _fold(
     try:
         model = train(recipe, trained)
     except InvalidData as error:
-        raise InvalidData(f"fold '{name}' cannot be trained: {error}") from error
+        raise InvalidData(f"fold '{name}' cannot be trained: {error}; {SPLIT_ADVICE}") from error
     taken_s = time.process_time() - start
     return FoldResult(name, trained_on, predict_slides(model, tested), model, taken_s)

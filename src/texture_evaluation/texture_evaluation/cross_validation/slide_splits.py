@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,8 @@ from texture_core.arrays import AnyArray
 from texture_core.errors import InvalidData
 from texture_evaluation.cross_validation.splits import Splitter
 from texture_recordings.slide_dataset import SlideDataset
+
+SPLIT_ADVICE = 'if each session holds one surface, set `session` in the mapping or use the split stratified'
 
 
 def split_slides(
@@ -42,6 +46,31 @@ def split_slides(
         return list(splitter.split(np.zeros((len(labels), 1)), labels, columns))
     except ValueError as error:
         raise InvalidData(f'the slides cannot be split: {error}; use another split or record more slides') from error
+
+
+def refuse_untrained(labels: AnyArray, splits: Sequence[tuple[NDArray[np.intp], NDArray[np.intp]]]) -> None:
+    """Refuse splits in which a surface is never trained where it is tested: its slides could not be right.
+
+    Parameters
+    ----------
+    labels : (n_slides,)
+        Surface of each slide.
+    splits
+        As `split_slides` returns them. One that trains on a single surface is left to the training, which refuses it.
+
+    Raises
+    ------
+    InvalidData
+        With the surfaces.
+    """
+    sides = [(set(labels[train].tolist()), set(labels[test].tolist())) for train, test in splits]
+    if any(len(trained) < 2 for trained, _ in sides):
+        return
+    possible = {label for trained, tested in sides for label in trained & tested}
+    untrained = sorted({label for _, tested in sides for label in tested} - possible)
+    if untrained:
+        names = ', '.join(f"'{label}'" for label in untrained)
+        raise InvalidData(f'tested but never trained in the same fold: {names}; {SPLIT_ADVICE}')
 
 
 def _check_folds(labels: AnyArray, folds: int) -> None:
