@@ -33,7 +33,13 @@ def refuse_inputs(outputs: Sequence[str | Path | None], inputs: Sequence[str | P
 
 
 def refuse_chart_format(path: str | Path) -> None:
-    """Raise InvalidParameter if the ending of a chart's file is not one of `CHART_FORMATS`."""
+    """Refuse a chart whose file has an ending other than those of `CHART_FORMATS`.
+
+    Raises
+    ------
+    InvalidParameter
+        With what is allowed.
+    """
     if Path(path).suffix.lower() not in CHART_FORMATS:
         raise InvalidParameter(f"the chart is '{path}'; a file that ends in .png, .svg or .pdf is needed")
 
