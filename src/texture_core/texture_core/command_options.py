@@ -18,7 +18,9 @@ def add_slides(parser: argparse.ArgumentParser) -> None:
 def add_channels(parser: argparse.ArgumentParser) -> None:
     """Add `--channels`."""
     parser.add_argument(
-        '--channels', choices=('fast', 'all'), help='fast: the vibration alone; all: the slow channels beside it, too'
+        '--channels',
+        choices=('fast', 'all'),
+        help='fast: the vibration alone; all: the slow channels beside it, too; default: as recorded or trained',
     )
 
 

@@ -18,7 +18,7 @@ T = TypeVar('T')
 def tree_from_mapping(cls: type[T], values: Any, where: str) -> T:
     """Build a dataclass whose fields are parameters, dataclasses of their own, or mappings of names to these.
 
-    A whole number that stands where a text is needed is taken as text: YAML reads a column named 3 as a number.
+    A number that stands where a text is needed is taken as text: YAML reads a column named 3 as a number.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def _values_by_name(parameter: Parameter, value: Any, where: str) -> dict[str, A
 
 
 def _as_text(kind: Any, value: Any) -> Any:
-    if kind is str and type(value) is int:
+    if kind is str and type(value) in (int, float):
         return str(value)
     if kind == list[str] and isinstance(value, list):
         return [_as_text(str, part) for part in value]

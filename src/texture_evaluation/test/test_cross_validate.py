@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import beta
 from sklearn.model_selection import GroupShuffleSplit, LeaveOneGroupOut, StratifiedGroupKFold
 
 from texture_core.errors import InvalidData, InvalidParameter
@@ -50,7 +51,16 @@ def test_tones_are_told_apart_in_every_fold() -> None:
     assert figures['window_accuracy'] == figures['slide_accuracy'] == 1.0
     assert [fold['window_accuracy'] for fold in figures['folds']] == [1.0] * 3
     assert figures['n_slides'] == 24
-    assert figures['window_accuracy_interval'] == [1.0, 1.0]
+    # The chance that 24 of 24 slides are right is 5 % at the lower edge.
+    assert figures['window_accuracy_interval'] == [pytest.approx(0.05 ** (1 / 24)), 1.0]
+
+
+@pytest.mark.parametrize('n', [1, 4, 20, 100])
+def test_slides_that_are_all_right_or_all_wrong_have_the_exact_bound(n: int) -> None:
+    edge = float(beta.ppf(0.05, n, 1))  # Clopper & Pearson 1934
+    right, wrong = np.ones((n, 2)), np.tile([0.0, 3.0], (n, 1))
+    assert interval([], lambda _: right) == [pytest.approx(edge), 1.0]
+    assert interval([], lambda _: wrong) == [0.0, pytest.approx(1.0 - edge)]
 
 
 def test_each_fold_and_each_time_has_an_interval_around_its_share() -> None:

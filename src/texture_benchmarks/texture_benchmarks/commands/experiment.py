@@ -30,6 +30,8 @@ def run(options: argparse.Namespace) -> int:
         result, path = run_experiment(options.name, experiment)
     else:
         result, path = run_over_seeds(options.name, experiment, options.seeds)
+    if options.quick:
+        print('REDUCED: fewer slides, not comparable with a published figure')
     print(f'{result.name}: {result.measured}')
     print(f'data: {result.data}; split: {result.split}')
     for line in result.lines:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import Any
 
 from texture_core.command_options import add_channels, add_dask, add_seed, add_slides
 from texture_core.errors import InvalidParameter, ModelMismatch
@@ -82,7 +83,8 @@ def run_cross_validation(options: argparse.Namespace) -> int:
     for one in compared:
         print(sentence(one))
     if options.json:
-        _write_figures(results, compared, options.json)
+        setting = {'split': split.name, 'seed': options.seed, 'bags': bags, 'channels': options.channels or 'all'}
+        _write_figures(results, compared, setting, options.json)
     if options.chart:
         title = f'{len(dataset)} slides of {len(results[0].labels)} surfaces, split {split.name}'
         print(comparison_chart(results, title, options.chart))
@@ -96,13 +98,15 @@ def _check_outputs(options: argparse.Namespace, inputs: Sequence[str]) -> None:
         refuse_chart_format(options.chart)
 
 
-def _write_figures(results: Sequence[CrossValidation], compared: Sequence[PairedComparison], path: str) -> None:
+def _write_figures(
+    results: Sequence[CrossValidation], compared: Sequence[PairedComparison], setting: Mapping[str, Any], path: str
+) -> None:
     """Write the figures of one recipe, or of several with their comparisons with the first, as JSON."""
     if len(results) == 1:
-        results[0].write(path)
+        write_json({**setting, **results[0].as_json()}, path)
     else:
         recipes, comparisons = [result.as_json() for result in results], [one.as_json() for one in compared]
-        write_json({'recipes': recipes, 'comparisons': comparisons}, path)
+        write_json({**setting, 'recipes': recipes, 'comparisons': comparisons}, path)
 
 
 def recipes_and_bags(given: Sequence[str]) -> tuple[list[str], list[str]]:

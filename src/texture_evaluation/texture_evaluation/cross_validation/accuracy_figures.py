@@ -1,4 +1,4 @@
-"""Shares of windows and slides that are right, with 95 % intervals by bootstrap over slides."""
+"""Shares of windows and slides that are right, with 95 % intervals by bootstrap over slides; exact at 0 and 100 %."""
 
 from __future__ import annotations
 
@@ -62,7 +62,17 @@ def interval(results: Sequence[SlideResult], counts: Callable[[Sequence[SlideRes
 
 
 def _bootstrap(pairs: Array) -> list[float]:
-    """Return the 95 % interval of a share; `pairs` holds right and all answers of each slide, (n_slides, 2)."""
+    """Return the 95 % interval of a share; `pairs` holds right and all answers of each slide, (n_slides, 2).
+
+    Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
+    the share of slides, about 3/n wide.
+
+    Source: Clopper & Pearson 1934, at 0 and n of n.
+    """
+    right, answers = pairs.sum(axis=0)
+    if right in (0.0, answers):
+        edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(pairs[:, 1])))
+        return [edge, 1.0] if right else [0.0, 1.0 - edge]
     drawn = np.random.default_rng(0).integers(len(pairs), size=(RESAMPLES, len(pairs)))
     sums = pairs[drawn].sum(axis=1)
     edges = np.quantile(sums[:, 0] / sums[:, 1], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
