@@ -74,7 +74,9 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
             reported = capsys.readouterr().out
             assert code == 0, reported + launcher.log.read_text()
             found = re.findall(
-                r'the motion ended as asked\ntexture: +(\w+), confidence [\d.]+ after ([\d.]+) s', reported
+                r'the motion ended as asked\ntexture: +(?:unknown \(nearest: )?(\w+), '
+                r'confidence [\d.]+ after ([\d.]+) s',
+                reported,
             )
             assert len(found) == (2 if motion is LINEAR else 1), reported
             assert all(label in ('', measured) and float(evidence_s) > 0.5 for measured, evidence_s in found), reported

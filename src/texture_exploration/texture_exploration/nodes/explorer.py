@@ -43,6 +43,12 @@ from texture_exploration.signal_watch import SignalWatch, SignalWatchParams
 
 FEEDBACK_PERIOD_S = 0.05
 IDLE_PERIOD_S = 1.0
+# rclpy raises an error if one line of code logs at several levels, so each level has a line of its own.
+LOGGED: dict[str, Callable[[Any, str], Any]] = {
+    'info': lambda logger, text: logger.info(text),
+    'warning': lambda logger, text: logger.warning(text),
+    'error': lambda logger, text: logger.error(text),
+}
 RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds of results
 
 
@@ -243,7 +249,7 @@ class ExplorerNode(LifecycleNode):
         return result
 
     def _log_end(self, end: ExplorationEnd) -> None:
-        getattr(self.get_logger(), end.severity)(end.sentence)
+        LOGGED[end.severity](self.get_logger(), end.sentence)
 
     def _give_feedback(self, goal: Any, exploration: Exploration) -> None:
         """Publish feedback to the client; stop when it cancels."""
