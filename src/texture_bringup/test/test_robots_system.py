@@ -53,6 +53,15 @@ def model(tmp_path_factory):
     return folder / 'model.skops'
 
 
+def patient_hand(out):
+    """Return a profile of the emulated hand whose motors wait longer for a busy machine."""
+    profile, path = resources.folder('texture_exploration', 'config/hands') / 'leap.yaml', out / 'leap.yaml'
+    text = profile.read_text()
+    assert 'watchdog_s: 0.3 ' in text
+    path.write_text(text.replace('watchdog_s: 0.3 ', 'watchdog_s: 1.5 '))
+    return path
+
+
 @pytest.mark.parametrize('robot', ROBOTS)
 def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, tmp_path, monkeypatch, capsys):
     for name, value in {'ROS_DOMAIN_ID': str(ROBOTS[robot]), 'ROS_LOG_DIR': str(tmp_path)}.items():
@@ -60,7 +69,12 @@ def test_every_motion_on_an_emulated_robot_ends_with_an_estimate(robot, model, t
     # A busy machine may hold up the emulated robot for longer than a real one is allowed to be silent.
     patient = {'state_timeout_s': 1.5, 'estimate_timeout_s': 10.0, 'signal_timeout_s': 3.0, **PATIENCE.get(robot, {})}
     (tmp_path / 'patient.yaml').write_text(yaml.safe_dump({'/**': {'ros__parameters': patient}}))
-    place = {'ur': {'ip': '127.0.0.110'}, 'ros_controllers': {}}.get(robot, {'robot': tmp_path / robot})
+    place = {
+        'ur': {'ip': '127.0.0.110'},
+        'ros_controllers': {},
+        'rails': {'robot': tmp_path / robot},
+        'hand': {'robot': tmp_path / robot, 'profile': patient_hand(tmp_path)},
+    }[robot]
     given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'surface': SURFACE, 'model': model, **place}
     given['explorer_params'] = tmp_path / 'patient.yaml'
     with ChildLauncher(robot, given, dict(os.environ), tmp_path / 'nodes.log') as launcher:
