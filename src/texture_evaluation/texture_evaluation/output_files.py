@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from texture_core.errors import InvalidParameter
+from texture_estimation.model_files import stem
 
 CHART_FORMATS = ('.png', '.svg', '.pdf')
 MODEL_FILES = ('.skops', '.json')
@@ -46,9 +47,8 @@ def refuse_chart_format(path: str | Path) -> None:
 
 def model_files(model: str | Path) -> list[Path]:
     """Return both files of a model that is named by either, or by both without the ending."""
-    path = Path(model)
-    stem = path.with_suffix('') if path.suffix in MODEL_FILES else path
-    return [stem.with_name(stem.name + ending) for ending in MODEL_FILES]
+    target = stem(model)
+    return [target.with_name(target.name + ending) for ending in MODEL_FILES]
 
 
 def _real(path: str | Path) -> Path:

@@ -243,17 +243,10 @@ class Operator:
         LaunchFailed
             If no node offers the service within `OFFERED_S`, or the answer takes longer than `ANSWER_S`.
         """
-        client = self._node.create_client(Trigger, service)
-        try:
-            name = f"the service '{self._node.resolve_service_name(service)}'"
-            self._until(client.service_is_ready, OFFERED_S, f'no node offers {name}; {advice}')
-            future = client.call_async(Trigger.Request())
-            self._until(
-                future.done, ANSWER_S, f'{name} does not answer; look at the robot, and at the output of its node'
-            )
-        finally:
-            self._node.destroy_client(client)
-        answer = future.result()
+        name = f"the service '{self._node.resolve_service_name(service)}'"
+        missing = f'no node offers {name}; {advice}'
+        silent = f'{name} does not answer; look at the robot, and at the output of its node'
+        answer = self._ask(Trigger, service, Trigger.Request(), (OFFERED_S, missing), (ANSWER_S, silent))
         return bool(answer.success), str(answer.message)
 
     def add(self, label: str, exploration_id: str = '', deadline_s: float = 30.0) -> tuple[int, str]:
@@ -322,17 +315,22 @@ class Operator:
 
     def _ask_classifier(self, kind: Any, name: str, request: Any, deadline_s: float) -> Any:
         """Return the answer of a service of the classifier that succeeded."""
-        client = self._node.create_client(kind, name)
-        try:
-            self._until(client.service_is_ready, deadline_s, 'no classifier answers; is it running?')
-            future = client.call_async(request)
-            self._until(future.done, deadline_s, 'the classifier does not answer; look at its output')
-        finally:
-            self._node.destroy_client(client)
-        answer = future.result()
+        missing, silent = 'no classifier answers; is it running?', 'the classifier does not answer; look at its output'
+        answer = self._ask(kind, name, request, (deadline_s, missing), (deadline_s, silent))
         if not answer.success:
             raise InvalidData(answer.message)
         return answer
+
+    def _ask(self, kind: Any, name: str, request: Any, offered: tuple[float, str], answered: tuple[float, str]) -> Any:
+        """Return the answer of a service; each step has the longest time, s, and what to say when it is over."""
+        client = self._node.create_client(kind, name)
+        try:
+            self._until(client.service_is_ready, *offered)
+            future = client.call_async(request)
+            self._until(future.done, *answered)
+        finally:
+            self._node.destroy_client(client)
+        return future.result()
 
     def set_parameters(self, node: str, values: Mapping[str, Any], deadline_s: float = 30.0) -> None:
         """Set parameters of a node.

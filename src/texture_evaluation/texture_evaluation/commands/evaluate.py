@@ -102,11 +102,9 @@ def _write_figures(
     results: Sequence[CrossValidation], compared: Sequence[PairedComparison], setting: Mapping[str, Any], path: str
 ) -> None:
     """Write the figures of one recipe, or of several with their comparisons with the first, as JSON."""
-    if len(results) == 1:
-        write_json({**setting, **results[0].as_json()}, path)
-    else:
-        recipes, comparisons = [result.as_json() for result in results], [one.as_json() for one in compared]
-        write_json({**setting, 'recipes': recipes, 'comparisons': comparisons}, path)
+    recipes = [result.as_json() for result in results]
+    several = {'recipes': recipes, 'comparisons': [one.as_json() for one in compared]}
+    write_json({**setting, **(recipes[0] if len(recipes) == 1 else several)}, path)
 
 
 def recipes_and_bags(given: Sequence[str]) -> tuple[list[str], list[str]]:
