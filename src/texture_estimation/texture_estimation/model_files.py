@@ -21,6 +21,7 @@ from texture_core.plain_data import MAX_CARD_BYTES, load_json, parse_json
 from texture_estimation.plain_skops import SCHEMA, read_plain_skops
 
 FORMAT = 1
+ENDINGS = ('.skops', '.json')
 MAX_BYTES = 200 * MB  # of a file of parts; ensembles of networks over many features come to 20 MB
 MAX_SCHEMA_BYTES = 2 * MB  # each node in it becomes objects of 2 kB
 MAX_ESTIMATOR_SCHEMA_BYTES = 10 * MB  # a thousand trees
@@ -59,7 +60,14 @@ def usable(target: Path) -> Iterator[None]:
 def stem(path: str | Path) -> Path:
     """Return the path without the ending of either file."""
     path = Path(path).expanduser()
-    return path.with_suffix('') if path.suffix in ('.skops', '.json') else path
+    return path.with_suffix('') if path.suffix in ENDINGS else path
+
+
+def both_files(path: str | Path) -> tuple[Path, Path]:
+    """Return NAME.skops and NAME.json of a model that is named by either, or by both without the ending."""
+    target = stem(path)
+    parameters, card = (target.with_name(target.name + ending) for ending in ENDINGS)
+    return parameters, card
 
 
 def write(path: str | Path, parameters: Mapping[str, Any], card: Mapping[str, Any]) -> Path:
@@ -83,13 +91,13 @@ def write(path: str | Path, parameters: Mapping[str, Any], card: Mapping[str, An
     """
     from skops.io import dumps  # noqa: PLC0415  # takes a second, and only who saves or loads needs it
 
-    target = stem(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    parameters_path, card_path = both_files(path)
+    card_path.parent.mkdir(parents=True, exist_ok=True)
     content = dumps(dict(parameters), compression=zipfile.ZIP_DEFLATED, compresslevel=1)
     card = {**card, 'sha256': hashlib.sha256(content).hexdigest()}
-    replace(target.with_name(f'{target.name}.skops'), content)
-    replace(target.with_name(f'{target.name}.json'), (json.dumps(card, indent=1) + '\n').encode())
-    return target.with_name(f'{target.name}.skops')
+    replace(parameters_path, content)
+    replace(card_path, (json.dumps(card, indent=1) + '\n').encode())
+    return parameters_path
 
 
 def read(path: str | Path) -> tuple[dict[str, Any], bytes]:
@@ -100,9 +108,9 @@ def read(path: str | Path) -> tuple[dict[str, Any], bytes]:
     ModelMismatch
         If a file is missing, damaged, or does not belong to the other.
     """
-    target = stem(path)
-    card = _read_card(target.with_name(f'{target.name}.json'), path)
-    return card, _read_parameters(target.with_name(f'{target.name}.skops'), str(card.get('sha256')))
+    parameters_path, card_path = both_files(path)
+    card = _read_card(card_path, path)
+    return card, _read_parameters(parameters_path, str(card.get('sha256')))
 
 
 def load_parameters(content: bytes, trusted: Sequence[str], *, estimators: bool = False) -> dict[str, Any]:

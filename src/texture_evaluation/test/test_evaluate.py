@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch, UnknownName
+from texture_core.plain_data import write_json
 from texture_core.signal import TactileSignal
 from texture_estimation.model import TextureModel, load_model
 from texture_evaluation.evaluate import evaluate
@@ -42,10 +43,10 @@ def test_distinct_surfaces_are_recognised_and_the_figures_agree_with_each_other(
 
 def test_the_figures_are_written_as_json(model: TextureModel, simulated: Path, tmp_path: Path) -> None:
     report = evaluate(model, [simulated / 'glass'], '5')
-    report.write(tmp_path / 'report.json')
+    write_json(report.as_json(), tmp_path / 'report.json')
     assert json.loads((tmp_path / 'report.json').read_text()) == report.as_json()
     with pytest.raises(InvalidParameter, match='cannot be written'):
-        report.write(tmp_path / 'nowhere' / 'report.json')
+        write_json(report.as_json(), tmp_path / 'nowhere' / 'report.json')
 
 
 def test_surfaces_that_were_not_trained_count_as_unknown_alone(simulated: Path) -> None:

@@ -3,7 +3,9 @@ from pathlib import Path
 import pytest
 
 from texture_core.errors import InvalidParameter
-from texture_evaluation.output_files import model_files, refuse_chart_format, refuse_inputs
+from texture_core.output_files import refuse_inputs
+from texture_estimation.model_files import both_files
+from texture_evaluation.charts import refuse_chart_format
 
 
 @pytest.mark.parametrize('model', ['m1', 'm1.skops', 'm1.json'])
@@ -14,13 +16,13 @@ def test_the_files_of_a_model_that_is_read_are_not_overwritten(
     monkeypatch.chdir(tmp_path)
     (tmp_path / 'sub').mkdir()
     with pytest.raises(InvalidParameter, match='would overwrite'):
-        refuse_inputs([output], model_files(model))
+        refuse_inputs([output], both_files(model))
 
 
 def test_a_recipe_that_is_read_is_not_overwritten_and_another_file_may_be(tmp_path: Path) -> None:
     with pytest.raises(InvalidParameter, match='would overwrite'):
         refuse_inputs([tmp_path / 'own.yaml'], [tmp_path / 'own.yaml', tmp_path / 'bags'])
-    refuse_inputs([tmp_path / 'figures.json', None], [*model_files('m1'), tmp_path / 'bags'])
+    refuse_inputs([tmp_path / 'figures.json', None], [*both_files('m1'), tmp_path / 'bags'])
 
 
 @pytest.mark.parametrize('name', ['figures.yaml', 'figures', 'figures.json'])

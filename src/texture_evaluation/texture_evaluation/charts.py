@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from texture_core.arrays import AnyArray
+from texture_core.errors import InvalidParameter
 
 # Okabe & Ito 2008: distinguished by all kinds of colour vision.
 COLOURS = ('#0072B2', '#E69F00', '#009E73', '#CC79A7', '#56B4E9', '#D55E00', '#000000')
@@ -27,7 +28,20 @@ STYLE: Any = {
     'legend.frameon': False,
 }
 DPI = 130
+CHART_FORMATS = ('.png', '.svg', '.pdf')
 MANY = 25  # more labels than this: no numbers in the cells
+
+
+def refuse_chart_format(path: str | Path) -> None:
+    """Refuse a chart whose file has an ending other than those of `CHART_FORMATS`.
+
+    Raises
+    ------
+    InvalidParameter
+        With what is allowed.
+    """
+    if Path(path).suffix.lower() not in CHART_FORMATS:
+        raise InvalidParameter(f"the chart is '{path}'; a file that ends in .png, .svg or .pdf is needed")
 
 
 def pareto_front(points: Sequence[tuple[float, float]]) -> list[int]:

@@ -14,7 +14,6 @@ from texture_core.arrays import AnyArray, Array
 from texture_core.errors import ModelMismatch
 from texture_core.estimates import TextureEstimate
 from texture_core.features import FeatureVector
-from texture_core.plain_data import write_json
 from texture_estimation.evidence import EvidenceAccumulator, single_decisions
 from texture_estimation.fingerprint import fingerprint_difference
 from texture_estimation.model import TextureModel
@@ -74,10 +73,6 @@ class EvaluationReport:
             'wrong_known': metrics.wrong_known([*self.known, *self.unknown]),
             'unknown': metrics.unknown([*self.known, *self.unknown]),
         }
-
-    def write(self, path: str | Path) -> None:
-        """Write the figures as JSON; InvalidParameter if the file cannot be written."""
-        write_json(self.as_json(), path)
 
 
 def evaluate(

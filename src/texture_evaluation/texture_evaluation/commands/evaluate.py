@@ -10,12 +10,15 @@ from typing import Any
 
 from texture_core.command_options import add_channels, add_dask, add_seed, add_slides
 from texture_core.errors import InvalidParameter, ModelMismatch
+from texture_core.output_files import refuse_inputs
 from texture_core.plain_data import write_json
 from texture_core.resources import folder
 from texture_estimation.channels import FAST_TOPIC, with_channels
 from texture_estimation.model import TextureModel, load_model
+from texture_estimation.model_files import both_files
 from texture_estimation.recipe import load_recipe
 from texture_estimation.search.parallel import dask_backend
+from texture_evaluation.charts import refuse_chart_format
 from texture_evaluation.cross_validation.comparison import PairedComparison, compare_all
 from texture_evaluation.cross_validation.comparison_chart import comparison_chart
 from texture_evaluation.cross_validation.cross_validate import cross_validate
@@ -23,7 +26,6 @@ from texture_evaluation.cross_validation.cross_validation import CrossValidation
 from texture_evaluation.cross_validation.splits import parse_split
 from texture_evaluation.evaluate import evaluate
 from texture_evaluation.evaluation_text import sentence, summary, table
-from texture_evaluation.output_files import model_files, refuse_chart_format, refuse_inputs
 from texture_recordings.slide_dataset import SlideDataset
 
 
@@ -54,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     """Evaluate, print the figures, and write them if asked to."""
     if options.cross_validate:
         return run_cross_validation(options)
-    refuse_inputs([options.json], [*model_files(options.model), *options.bags])
+    refuse_inputs([options.json], [*both_files(options.model), *options.bags])
     model = load_model(options.model)
     if options.channels == 'fast':
         _refuse_slow_channels(model)
@@ -62,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
     for line in summary(report):
         print(line)
     if options.json:
-        report.write(options.json)
+        write_json(report.as_json(), options.json)
     return 0
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,8 +33,8 @@ def figures(results: Sequence[SlideResult]) -> dict[str, Any]:
         'window_accuracy': metrics.window_accuracy(results) if results else None,
         'slide_accuracy': metrics.accuracy_at_end(results) if results else None,
         'accuracy_at_s': dict(metrics.accuracy_at_times(results)),
-        'window_accuracy_interval': interval(results, window_counts) if results else None,
-        'slide_accuracy_interval': interval(results, slide_counts) if results else None,
+        'window_accuracy_interval': interval(window_counts(results)) if results else None,
+        'slide_accuracy_interval': interval(slide_counts(results)) if results else None,
         'accuracy_at_s_interval': {f'{seconds:.1f}': _interval_at(results, seconds) for seconds in metrics.TIMES_S},
     }
 
@@ -43,38 +43,28 @@ def _interval_at(results: Sequence[SlideResult], seconds: float) -> list[float] 
     """Return the interval of `metrics.accuracy_at`, over the slides that are long enough; None without any."""
     ends = [(result.surface, result.after(seconds)) for result in results]
     right = [(end.label == surface, 1) for surface, end in ends if end is not None]
-    return _bootstrap(np.array(right, dtype=np.float64)) if right else None
+    return interval(np.array(right, dtype=np.float64)) if right else None
 
 
-def interval(results: Sequence[SlideResult], counts: Callable[[Sequence[SlideResult]], Array]) -> list[float]:
+def interval(counts: Array) -> list[float]:
     """Return the 95 % interval of a share by bootstrap over slides: windows of a slide are not independent.
-
-    Parameters
-    ----------
-    results
-        Of the test slides.
-    counts
-        Gives right and all answers of each slide, (n_slides, 2).
-
-    Source: Efron & Tibshirani 1993, chapter 13 (percentile interval).
-    """
-    return _bootstrap(counts(results))
-
-
-def _bootstrap(pairs: Array) -> list[float]:
-    """Return the 95 % interval of a share; `pairs` holds right and all answers of each slide, (n_slides, 2).
 
     Where all answers or none are right, every resample is the same: the interval is then the exact one-sided bound on
     the share of slides, about 3/n wide.
 
-    Source: Clopper & Pearson 1934, at 0 and n of n.
+    Parameters
+    ----------
+    counts : (n_slides, 2)
+        Number of right answers and of all answers of each slide, see `window_counts` and `slide_counts`.
+
+    Sources: Efron & Tibshirani 1993, chapter 13 (percentile interval); Clopper & Pearson 1934, at 0 and n of n.
     """
-    right, answers = pairs.sum(axis=0)
+    right, answers = counts.sum(axis=0)
     if right in (0.0, answers):
-        edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(pairs[:, 1])))
+        edge = float((1.0 - CONFIDENCE) ** (1.0 / np.count_nonzero(counts[:, 1])))
         return [edge, 1.0] if right else [0.0, 1.0 - edge]
-    drawn = np.random.default_rng(0).integers(len(pairs), size=(RESAMPLES, len(pairs)))
-    sums = pairs[drawn].sum(axis=1)
+    drawn = np.random.default_rng(0).integers(len(counts), size=(RESAMPLES, len(counts)))
+    sums = counts[drawn].sum(axis=1)
     edges = np.quantile(sums[:, 0] / sums[:, 1], [(1.0 - CONFIDENCE) / 2, (1.0 + CONFIDENCE) / 2])
     return [float(edge) for edge in edges]
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from texture_core.plain_data import write_json
 from texture_estimation.model import TextureModel
 from texture_evaluation import metrics
 from texture_evaluation.cross_validation.accuracy_figures import figures
@@ -83,7 +81,3 @@ class CrossValidation:
             ],
             'unusable': list(self.unusable),
         }
-
-    def write(self, path: str | Path) -> None:
-        """Write the figures as JSON; InvalidParameter if the file cannot be written."""
-        write_json(self.as_json(), path)
