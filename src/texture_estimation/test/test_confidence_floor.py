@@ -87,14 +87,15 @@ def test_training_fits_the_limit_that_a_recipe_asks_for(make_examples):
     assert train(dataclasses.replace(recipe, training=none), many).confidence_floor == ConfidenceFloor()
 
 
-def test_a_model_file_keeps_the_limit_and_a_card_without_one_has_none(model, tmp_path):
+def test_a_model_file_keeps_the_limit_and_a_card_without_the_entry_is_refused(model, tmp_path):
     limited = dataclasses.replace(model, confidence_floor=ConfidenceFloor((1.0, 10.0), (0.5, 3.0)))
     path = limited.save(tmp_path / 'model').with_suffix('.json')
     assert load_model(path).confidence_floor == limited.confidence_floor
     card = json.loads(path.read_text())
     del card['confidence_floor']
     path.write_text(json.dumps(card))
-    assert load_model(path).confidence_floor == ConfidenceFloor()
+    with pytest.raises(ModelMismatch, match=r"no entry 'confidence_floor'.*; train it again with 'texture train'"):
+        load_model(path)
 
 
 @pytest.mark.parametrize('entry', [{'log_odds': [1.0]}, {'other': [1.0]}, [1.0], {'log_odds': 3}])

@@ -5,7 +5,6 @@ The message definitions are read from the .msg files of texture_msgs, so they ex
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -41,8 +40,6 @@ WIRE: Mapping[Any, Convert] = {
     NDArray[np.float32]: (lambda samples: np.ascontiguousarray(samples, dtype=np.float32).ravel(), lambda flat: flat),
 }
 SAME: Convert = (lambda value: value, lambda value: value)
-# What recordings from before the newest field lack at the end of a message: a tangential force, unknown.
-LATER_FIELDS = {'texture_msgs/msg/ExplorationState': struct.pack('<d', math.nan)}
 STAMPS = {'stamp_ns', 'start_ns'}
 
 
@@ -89,19 +86,9 @@ def decode(raw: bytes, msgtype: str) -> Any:
         If the bytes are not such a message, or it contradicts itself.
     """
     try:
-        return _data_class(_message(raw, msgtype), MESSAGES[msgtype])
+        return _data_class(typestore().deserialize_cdr(raw, msgtype), MESSAGES[msgtype])
     except (SerdeError, struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError) as error:
         raise InvalidData(f'{len(raw)} bytes came as a {msgtype}, which they are not: {error}') from error
-
-
-def _message(raw: bytes, msgtype: str) -> Any:
-    try:
-        return typestore().deserialize_cdr(raw, msgtype)
-    except SerdeError:
-        later = LATER_FIELDS.get(msgtype)
-        if later is None:
-            raise
-        return typestore().deserialize_cdr(bytes(raw) + later, msgtype)
 
 
 def _data_class(message: Any, cls: type) -> Any:

@@ -66,8 +66,16 @@ class ConfidenceFloor:
 
     @classmethod
     def from_card(cls, card: Mapping[str, Any]) -> ConfidenceFloor:
-        """Return the limit that a model card holds; none if it is of a version before there was one."""
-        return cls(**{name: tuple(map(float, values)) for name, values in card.get(ENTRY, {}).items()})
+        """Return the limit that a model card holds.
+
+        Raises
+        ------
+        InvalidData
+            If the card has no entry of it. A model without a limit has one that is empty.
+        """
+        if ENTRY not in card:
+            raise InvalidData(f"its card has no entry '{ENTRY}', the smallest confidence of known surfaces")
+        return cls(**{name: tuple(map(float, values)) for name, values in card[ENTRY].items()})
 
     def reached(self, confidence: float, effective_windows: float) -> bool:
         """Return whether a known surface may have so little confidence.
