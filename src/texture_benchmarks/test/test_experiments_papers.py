@@ -8,7 +8,7 @@ import pytest
 
 from texture_benchmarks.papers import EXPERIMENTS, PROTOCOLS, Experiment, report, run_experiment
 from texture_benchmarks.papers.claim_checks import at_least, higher, lower_in, most_errors, seldom
-from texture_benchmarks.papers.interval import apart, mean, share
+from texture_benchmarks.papers.interval import apart, mean, mean_share, share
 from texture_benchmarks.papers.method_result import MethodResult
 from texture_benchmarks.papers.protocol import PaperProtocol, drawn, folds, halves, training_in
 from texture_benchmarks.papers.simulated_trials import gather
@@ -176,6 +176,13 @@ def test_a_share_lies_within_its_interval_whatever_rounding_does(right: float) -
     for n in range(1, 500):
         interval = share(np.full(n, right))
         assert interval.low <= interval.value <= interval.high
+
+
+def test_the_interval_of_a_mean_share_ends_at_0_and_100_percent() -> None:
+    assert mean(np.array([0.02, 0.0, 0.22])).low < 0.0
+    assert mean_share(np.array([0.02, 0.0, 0.22])).low == 0.0
+    assert mean_share(np.array([0.98, 1.0, 0.78])).high == 1.0
+    assert mean_share(np.array([0.4, 0.5, 0.6])) == mean(np.array([0.4, 0.5, 0.6]))
 
 
 def test_intervals_are_those_of_the_textbook() -> None:

@@ -31,3 +31,9 @@ def test_no_name_leaves_the_chart_on_the_left() -> None:
 def test_at_most_ten_methods_are_named() -> None:
     many = [(10.0 ** (2 + 0.5 * column), 0.05 + 0.1 * row) for row in range(9) for column in range(4)]
     assert len(charts._named(many, [])) == charts.DIRECT_LABELS
+
+
+def test_a_method_of_ones_own_is_named_even_where_its_name_covers_another_point() -> None:
+    crowded = [(100.0 + number, 0.70 + 0.002 * number) for number in range(12)]
+    assert 5 not in charts._named(crowded, [11])
+    assert 5 in charts._named(crowded, [11], always=[5])

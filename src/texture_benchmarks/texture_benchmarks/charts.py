@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -181,7 +181,12 @@ def fault_chart(panels: Mapping[str, Mapping[str, tuple[Array, Array, Array]]], 
 
 
 def front_chart(
-    panels: Mapping[str, Mapping[str, tuple[float, float]]], title: str, axis_labels: tuple[str, str], path: str | Path
+    panels: Mapping[str, Mapping[str, tuple[float, float]]],
+    title: str,
+    axis_labels: tuple[str, str],
+    path: str | Path,
+    *,
+    always: Collection[str] = (),
 ) -> Path:
     """Draw methods by cost and share of successes, with the front that no other betters; a row for each data set.
 
@@ -195,6 +200,8 @@ def front_chart(
         Of cost and of share, with their units.
     path
         File that is written.
+    always
+        Methods that are named wherever they lie; others where there is room.
 
     Returns
     -------
@@ -205,7 +212,7 @@ def front_chart(
         rows = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
         for axes, (name, points) in zip(rows, panels.items(), strict=True):
             axes.set(ylabel=axis_labels[1], title=name, xscale='log', ylim=(0, 101))
-            _front(axes, points)
+            _front(axes, points, always)
         rows[-1].set_xlabel(axis_labels[0])
     return Path(path)
 
@@ -243,7 +250,7 @@ def histogram_chart(series: Mapping[str, Array], title: str, axis_label: str, pa
     return Path(path)
 
 
-def _front(axes: Any, points: Mapping[str, tuple[float, float]]) -> None:
+def _front(axes: Any, points: Mapping[str, tuple[float, float]], always: Collection[str]) -> None:
     values = list(points.values())
     best = pareto_front(values)
     axes.step(
@@ -255,7 +262,8 @@ def _front(axes: Any, points: Mapping[str, tuple[float, float]]) -> None:
     costs = [cost for cost, _ in values]
     axes.set_xlim(min(costs) / 10**ROOM_DECADES, 3.5 * max(costs))  # room for the names at both ends
     names = list(points)
-    for index, (start, height) in _named(values, best).items():
+    own = [index for index, name in enumerate(names) if name in always]
+    for index, (start, height) in _named(values, best, own).items():
         left = start < np.log10(values[index][0])
         axes.annotate(
             names[index], (values[index][0], 100 * height), xytext=(-5 if left else 5, 0), textcoords='offset points',
@@ -278,13 +286,15 @@ def _free_places(
     ]
 
 
-def _named(values: Sequence[tuple[float, float]], best: Sequence[int]) -> dict[int, tuple[float, float]]:
-    """Return where names stand, in decades and as a share: of the front, then of the best that cover nothing."""
+def _named(
+    values: Sequence[tuple[float, float]], best: Sequence[int], always: Sequence[int] = ()
+) -> dict[int, tuple[float, float]]:
+    """Return where names stand, in decades and as a share: `always`, the front, then the best that cover nothing."""
     points = [(float(np.log10(cost)), share) for cost, share in values]
     others = sorted(set(range(len(points))) - set(best), key=lambda index: -points[index][1])
     places: dict[int, tuple[float, float]] = {}
-    for index in [*sorted(best, key=lambda index: -points[index][1]), *others]:
-        free = _free_places(points, index, places)
+    for index in dict.fromkeys([*always, *sorted(best, key=lambda index: -points[index][1]), *others]):
+        free = _free_places(points, index, places) or [points[index]] * (index in always)
         if free and len(places) < DIRECT_LABELS:
             places[index] = free[0]
     return places

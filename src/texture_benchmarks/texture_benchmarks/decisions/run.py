@@ -17,7 +17,7 @@ from texture_benchmarks.decisions.trial import (
     try_recipe,
 )
 from texture_benchmarks.imported_data import imported
-from texture_benchmarks.papers.interval import mean
+from texture_benchmarks.papers.interval import mean_share
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_estimation.recipe import load_recipe
 
@@ -68,8 +68,8 @@ def _numbers(trial: Trial) -> dict[str, Any]:
             'accepted': float(means[at, 1]),
             'accepted_per_draw': trial.draws[:, at, 1].tolist(),
             'at_the_threshold': {
-                'false_rejections': mean(trial.draws[:, -1, 0]).as_json(),
-                'accepted': mean(trial.draws[:, -1, 1]).as_json(),
+                'false_rejections': mean_share(trial.draws[:, -1, 0]).as_json(),
+                'accepted': mean_share(trial.draws[:, -1, 1]).as_json(),
             },
             'accepted_at_false_rejections': float(np.interp(TARGET_REJECTED, *means.T)),
         },

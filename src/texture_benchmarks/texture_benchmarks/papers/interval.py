@@ -63,6 +63,18 @@ def mean(values: Array) -> Interval:
     return Interval(centre, centre - reach, centre + reach)
 
 
+def mean_share(values: Array) -> Interval:
+    """Return the mean of shares, such as those of several draws; its interval is cut where no share can lie.
+
+    Parameters
+    ----------
+    values : (n,)
+        Shares, 0 to 1.
+    """
+    found = mean(values)
+    return Interval(found.value, max(found.low, 0.0), min(found.high, 1.0))
+
+
 def apart(first: Array, second: Array) -> Interval:
     """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,).
 

@@ -339,7 +339,7 @@ def result_of(name: str, numbers: Mapping[str, Any], options: BenchmarkOptions) 
         data='; '.join(text for name, text in DATA.items() if name in sets),
         split='; '.join(f'{split}: {SPLITS[split]}' if split in SPLITS else split for split in sorted(splits)),
         numbers={'references': REFERENCES, 'MiniRocket': _note(options), **numbers},
-        charts=(_chart(numbers, options.out / f'{name}.png'),),
+        charts=(_chart(numbers, options.out / f'{name}.png', [shown_name(own) for own in options.own_methods]),),
     )
 
 
@@ -438,7 +438,7 @@ def _note(options: BenchmarkOptions) -> str:
     return 'measured' if minirocket.installed() else minirocket.ABSENT
 
 
-def _chart(numbers: Mapping[str, Any], path: Path) -> Path:
+def _chart(numbers: Mapping[str, Any], path: Path, always: Sequence[str]) -> Path:
     panels = {
         f'{name}, {SPLIT_TITLES.get(split, split)}': {
             recipe: (cell['latency_us']['median'], cell['window_accuracy']) for recipe, cell in of_split.items()
@@ -447,4 +447,5 @@ def _chart(numbers: Mapping[str, Any], path: Path) -> Path:
         for split, of_split in list(of_setting.items())[-1:]
     }
     title = 'Accuracy of all recipes over computing time; orange: most accurate for the time'
-    return front_chart(panels, title, ('computing time of a window (µs)', 'single windows recognised (%)'), path)
+    axis_labels = ('computing time of a window (µs)', 'single windows recognised (%)')
+    return front_chart(panels, title, axis_labels, path, always=always)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any
 
 from texture_estimation.model import TextureModel
@@ -64,9 +65,14 @@ class CrossValidation:
         return [result for fold in self.folds for result in fold.results.values()]
 
     def as_json(self) -> dict[str, Any]:
-        """Return the pooled figures, those of each fold, all with 95 % intervals, and the label of each test slide."""
+        """Return the pooled figures, those of each fold, all with 95 % intervals, and the label of each test slide.
+
+        `feature_set` is the fingerprint of the features, as in the card of a model, and `version` that of the suite.
+        """
         return {
             'recipe': self.recipe,
+            'feature_set': self.folds[0].model.feature_set,
+            'version': version('texture_evaluation'),
             **figures(self.pooled),
             'labels': list(self.labels),
             'confusion': metrics.confusion(self.pooled, self.labels).tolist(),
