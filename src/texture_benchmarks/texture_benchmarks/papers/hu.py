@@ -37,11 +37,11 @@ def findings(outcomes: MethodResults) -> list[Finding]:
     both, x_only, y_only = (outcomes[TASK, name] for name in (BOTH, X_ONLY, Y_ONLY))
     log, power = (outcomes[TASK, name] for name in (LOG, POWER))
     return [
-        better_on('linen 1, which differs between x and y, is told best (100 %)', both, 'linen_1'),
+        better_on('linen 1, which differs between x and y, is distinguished best (100 %)', both, 'linen_1'),
         higher('x and y joined are better than x alone', both, x_only),
         higher('x and y joined are better than y alone', both, y_only),
-        higher('not of the paper: magnitudes tell more than powers', both, power),
-        higher('not of the paper: magnitudes tell more than their logarithm', both, log),
+        higher('not of the paper: magnitudes distinguish better than powers', both, power),
+        higher('not of the paper: magnitudes distinguish better than their logarithm', both, log),
     ]
 
 

@@ -150,7 +150,7 @@ def _charts(protocol: PaperProtocol, found: MethodResults, name: str, out: Path)
     }
     if tables:
         path = out / f'{stem}_confusion.png'
-        charts.append(confusions_chart(tables, f'{name}: what was taken for what, %', path))
+        charts.append(confusions_chart(tables, f'{name}: confusion matrices, % of each surface', path))
     return tuple(charts)
 
 
