@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -131,8 +131,8 @@ def fit_stopping_rule(
     -------
     StoppingRule
     """
-    tried = [StoppingRule(float(confidence), max_windows) for confidence in CONFIDENCES for max_windows in MAX_WINDOWS]
-    outcomes = [_outcome(rule, confidences, right, effective_window_counts) for rule in tried]
+    tried = [StoppingRule(confidence, longest) for confidence, longest in product(CONFIDENCES.tolist(), MAX_WINDOWS)]
+    outcomes = _outcomes(tried, confidences, right, effective_window_counts)
     least = max(wrong, min(errors for errors, _ in outcomes))
     good = [(mean, number) for number, (errors, mean) in enumerate(outcomes) if errors <= least]
     return tried[min(good)[1]]
@@ -176,21 +176,13 @@ class _CourseTable:
     """Courses as arrays (n_slides, n_windows), the shorter ones filled with what never stops a slide."""
 
     def __init__(self, courses: Sequence[SlideCourse], early_novelty_score: float) -> None:
-        longest = max(len(course.right) for course in courses)
-
-        def filled(rows: Iterable[Array | Mask], value: float) -> Array:
-            table = np.full((len(courses), longest), value)
-            for number, row in enumerate(rows):
-                table[number, : len(row)] = row
-            return table
-
-        self._novelty = filled((course.novelty_scores for course in courses), np.inf)
-        self._windows = filled((course.effective_windows for course in courses), np.nan)
-        known = filled((course.known for course in courses), 0.0) > 0.0
+        self._novelty = _filled([course.novelty_scores for course in courses], np.inf)
+        self._windows = _filled([course.effective_windows for course in courses], np.nan)
+        known = _filled([course.known for course in courses], 0.0) > 0.0
         growing = EARLY_GROWTH ** (np.fmin(self._windows, MAX_EARLY_WINDOWS) - 1.0)
         known &= self._novelty <= early_novelty_score * growing
-        self._confidences = np.where(known, filled((course.confidences for course in courses), -1.0), -1.0)
-        self._wrong = filled((~course.right for course in courses), 0.0) > 0.0
+        self._confidences = np.where(known, _filled([course.confidences for course in courses], -1.0), -1.0)
+        self._wrong = _filled([~course.right for course in courses], 0.0) > 0.0
         self._whole = np.array([course.effective_windows[-1] for course in courses])
         self._undisturbed = np.array([not course.disturbance for course in courses])
 
@@ -210,14 +202,28 @@ class _CourseTable:
         return float(wrong[undisturbed].mean()), disturbed_errors, float(taken[undisturbed].mean())
 
 
-def _outcome(
-    rule: StoppingRule, confidences: Sequence[Array], right: Sequence[Mask], effective_window_counts: Sequence[Array]
-) -> tuple[float, float]:
-    """Return the share of wrong decisions, and the mean length of the evidence they took."""
-    wrong, taken = 0, 0.0
-    for confidence, correct, effective_windows in zip(confidences, right, effective_window_counts, strict=True):
-        over = (confidence >= rule.confidence) | (effective_windows >= rule.max_windows)
-        place = int(over.argmax()) if over.any() else len(over) - 1
-        wrong += not bool(correct[place])
-        taken += float(effective_windows[place])
-    return wrong / len(confidences), taken / len(confidences)
+def _outcomes(
+    rules: Sequence[StoppingRule],
+    confidences: Sequence[Array],
+    right: Sequence[Mask],
+    effective_window_counts: Sequence[Array],
+) -> list[tuple[float, float]]:
+    """Return of each rule the share of wrong decisions, and the mean length of the evidence they took."""
+    windows, confident = _filled(effective_window_counts, -np.inf), _filled(confidences, -np.inf)
+    wrong = _filled([~correct for correct in right], 0.0) > 0.0
+    rows, last = np.arange(len(right)), np.array([len(correct) - 1 for correct in right])
+
+    def outcome(rule: StoppingRule) -> tuple[float, float]:
+        over = (confident >= rule.confidence) | (windows >= rule.max_windows)
+        places = np.where(over.any(axis=1), over.argmax(axis=1), last)
+        return float(wrong[rows, places].mean()), float(windows[rows, places].mean())
+
+    return [outcome(rule) for rule in rules]
+
+
+def _filled(rows: Sequence[Array | Mask], value: float) -> Array:
+    """Return the rows as an array (n_rows, longest), the shorter ones filled with a value."""
+    table = np.full((len(rows), max(len(row) for row in rows)), value)
+    for number, row in enumerate(rows):
+        table[number, : len(row)] = row
+    return table
