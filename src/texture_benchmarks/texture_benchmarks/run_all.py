@@ -17,11 +17,11 @@ Act = Callable[[str], int]  # runs a benchmark by its name and returns the exit 
 # `decisions` has trained.
 SIDE_BY_SIDE = (
     'decisions',
-    'robustness',
     'trust',
     'learning',
-    'speed_force',
     'ablation',
+    'robustness',
+    'speed_force',
     'biotac20',
     'onset',
     'next_motion',
@@ -30,18 +30,17 @@ SIDE_BY_SIDE = (
     'segmentation',
     'clock',
 )
-# These take half a minute or more for other things than recognition, or nine and more of one core for
-# it; without them all benchmarks take half an hour.
+# What explains rather than measures how well and how fast surfaces are recognised, and what takes ten minutes of a core
+# or more; without them all benchmarks take half an hour.
 LONG = frozenset(
     {
+        'ablation',
         'frontier',
         'recipes',
-        'optimise',
+        'robustness',
         'optimise_large',
         'optimise_pairs',
         'scenes',
-        'hand',
-        'learning',
         'load',
         'motion',
         'peers',
