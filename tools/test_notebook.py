@@ -20,6 +20,7 @@ def test_there_is_a_notebook() -> None:
     assert [path.name for path in NOTEBOOKS] == ['recordings.ipynb']
 
 
+@pytest.mark.benchmark
 @pytest.mark.parametrize('notebook', NOTEBOOKS, ids=lambda path: path.name)
 def test_every_cell_runs_after_those_above_it(
     notebook: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -34,6 +35,7 @@ def test_every_cell_runs_after_those_above_it(
     assert (tmp_path / 'figure.png').stat().st_size > 10_000
 
 
+@pytest.mark.benchmark
 @pytest.mark.parametrize('notebook', NOTEBOOKS, ids=lambda path: path.name)
 def test_a_notebook_is_kept_without_its_output(notebook: Path) -> None:
     content = json.loads(notebook.read_text(encoding='utf-8'))
