@@ -24,6 +24,7 @@ from texture_launch.child import ChildLauncher  # noqa: E402
 from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
 DOMAIN = 61
+PATIENT = '/**: {ros__parameters: {estimate_timeout_s: 10.0, signal_timeout_s: 3.0}}'  # this machine may be busy
 DEADLINE_S = 60.0
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05, surface='ridge_2mm_deep')
 STARTED = re.compile(r'\[launch\] (\S+) started \(process (\d+)\)')
@@ -65,7 +66,11 @@ def roughness_model(folder, bags):
 
 @pytest.fixture(scope='module')
 def emulator(folder, roughness_model):
-    with launched(folder, surface='ridge_2mm_deep', roughness_model=roughness_model) as launcher:
+    patient = folder / 'patient.yaml'
+    patient.write_text(PATIENT)
+    with launched(
+        folder, surface='ridge_2mm_deep', roughness_model=roughness_model, explorer_params=patient
+    ) as launcher:
         yield launcher
 
 
@@ -75,7 +80,6 @@ def operator(emulator):
         operator.wait_for_explorer(DEADLINE_S)
         operator.wait_for_signal(DEADLINE_S)
         operator.wait_for_listeners(('features', 'roughness_features'), 1, emulator.check)  # who names and who grades
-        operator.set_parameters('explorer', {'estimate_timeout_s': 10.0})  # this machine may be busy
         yield operator
 
 

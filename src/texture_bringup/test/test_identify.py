@@ -18,6 +18,7 @@ from texture_launch.child import ChildLauncher  # noqa: E402
 from texture_simulation.simulated_bags import SlidePlan, write_simulated  # noqa: E402
 
 DOMAIN = 79
+PATIENT = '/**: {ros__parameters: {estimate_timeout_s: 10.0, signal_timeout_s: 3.0}}'  # this machine may be busy
 DEADLINE_S = 60.0
 PLAN = SlidePlan(slides=8, speed_m_s=0.1, force_n=2.0, slide_s=0.9)
 TEXTURES = ('ridges_x', 'ridges_y')
@@ -47,13 +48,14 @@ def model(tmp_path_factory):
 def bench(tmp_path, monkeypatch):
     monkeypatch.setenv('ROS_DOMAIN_ID', str(DOMAIN))
     monkeypatch.setenv('ROS_LOG_DIR', str(tmp_path))
+    (tmp_path / 'patient.yaml').write_text(PATIENT)
     given = {'device': tmp_path / 'tsf85', 'finger_port': free_port(), 'scene': 'oriented', 'surface': 'ridges_x'}
+    given['explorer_params'] = tmp_path / 'patient.yaml'
     with ChildLauncher('emulator', {**given, 'recipe': 'fast'}, dict(os.environ), tmp_path / 'nodes.log') as launcher:
         with Operator('', DOMAIN, launcher.check) as operator:
             operator.wait_for_explorer(DEADLINE_S)
             operator.wait_for_signal(DEADLINE_S)
             operator.wait_for_listeners(('features',), 1, launcher.check)
-            operator.set_parameters('explorer', {'estimate_timeout_s': 10.0})  # this machine may be busy
         yield launcher
 
 
