@@ -3,8 +3,9 @@ PYTHON ?= python3
 RUN := .venv/bin/ros-run
 # Tests that run against the clock mostly wait, but a crowd of them would disturb one another. One that fails in the crowd
 # runs once more with nothing beside it, and both results are printed; it fails if it fails alone.
-TEST_JOBS ?= 2
-REALTIME_JOBS ?= 4
+TEST_JOBS ?= 3
+REALTIME_JOBS ?= 6
+BENCHMARK_JOBS ?= 2
 TESTS := $(RUN) python -m pytest --dist loadfile
 # In the order of their names: the files with the longest tests begin early, those with the most tests need not.
 CLOCKED := $(TESTS) --no-loadscope-reorder
@@ -34,10 +35,10 @@ test: setup lint
 	@$(TESTS) -n $(TEST_JOBS) -m "not realtime and not benchmark" --doctest-modules
 	@$(CLOCKED) -n $(REALTIME_JOBS) -m "realtime and not benchmark" || $(call ALONE,realtime and not benchmark)
 
-# Benchmarks and experiments in reduced size, endurance, and pages whose every line is run.
+# Benchmarks and experiments in reduced size, endurance, pages whose every line is run, and large files.
 test-benchmarks: setup
-	@$(TESTS) -n $(TEST_JOBS) -m "benchmark and not realtime"
-	@$(CLOCKED) -n $(TEST_JOBS) -m "benchmark and realtime" || $(call ALONE,benchmark and realtime)
+	@$(TESTS) -n $(BENCHMARK_JOBS) -m "benchmark and not realtime"
+	@$(CLOCKED) -n $(BENCHMARK_JOBS) -m "benchmark and realtime" || $(call ALONE,benchmark and realtime)
 
 benchmark: setup
 	@.venv/bin/texture benchmark all

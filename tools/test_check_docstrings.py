@@ -100,9 +100,5 @@ def test_a_class_without_a_doctest_is_found_unless_another_one_shows_it(tmp_path
     assert classes_without_example(module) == ['Named']
 
 
-def test_every_docstring_of_the_repository_says_what_a_caller_needs() -> None:
-    assert not check(ROOT / 'src')
-
-
 def test_every_public_class_of_features_estimation_and_recordings_has_an_example() -> None:
     assert not check_examples(ROOT / 'src')

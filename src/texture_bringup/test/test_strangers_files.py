@@ -950,7 +950,17 @@ def wav(samples: Any) -> bytes:
     return packed.getvalue()
 
 
-@pytest.mark.parametrize('what', BOMBS)
+# Each of these takes seconds to write and to read; another file of the list shows the same reader its limit.
+LONG_BOMBS = (
+    'a card of empty lists', 'a model of 600 MB of zeros', 'a recording of 600 MB of zeros', 'settings of numbers',
+    'settings of mappings', 'settings of deep lists', 'a bag of explorations', 'a bag of single samples',
+    'a data set of zeros',
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    'what', [pytest.param(what, marks=[pytest.mark.benchmark] * (what in LONG_BOMBS)) for what in BOMBS]
+)
 def test_files_that_stand_for_more_than_they_hold_take_little_memory_and_time(
     what: str, good: dict[str, Path], tmp_path: Path
 ) -> None:
