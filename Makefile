@@ -1,13 +1,15 @@
 # The set-up is tools/workspace.py; every target below calls it first, and a finished set-up is recognised in a second.
 PYTHON ?= python3
 RUN := .venv/bin/ros-run
+# Compiled modules are kept, whatever the environment says: the tests start a thousand processes.
+unexport PYTHONDONTWRITEBYTECODE
 # Tests that run against the clock mostly wait, but a crowd of them would disturb one another. One that fails in the crowd
 # runs once more with nothing beside it, and both results are printed; it fails if it fails alone.
 TEST_JOBS ?= 3
-REALTIME_JOBS ?= 6
+REALTIME_JOBS ?= 5
 BENCHMARK_JOBS ?= 2
 TESTS := $(RUN) python -m pytest --dist loadfile
-# In the order of their names: the files with the longest tests begin early, those with the most tests need not.
+# In the order of conftest.py: the files with the longest tests begin early, those with the most tests need not.
 CLOCKED := $(TESTS) --no-loadscope-reorder
 ALONE = { echo 'Tests against the clock failed beside others; they run again, alone:'; \
 	$(RUN) python -m pytest -m "$(1)" --last-failed --last-failed-no-failures none; }

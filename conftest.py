@@ -12,6 +12,7 @@ import pytest
 
 # Files that hold no such test are not imported by `-m realtime` and `-m benchmark`: each worker saves seconds.
 NAMED_MARKERS = ('realtime', 'benchmark')
+SYSTEM = 'texture_bringup'  # the package whose realtime tests start all nodes
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -31,12 +32,27 @@ def asked_for(expression: str) -> list[str]:
     return [marker for marker in NAMED_MARKERS if marker in terms]
 
 
-def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
-    """Refuse a marked test whose file does not name the marker: `-m` would not find it."""
+def pytest_collection_modifyitems(items: list[pytest.Item], config: pytest.Config) -> None:
+    """Refuse a marked test whose file does not name the marker: `-m` would not find it. Spread tests of all nodes."""
     for item in items:
         for marker in NAMED_MARKERS:
             if item.get_closest_marker(marker) and marker not in _text(item.path):
                 raise pytest.UsageError(f"{item.path} does not name the marker '{marker}' of its test {item.name}")
+    if 'realtime' in asked_for(config.getoption('markexpr')):
+        order = {path: place for place, path in enumerate(spread(list(dict.fromkeys(item.path for item in items))))}
+        items.sort(key=lambda item: order[item.path])
+
+
+def spread(paths: Sequence[Path]) -> list[Path]:
+    """Return the files with those that start the whole suite spread over the others.
+
+    A few of them at once need the whole machine, and then samples are lost. The longest are last in the alphabet, so
+    they come first.
+    """
+    system = [path for path in paths if SYSTEM in path.parts][::-1]
+    others = [path for path in paths if SYSTEM not in path.parts]
+    places = {path: place / len(own) for own in (system, others) for place, path in enumerate(own)}
+    return sorted([*system, *others], key=places.__getitem__)
 
 
 @cache

@@ -83,13 +83,19 @@ def test_a_protective_stop_refuses_commands_until_it_is_unlocked(done):
 @pytest.mark.parametrize('version', ['3.15', '5.23', '10.10'])
 def test_other_versions_let_the_client_move(version):
     pytest.importorskip('rtde_control', reason='ur-rtde is not installable here')
-    program = (
-        'import os, sys; from rtde_control import RTDEControlInterface as Control; '
-        'from rtde_receive import RTDEReceiveInterface as Receive; '
-        'ip = sys.argv[1]; receive = Receive(ip); control = Control(ip); pose = receive.getActualTCPPose(); '
-        'pose[0] += 0.01; print(control.moveL(pose, 0.25, 1.2), round(receive.getActualTCPPose()[0], 6), flush=True); '
-        'os._exit(0)'  # the interfaces would sleep
-    )
+    program = """
+import os, sys, time
+from rtde_control import RTDEControlInterface as Control
+from rtde_receive import RTDEReceiveInterface as Receive
+receive, control = Receive(sys.argv[1]), Control(sys.argv[1])
+pose = receive.getActualTCPPose()
+pose[0] += 0.01
+moved, deadline = control.moveL(pose, 0.25, 1.2), time.monotonic() + 5.0
+while round(receive.getActualTCPPose()[0], 6) != 0.41 and time.monotonic() < deadline:
+    time.sleep(0.01)  # the last state may not have come yet
+print(moved, round(receive.getActualTCPPose()[0], 6), flush=True)
+os._exit(0)  # the interfaces would sleep
+"""
     with ControllerProcess(UrControllerParams(ip=IP, version=version)):
         command = [sys.executable, '-c', program, IP]
         session = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
