@@ -19,6 +19,7 @@ from texture_bringup.demo.progress_log import ProgressLog
 from texture_bringup.demo.results import RecognisedSlide, is_refused, table
 from texture_bringup.demo.run import demonstrate
 from texture_core.estimates import TextureEstimate
+from texture_core.node_process import killed_on_error
 
 pytestmark = pytest.mark.realtime
 
@@ -90,7 +91,10 @@ def test_it_learns_recognises_and_leaves_recordings_model_figures_and_picture(tm
 @pytest.mark.ros
 def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
     command = [sys.executable, '-m', 'texture_bringup.command', 'demo', '--out', str(tmp_path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as demo:
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as demo,
+        killed_on_error(demo),
+    ):
         for line in demo.stdout:
             if 'Learning' in line:
                 break
@@ -109,7 +113,10 @@ def test_ctrl_c_ends_it_cleanly_and_leaves_no_process(tmp_path) -> None:
 def test_the_nodes_end_even_if_the_demonstration_is_killed(tmp_path) -> None:
     command = [sys.executable, '-m', 'texture_bringup.command', 'demo', '--out', str(tmp_path)]
     environment = {**os.environ, 'TMPDIR': str(tmp_path)}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as demo:
+    with (
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as demo,
+        killed_on_error(demo),
+    ):
         log = tmp_path / 'nodes.log'
         deadline = time.monotonic() + DEADLINE_S
         while not (log.exists() and 'classifier started' in log.read_text()):

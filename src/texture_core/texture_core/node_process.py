@@ -7,7 +7,8 @@ import os
 import signal
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,27 @@ def executable(package: str, node: str) -> Path:
         if path.is_file():
             return path
     raise DeviceError(f"no executable '{node}' of '{package}' is installed; build and source the workspace")
+
+
+@contextmanager
+def killed_on_error(process: subprocess.Popen[Any]) -> Iterator[None]:
+    """Kill a process when the block fails, because `Popen` would wait for its end for ever.
+
+    Parameters
+    ----------
+    process
+        Which the block starts or watches.
+
+    Raises
+    ------
+    BaseException
+        What the block raised.
+    """
+    try:
+        yield
+    except BaseException:
+        process.kill()
+        raise
 
 
 class NodeProcess:

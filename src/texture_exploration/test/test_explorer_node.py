@@ -1,6 +1,5 @@
 """The explorer as others meet it: over ROS, on a simulated arm in real time."""
 
-import contextlib
 import math
 import select
 import signal
@@ -21,6 +20,7 @@ from texture_msgs import action, msg, srv
 
 from texture_core.estimates import TextureEstimate
 from texture_core.finger_state import FingerState
+from texture_core.node_process import killed_on_error
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import ESTIMATE_QOS, STATE_QOS
@@ -369,16 +369,6 @@ def test_ctrl_c_while_sliding_lifts_the_finger_answers_and_ends_the_process(ros)
     assert last.force_n == 0
     assert last.z_m == pytest.approx(0.01, abs=0.001)
     assert answer.result().message == 'the explorer was shut down'
-
-
-@contextlib.contextmanager
-def killed_on_error(process):
-    """End a process when the test fails: `Popen` would wait for its end for ever."""
-    try:
-        yield
-    except BaseException:
-        process.kill()
-        raise
 
 
 def last_until_exit(emulator, process):

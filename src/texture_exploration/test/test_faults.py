@@ -11,6 +11,7 @@ from contextlib import ExitStack, contextmanager
 import pytest
 
 from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.node_process import killed_on_error
 from texture_exploration.arms.catalogue import ARMS
 from texture_exploration.arms.in_hand import InHandArm, InHandParams
 from texture_exploration.arms.rails import RailsArm, RailsParams
@@ -231,7 +232,7 @@ def test_when_the_explorer_is_killed_in_the_slide_the_robot_stops_by_itself(name
     with robot(tmp_path) as (device, arm, next_request):
         begin = place(device)
         command = [sys.executable, '-c', KILLED, name, repr(parameters(device)), repr(request)]
-        with subprocess.Popen(command) as explorer:
+        with subprocess.Popen(command) as explorer, killed_on_error(explorer):
             until(lambda: abs(place(device) - begin) > way)
             explorer.send_signal(signal.SIGKILL)
             begin_s = moved_s = time.monotonic()

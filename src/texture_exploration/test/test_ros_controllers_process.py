@@ -19,7 +19,7 @@ from texture_msgs import msg, srv
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ExplorationRequest, Phase
-from texture_core.node_process import NodeProcess
+from texture_core.node_process import NodeProcess, killed_on_error
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import STATE_QOS
 from texture_exploration.arms.ros_controllers import RosControllersArm
@@ -115,9 +115,11 @@ def test_an_emulated_controller_that_is_interrupted_with_the_explorer_lets_it_li
 def test_when_the_process_that_commands_is_killed_the_arm_comes_to_rest(graph, record_property):
     places = graph.listen(PoseStamped, 'tcp_pose_broadcaster/pose')
     with NodeProcess('texture_simulation', 'twist_controller', HELD):
-        with subprocess.Popen([sys.executable, '-c', MOVING], env=dict(os.environ), stdout=subprocess.PIPE) as process:
-            graph.until(lambda: len(places) > 1 and places[-1].pose.position.x > places[0].pose.position.x + 0.002)
-            process.send_signal(signal.SIGKILL)
+        graph.until(lambda: places)
+        command = [sys.executable, '-c', MOVING]
+        with subprocess.Popen(command, stdout=subprocess.PIPE) as process, killed_on_error(process):
+            graph.until(lambda: places[-1].pose.position.x > places[0].pose.position.x + 0.002)
+            process.kill()
             killed_s = time.monotonic()
         moved = [places[-1].pose.position.x, time.monotonic()]
 
