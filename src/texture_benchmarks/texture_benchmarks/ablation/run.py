@@ -29,7 +29,7 @@ from texture_benchmarks.recipes.run import (
     VIBRATION,
     biotac20_settings,
 )
-from texture_benchmarks.recipes.trial import all_at_rate, comparable, latency_us
+from texture_benchmarks.recipes.trial import all_at_rate, comparable, latencies_us
 from texture_benchmarks.result import BenchmarkOptions, BenchmarkResult
 from texture_core.errors import InvalidData
 from texture_estimation.channels import with_channels
@@ -41,7 +41,6 @@ from texture_features.labelled_features import LabelledFeatures
 from texture_recordings.slide_dataset import SlideDataset
 
 FOLDS, QUICK_FOLDS = 3, 2
-ROUNDS = 3  # of timing; the quickest counts, as other work on the machine only adds
 QUICK = (SHIPPED, 'without moments')
 
 
@@ -113,18 +112,17 @@ def _case(recipe: Recipe, changes: Changes, rate_hz: float, dataset: SlideDatase
 def _figures(cases: Mapping[str, _Case], options: BenchmarkOptions) -> dict[str, Any]:
     used = {name: case for name, case in cases.items() if name in QUICK or not options.quick}
     tried = {name: _try(case, options.quick) for name, case in used.items()}
-    times = [[_median_us(item) for item in tried.values()] for _ in range(ROUNDS)]
-    latencies = dict(zip(tried, np.min(times, axis=0).tolist(), strict=True))
+    latencies = latencies_us({name: (item.case.recipe, item.model, item.case.dataset) for name, item in tried.items()})
     best = max(tried, key=lambda name: tried[name].held_out)
     good = [name for name, item in tried.items() if item.held_out >= tried[best].held_out - WITHIN]
-    smallest = min(good, key=lambda name: latencies[name])
+    smallest = min(good, key=lambda name: latencies[name]['median'])
     return {
         'variants': {
             name: {
                 'values': len(item.model.names),
                 'held_out': item.held_out,
                 'change_points': round(100 * (item.held_out - tried[SHIPPED].held_out), 2),
-                'latency_us': round(latencies[name], 1),
+                'latency_us': latencies[name]['median'],
             }
             for name, item in tried.items()
         },
@@ -157,7 +155,3 @@ def _try(case: _Case, quick: bool) -> _AblationResult:
     if fitted.held_out is None:
         raise InvalidData('slides for training are too short to hold any out; record longer ones')
     return _AblationResult(case, model, float(np.mean(fitted.held_out.argmax(axis=1) == codes)), later)
-
-
-def _median_us(item: _AblationResult) -> float:
-    return latency_us(item.case.recipe, item.model, item.case.dataset)['median']

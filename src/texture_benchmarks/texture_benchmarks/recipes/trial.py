@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from fractions import Fraction
-from typing import Any
+from operator import itemgetter
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.signal import resample_poly
@@ -34,7 +35,9 @@ from texture_recordings.slide_dataset import SlideDataset, cut_slide
 # windows this far apart.
 LENGTH_S = 0.5
 TIMED_SLIDES = 40
+LATENCY_ROUNDS = 5  # the quickest counts, as other work on the machine only adds
 ROUNDING = 1e-9  # of a quotient of two times
+Key = TypeVar('Key', bound=Hashable)
 
 
 def figures_of(result: CrossValidation) -> dict[str, Any]:
@@ -188,6 +191,25 @@ def latency_us(recipe: Recipe, model: TextureModel, dataset: SlideDataset) -> di
     taken = [run_model(model, events, time.process_time)[2][:-1] for events in (cut[0], *cut)][1:]
     median, p99 = np.percentile(np.concatenate(taken), (50, 99))
     return {'median': round(float(median), 1), 'p99': round(float(p99), 1)}
+
+
+def latencies_us(timed: Mapping[Key, tuple[Recipe, TextureModel, SlideDataset]]) -> dict[Key, dict[str, float]]:
+    """Return what `latency_us` does for each, of the round over all in which its median was lowest.
+
+    Other work on the machine comes and goes within a minute, and only ever lengthens a round.
+
+    Parameters
+    ----------
+    timed
+        What `latency_us` takes, by any key.
+
+    Returns
+    -------
+    dict
+        'median' and 'p99', µs, by key.
+    """
+    rounds = [{key: latency_us(*item) for key, item in timed.items()} for _ in range(LATENCY_ROUNDS)]
+    return {key: min((taken[key] for taken in rounds), key=itemgetter('median')) for key in timed}
 
 
 def _at_rate(batches: Sequence[TactileSignal], rate_hz: float) -> list[TactileSignal]:

@@ -16,6 +16,7 @@ from texture_simulation.scene import load_scene
 RECIPES = {'ours': 'roughness', 'SVM5': 'ets-roughness-svm5', 'ANN5': 'ets-roughness-ann5'}
 SCANS, QUICK_SCANS = 20, 4
 TIMED, QUICK_TIMED = 5000, 200
+ROUNDS = 5  # the quickest counts, as other work on the machine only adds
 TARGET_US = 200.0
 
 
@@ -27,12 +28,14 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
     windows = [
         event for texture in grades.used_for(TEST) for event in simulated.events(texture, count, SPEED_M_S, FORCE_N)
     ]
-    times = {}
+    models = {}
     for name, recipe_name in list(RECIPES.items())[: 1 if options.quick else None]:
         recipe = load_roughness_recipe(recipe_name)
         examples = simulated.extract(recipe.feature_set, grades.used_for(TRAIN), count, SPEED_M_S, FORCE_N)
-        model = train_grades(recipe, examples, grades)
-        times[name] = times_us(model, windows, QUICK_TIMED if options.quick else TIMED)
+        models[name] = train_grades(recipe, examples, grades)
+    timed = QUICK_TIMED if options.quick else TIMED
+    rounds = [{name: times_us(model, windows, timed) for name, model in models.items()} for _ in range(ROUNDS)]
+    times = {name: min((taken[name] for taken in rounds), key=np.median) for name in models}
     chart = histogram_chart(
         times,
         'From the samples of a window to the grade, in one process (simulated)',
@@ -44,7 +47,7 @@ def run(options: BenchmarkOptions) -> BenchmarkResult:
         name='roughness-latency',
         measured=(
             f'computing time of a core: features, checks, head and evidence for windows of {USED_S} s at 1 kHz, '
-            'one by one, in one process'
+            f'one by one, in one process; the quickest of {ROUNDS} rounds'
         ),
         data='simulated TSF-85, scene roughness',
         split="by texture, the paper's: 15 for training, windows of the 10 others timed",
