@@ -47,7 +47,6 @@ LONG = frozenset(
         'scale',
         'sensors',
         'stick_slip',
-        'trust',
     }
 )
 # What many of them read is imported once.

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from texture_benchmarks.decision_times import decided_at
 from texture_benchmarks.forked_map import map_forked
 from texture_benchmarks.recipes.run import RATE_HZ
-from texture_benchmarks.recipes.trial import comparable, every, figures_of, latency_us
+from texture_benchmarks.recipes.trial import comparable, every, figures_of, latencies_us
 from texture_core.arrays import Array
 from texture_estimation.channels import with_channels
 from texture_estimation.model import TextureModel
@@ -79,6 +79,7 @@ def try_all(jobs: Sequence[FrontierJob], dataset: SlideDataset, split: Split) ->
     """
     tried = dict(zip(jobs, map_forked(partial(_try, dataset, split), jobs), strict=True))
     with single_blas_thread():
-        for job, point in tried.items():
-            point.figures['latency_us'] = latency_us(job.recipe(), point.model, dataset)
+        latencies = latencies_us({job: (job.recipe(), point.model, dataset) for job, point in tried.items()})
+    for job, latency in latencies.items():
+        tried[job].figures['latency_us'] = latency
     return tried
