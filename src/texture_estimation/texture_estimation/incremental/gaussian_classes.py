@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eigh
 
 from texture_core.arrays import Array
 from texture_estimation.group_means import group_means
@@ -122,6 +121,8 @@ def _scale(samples: Array, deviations: Array, freedom: int) -> Array:
 
 def _projection(deviations: Array, freedom: int, scale: Array) -> Array:
     """Return what makes the covariance of these scaled deviations within classes the identity."""
+    from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
     if deviations.shape[1] > MAX_CORRELATED:
         diagonal: Array = 1.0 / scale
         return diagonal

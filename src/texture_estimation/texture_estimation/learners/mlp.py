@@ -9,7 +9,6 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
 from texture_core.parameters import param
@@ -107,6 +106,8 @@ class Mlp:
         Fitted
             Parameters, log-probabilities when held out, and a note on the calibration.
         """
+        from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
         n_labels = int(y.max()) + 1
         split = assign_folds(y, groups, self.folds)
         if split is None:

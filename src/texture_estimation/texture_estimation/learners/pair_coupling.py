@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
 from texture_estimation.learners.learner import Codes
@@ -105,6 +104,8 @@ def fit_coupling(decisions: Array, y: Codes, n_labels: int) -> PairCoupling:
     PairCoupling
         With a temperature that makes the labels most probable.
     """
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
     pairs = combinations(range(n_labels), 2)
     sigmoids = np.array([_fit_sigmoid(decisions[:, number], y, *pair) for number, pair in enumerate(pairs)])
     coupling = PairCoupling(n_labels, sigmoids[:, 0], sigmoids[:, 1], 1.0)

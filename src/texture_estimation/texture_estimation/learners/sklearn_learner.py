@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import Array
 from texture_core.catalogue import unknown_name
@@ -200,6 +199,8 @@ def _plain(name: str, value: Any) -> Any:
 
 def _fit_temperature(scores: Array, y: Codes) -> float:
     """Return the divisor of scores (n, n_labels) that makes the labels (n,) most probable."""
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
     best = minimize_scalar(
         lambda log_t: log_loss(log_softmax(scores / np.exp(log_t)), y), bounds=(-2.0, 4.0), method='bounded'
     )

@@ -9,8 +9,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.optimize import minimize_scalar
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.errors import InvalidData, InvalidParameter, ModelMismatch
@@ -433,6 +431,7 @@ def _fit(values: Array, cells: AnyArray, n_textures: int) -> _Fit:
     cells : (n_slides,)
         Number of the motion times the number of textures, and number of the texture.
     """
+    from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
     from sklearn.covariance import ledoit_wolf  # noqa: PLC0415  # takes seconds, and who classifies does not need it
 
     counts = np.bincount(cells)
@@ -480,6 +479,8 @@ def _parts(cells: AnyArray) -> AnyArray:
 
 def _temper(values: Array, cells: AnyArray, n_textures: int) -> float:
     """Return the exponent of the likelihoods that makes slides held out most probable: they are not quite Gaussian."""
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
     parameters, least = _parts(cells), len(np.unique(cells))
     known_motions: list[Array] = [np.zeros((0, n_textures))]
     truths = [cells[:0]]

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 
 from texture_core.arrays import AnyArray, Array
 from texture_estimation.learners.learner import Codes
@@ -67,6 +66,8 @@ class ClassDistance:
         classes : (n_slides,)
             Number of the label of each.
         """
+        from scipy.linalg import eigh  # noqa: PLC0415  # takes 0.3 s, and only training needs it
+
         names, codes = np.unique(classes, return_inverse=True)
         scale = means.std(axis=0)
         scale[scale <= 1e-12 * np.abs(means).max(axis=0)] = np.inf  # what is constant tells nothing
