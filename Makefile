@@ -16,7 +16,7 @@ ALONE = { echo 'Tests against the clock failed beside others; they run again, al
 # Public recordings for evaluation, if they lie beside the repository or where the user says.
 export TEXTURE_DATA ?= $(wildcard $(abspath ../shared/data))
 
-.PHONY: setup demo test test-benchmarks lint benchmark peers docs clean
+.PHONY: setup demo test test-pure test-benchmarks lint benchmark peers docs clean
 
 setup:
 	@$(PYTHON) tools/workspace.py
@@ -33,9 +33,13 @@ lint: setup
 	@$(RUN) python tools/check_prose.py
 	@$(RUN) python tools/figures.py --check
 
-test: setup lint
-	@$(TESTS) -n $(TEST_JOBS) -m "not realtime and not benchmark" --doctest-modules
+# The checks run beside the tests that need no clock: most of them use one core.
+test: setup
+	@$(MAKE) --no-print-directory -j 2 lint test-pure
 	@$(CLOCKED) -n $(REALTIME_JOBS) -m "realtime and not benchmark" || $(call ALONE,realtime and not benchmark)
+
+test-pure: setup
+	@$(TESTS) -n $(TEST_JOBS) -m "not realtime and not benchmark" --doctest-modules
 
 # Benchmarks and experiments in reduced size, endurance, pages whose every line is run, and large files.
 test-benchmarks: setup
