@@ -47,6 +47,7 @@ LONG = frozenset(
         'scale',
         'sensors',
         'stick_slip',
+        'trust',
     }
 )
 # What many of them read is imported once.
