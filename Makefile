@@ -28,9 +28,6 @@ lint: setup
 	@$(RUN) ruff check .
 	@$(RUN) ruff format --check .
 	@$(RUN) mypy
-	@$(RUN) python tools/check_terms.py
-	@$(RUN) python tools/check_docstrings.py
-	@$(RUN) python tools/check_prose.py
 	@$(RUN) python tools/figures.py --check
 
 # The checks run beside the tests that need no clock: most of them use one core.

@@ -1,4 +1,4 @@
-"""Checks of the repository as a whole: links, the shared setup.py, versions, anatomy."""
+"""Checks of the repository as a whole: links, the shared setup.py, versions, names."""
 
 from __future__ import annotations
 
@@ -35,30 +35,6 @@ def test_every_relative_link_leads_somewhere(page: Path) -> None:
         assert target.exists(), f'{link} leads nowhere'
         if anchor:
             assert anchor in anchors(target), f'{link}: no such heading'
-
-
-WAY = re.compile(r'^\| ([^|]+) \| \[[^]]+\]\(([^)]+)\) \| \[[^]]+\]\(([^)]+)\) \|$', re.MULTILINE)
-WAYS = WAY.findall((ROOT / 'CONTRIBUTING.md').read_text())
-
-
-def linked(page: Path) -> set[Path]:
-    """Return the files that a Markdown page links to."""
-    return {(page.parent / link.partition('#')[0]).resolve() for link in LINK.findall(page.read_text())}
-
-
-def test_ten_ways_from_the_readme_to_a_file_are_written_down() -> None:
-    assert len({file for _, _, file in WAYS}) >= 10
-
-
-@pytest.mark.parametrize(('wanted', 'page', 'file'), WAYS, ids=[wanted for wanted, _, _ in WAYS])
-def test_two_steps_lead_from_the_readme_to_the_file(wanted: str, page: str, file: str) -> None:
-    assert ROOT / page in linked(ROOT / 'README.md'), f'the README does not link to {page}'
-    assert ROOT / file in linked(ROOT / page), f'{page} does not link to {file}, where {wanted} is'
-    assert (ROOT / file).is_file()
-
-
-def test_there_are_twelve_packages() -> None:
-    assert len(PACKAGES) == 12
 
 
 @pytest.mark.parametrize('package', PYTHON_PACKAGES, ids=lambda package: package.name)
