@@ -6,9 +6,9 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from texture_core.signal import NANOSECONDS
 from texture_drivers.delay_model import DelayModel
 
-NANOSECONDS = 1_000_000_000
 PPM = 1e6
 SLOW_CLOCK = 'device clock slow by [ppm]'  # name of the drift among the details of a sensor
 BINS = 64

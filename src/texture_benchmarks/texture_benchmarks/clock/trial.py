@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from texture_core.arrays import AnyArray, Array
-from texture_drivers.clock import NANOSECONDS, StreamClock
+from texture_core.signal import NANOSECONDS
+from texture_drivers.clock import StreamClock
 
 START_NS = 1_700_000_000 * NANOSECONDS  # some day
 

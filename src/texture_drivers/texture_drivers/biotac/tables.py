@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-NANOSECONDS = 1_000_000_000
+from texture_core.signal import NANOSECONDS
+
 SLOT_RATE_HZ = 4400.0  # samplings of any channel; a slot is 227.27 µs
 SLOT_NS = NANOSECONDS / SLOT_RATE_HZ
 FULL_SCALE = 4095  # 12 bits
