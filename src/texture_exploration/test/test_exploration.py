@@ -297,3 +297,25 @@ def test_whatever_ends_a_slide_ends_it_within_100_ms_and_the_next_exploration_wo
     if name != 'a shove out of the workspace':
         table.arm.connect()  # as the explorer does, once the arm is in trouble
     assert table.explore().success
+
+
+@pytest.mark.parametrize('speed_m_s', [0.05, 0.1])
+@pytest.mark.parametrize('force_mode', [True, False])
+def test_a_wall_in_the_path_ends_the_slide_and_the_finger_goes_back_before_it_is_lifted(
+    make_table, speed_m_s, force_mode
+):
+    table = make_table(SimulatedArmParams(wall_m=0.02, force_mode=force_mode))
+    held, go_on = [], table.pace
+
+    def pace():
+        go_on()
+        held.append(table.arm.state().force_size_n)
+
+    table.pace = pace
+    outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=speed_m_s, force_n=1.0, distance_m=0.06))
+    print(f'{max(held):.1f} N: {outcome}')
+    assert (outcome.success, outcome.lifted) == (False, True)
+    assert 'along the surface' in outcome.message
+    assert max(held) < 10.0 + 20000.0 * 0.035 * speed_m_s
+    assert sum(force_n > 10.0 for force_n in held) <= 10  # steps of 10 ms
+    assert held[-1] == 0.0

@@ -71,16 +71,30 @@ def test_an_arm_that_needs_a_longer_rise_to_zero_its_force_sensor_gets_it(table,
     assert highest_m < table.home[2] + 5 * TOUCH.clearance_m
 
 
-def test_a_force_that_never_stops_changing_aborts_after_the_travel_of_an_approach(table, lifting_first, monkeypatch):
-    state = table.arm.state
+CHANGING = {
+    'swings': (lambda reading: 2.0 * (reading.time_ns // 50_000_000 % 2), 'the force changed by 2.00 N'),
+    'falls slowly': (
+        lambda reading: -150.0 * reading.position[2],
+        'the force changed all the while the finger rose by 0.05',
+    ),
+}
 
-    def swinging():
+
+@pytest.mark.parametrize('change', CHANGING)
+def test_a_force_that_never_stops_changing_aborts_after_the_travel_of_an_approach(
+    table, lifting_first, monkeypatch, change
+):
+    state, (force_n, message) = table.arm.state, CHANGING[change]
+
+    def changing():
         reading = state()
-        return replace(reading, force_n=2.0 * (reading.time_ns // 50_000_000 % 2))
+        return replace(reading, force_n=force_n(reading))
 
-    monkeypatch.setattr(table.arm, 'state', swinging)
+    monkeypatch.setattr(table.arm, 'state', changing)
     outcome = table.explore(REQUEST)
-    assert 'the force changed all the while the finger rose by 0.05' in outcome.message
+    assert message in outcome.message
+    assert not outcome.lifted
+    assert table.arm.state().position[2] < table.home[2] + 0.052
 
 
 def test_a_stop_during_the_lift_ends_the_exploration(table, lifting_first):

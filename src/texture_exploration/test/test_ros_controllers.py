@@ -40,6 +40,7 @@ class Robot:
         self.heard_by = 1
         self.sent = []  # velocities with their times
         self.forces = []
+        self.pressed_n = []  # the true force, in any direction
         self.closed = False
         self.switched, self.refused_switches = [], ()
         self.driven = RosControllersArm(
@@ -80,6 +81,7 @@ class Robot:
                 self.driven.command(command)
             self.now_ns += PERIOD_NS
             self.arm.advance(self.now_ns)
+            self.pressed_n.append(float(np.linalg.norm(self.arm.force_n)))
             self.driven.step()
 
     @property
@@ -92,8 +94,8 @@ class Robot:
         self.pass_time(0.4, ArmCommand())
         assert self.driven.zeroed
 
-    def explore(self, request, touch):
-        home = self.driven.state().position
+    def explore(self, request, touch, home=None):
+        home = home or self.driven.state().position
         motion = MOTIONS[request.motion](request, home, touch, LIMITS)
         forces = {}
 
@@ -500,3 +502,69 @@ def test_controllers_that_cannot_be_switched_back_are_a_warning():
     robot.driven.close()
     assert robot.closed
     assert robot.driven.warning() == 'the controllers were not switched back: the manager refused'
+
+
+# What is not as the arm is told, and the largest true force in any direction that follows, N.
+WALL = {'wall_m': 0.02, 'friction': 0.3}
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=5.0, distance_m=0.06)
+TRAVEL_M = 0.06
+LIES = {
+    'a wall in the slide': (WALL, {}, 45.0, 'along the surface'),
+    'a wall in a fast slide': (WALL, {'speed_m_s': 0.1}, 75.0, 'along the surface'),
+    'a wall on the way to the start': (WALL, {'travel': True}, 45.0, 'the finger met something'),
+    'an inverted twist': ({'invert_twist': True}, {}, 5.0, 'the arm moved by'),
+    'an inverted twist in contact': ({'invert_twist': True, 'start_height_m': 0.0}, {}, 15.0, 'the arm moved by'),
+    'a force of the wrong sign': ({'invert_force': True}, {}, 6.0, 'its sign is wrong'),
+    'a force in a frame turned by 90 degrees': ({'turn_force_rad': 1.57}, {}, 6.0, 'from the side'),
+    'a force in a frame turned by -90 degrees': ({'turn_force_rad': -1.57}, {}, 6.0, 'from the side'),
+    'a force in a frame turned by 180 degrees': ({'turn_force_rad': 3.14159}, {}, 6.0, 'its sign is wrong'),
+    'a surface upside down': ({}, {'surface_rx_rad': math.pi}, 12.0, 'left the workspace'),
+    'a surface upside down near the finger': (
+        {'start_height_m': 0.002},
+        {'surface_rx_rad': math.pi},
+        12.0,
+        'met something while it rose',
+    ),
+    'a surface upside down under a finger that presses': (
+        {'start_height_m': -0.0001},
+        {'surface_rx_rad': math.pi},
+        12.0,
+        'while the finger rose',
+    ),
+}
+
+
+@pytest.mark.parametrize('stiffness_n_m', [2000.0, 20000.0])
+@pytest.mark.parametrize('lie', LIES)
+def test_no_hidden_force_follows_from_what_is_not_as_the_arm_is_told(lie, stiffness_n_m, record_property):
+    emulated, given, most_n, message = LIES[lie]
+    params = {key: value for key, value in given.items() if key.startswith('surface')}
+    robot = Robot(replace(NO_NOISE, force_noise_n=0.01, stiffness_n_m=stiffness_n_m, **emulated), **params)
+    if given.get('travel'):
+        robot.arm.position = robot.arm.position - [TRAVEL_M, 0.0, 0.0]
+    robot.driven.connect()
+    robot.pass_time(0.05)
+    home = robot.driven.state().position
+    if given.get('travel'):
+        home = (WALL['wall_m'] + 0.02, 0.0, home[2])
+    request = replace(SLIDE, speed_m_s=given.get('speed_m_s', SLIDE.speed_m_s))
+    touch = TouchParams(approach_stiffness_n_m=stiffness_n_m)
+    outcome, _ = robot.explore(request, touch, home)
+    peak_n, end_n = max(robot.pressed_n), robot.pressed_n[-1]
+    above_s = longest_above(robot.pressed_n, LIMITS.force_limit_n) * PERIOD_NS * 1e-9
+    record_property('peak_n', peak_n)
+    print(f'{lie}, {stiffness_n_m:g} N/m: {peak_n:.1f} N, {above_s:.3f} s above, {end_n:.1f} N left: {outcome}')
+    assert not outcome.success
+    assert peak_n < most_n
+    assert above_s <= 0.1
+    assert message in outcome.message
+    assert end_n < 0.5 or not outcome.lifted
+
+
+def longest_above(forces_n, limit_n):
+    """Return the largest number of readings in a row above a limit."""
+    longest = run = 0
+    for force_n in forces_n:
+        run = run + 1 if force_n > limit_n else 0
+        longest = max(longest, run)
+    return longest

@@ -41,3 +41,18 @@ def test_the_room_is_the_way_to_the_nearest_wall():
     assert limits.free_distance_m((0.1, 0.0, 0.0), 0.0) == pytest.approx(0.1)
     assert limits.free_distance_m((0.1, 0.0, 0.0), math.pi) == pytest.approx(0.3)
     assert limits.free_distance_m((0.0, 0.0, 0.0), math.pi / 4) == pytest.approx(0.2 * math.sqrt(2))
+
+
+@pytest.mark.parametrize(('along_n', 'normal_n', 'allowed'), [(2.9, 1.0, True), (3.1, 1.0, False), (1.1, 0.0, False)])
+def test_a_force_along_the_surface_is_bounded_by_friction_and_a_small_floor(along_n, normal_n, allowed):
+    limits = SafetyLimits(friction_limit=2.0, tangential_floor_n=1.0)
+    arm = ArmState(0, REST, REST, normal_n, along_n=(0.0, -along_n))
+    assert (limits.friction_violation(arm) == '') is allowed
+
+
+def test_the_limit_is_of_the_whole_force_and_of_the_normal_one_where_only_that_is_measured():
+    limits = SafetyLimits(force_limit_n=10.0)
+    assert 'above the limit' in limits.force_violation(ArmState(0, REST, REST, 6.0, along_n=(6.0, 6.0)))
+    assert limits.force_violation(ArmState(0, REST, REST, 6.0)) == limits.friction_violation(
+        ArmState(0, REST, REST, 6.0)
+    )

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ENDED, ExplorationRequest, ExplorationState, Phase
-from texture_exploration.arms.protocol import Arm, ArmCommand, ArmState, ForceReading
-from texture_exploration.force_watch import ForceWatch
+from texture_exploration.arms.protocol import Arm, ArmCommand, ArmState, ForceReading, Zeroing
+from texture_exploration.force_watch import ForceGuard, ForceWatch
 from texture_exploration.listening import WITHOUT_GAPS, Listening
 from texture_exploration.motions.protocol import Motion, MotionStep
 from texture_exploration.safety import SafetyLimits
@@ -39,7 +39,8 @@ class ExplorationOutcome:
     slid
         Whether the finger slid, so that there are samples.
     lifted
-        Whether the finger was lifted at the end; an arm with a fault can only be stopped.
+        Whether the finger was lifted at the end, and the measured force says so; an arm with a fault can only be
+        stopped.
     """
 
     success: bool
@@ -105,6 +106,7 @@ class Exploration:
         self._signal_fault = signal_fault
         reading = getattr(arm, 'force_reading', ForceReading.CONTROLLED)
         self._force_watch = ForceWatch(limits, reading, motion.force_n)
+        self._guard = ForceGuard(limits)
         self._commanded = ArmCommand()
         self._stop_reason = ''
         self._finish_reason = ''
@@ -145,8 +147,12 @@ class Exploration:
         if fault:
             self._give_up(f'{fault}; the finger was not lifted')
             return True
+        relative = self._guard.relative(arm, self._zeroed, self._commanded)
         reason = (
-            self._stop_reason or self._violation(arm) or self._signal_fault(self._listening) or self._overdue(now_ns)
+            self._stop_reason
+            or self._violation(arm, relative)
+            or self._signal_fault(self._listening)
+            or self._overdue(now_ns)
         )
         if reason:
             self._abort_reason = self._abort_reason or reason
@@ -157,6 +163,13 @@ class Exploration:
         if self._finish_reason:
             self._motion.finish(self._finish_reason)
         step = self._motion.step(now_ns, arm)
+        command = self._guard.yielding(relative, step.command, step.phase in (Phase.LIFT, Phase.ABORTED))
+        if self._guard.blocked:
+            self._abort_reason = self._motion.message
+            self._give_up(f'{self._guard.blocked}; the finger was not lifted')
+            return True
+        if command is not step.command:
+            step = replace(step, command=command, phase=Phase.LIFT)
         self._arm.command(step.command)
         self._commanded = step.command
         self._force_watch.note(step.phase, arm, step.command)
@@ -168,12 +181,20 @@ class Exploration:
         self._signal_seen = self._signal_seen or bool(self._abort_reason) or not self._signal_fault(WITHOUT_GAPS)
         return not self._signal_seen
 
-    def _violation(self, arm: ArmState) -> str:
+    @property
+    def _zeroed(self) -> bool:
+        return self._arm.zeroed if isinstance(self._arm, Zeroing) else True
+
+    def _violation(self, arm: ArmState, relative: ArmState) -> str:
         """Return which limit was passed; a finger that was pushed out of the workspace may come home first."""
         workspace_violation = self._limits.workspace_violation(arm)
         self._entered |= not workspace_violation
         frozen = self._force_watch.frozen(arm, self._commanded)
-        return self._limits.force_violation(arm) or frozen or (workspace_violation if self._entered else '')
+        return (
+            self._guard.violation(relative, self.state.phase)
+            or frozen
+            or (workspace_violation if self._entered else '')
+        )
 
     def _overdue(self, now_ns: int) -> str:
         """Return in a sentence that the exploration takes longer than its caller allows, '' if it does not."""
@@ -192,9 +213,11 @@ class Exploration:
         self._slid |= step.phase is Phase.SLIDE
         flaw = self._flaw() if step.phase is Phase.DONE else ''
         if flaw:
-            self.outcome, step = ExplorationOutcome(False, flaw, self._slid), replace(step, phase=Phase.ABORTED)
+            lifted = self._motion.lifted
+            self.outcome, step = ExplorationOutcome(False, flaw, self._slid, lifted), replace(step, phase=Phase.ABORTED)
         elif step.phase in ENDED:
-            self.outcome = ExplorationOutcome(step.phase is Phase.DONE, self._motion.message, self._slid)
+            success = step.phase is Phase.DONE
+            self.outcome = ExplorationOutcome(success, self._motion.message, self._slid, self._motion.lifted)
         # A promise that is withdrawn is told at once: until then windows may be cut on it.
         as_before = step.phase is self.state.phase and (step.steady_s > 0) is (self.state.steady_s > 0)
         if as_before and now_ns < self._next_state_ns:

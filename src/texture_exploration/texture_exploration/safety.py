@@ -41,7 +41,26 @@ class SafetyLimits:
         high=50.0,
     )
     force_limit_n: float = param(
-        10.0, 'Sets the measured force above which an exploration is aborted.', unit='N', low=0.1, high=100.0
+        10.0,
+        'Sets the measured force, in any direction, above which an exploration is aborted.',
+        unit='N',
+        low=0.1,
+        high=100.0,
+    )
+    friction_limit: float = param(
+        2.0,
+        'Sets the highest force along the surface, as a multiple of the normal force, above which an exploration is '
+        'aborted; it must exceed the friction of finger and samples.',
+        low=0.1,
+        high=20.0,
+    )
+    tangential_floor_n: float = param(
+        1.0,
+        'Sets the force along the surface that is allowed beside friction; it must exceed the noise of the force '
+        'sensor.',
+        unit='N',
+        low=0.05,
+        high=20.0,
     )
     frozen_force_s: float = param(
         0.06,
@@ -236,9 +255,27 @@ class SafetyLimits:
                 f'the force of {arm.force_n:.2f} N pulls by more than the limit of {self.force_limit_n:g} N; if the '
                 'finger was pressing, its sign is wrong'
             )
+        if not arm.force_size_n <= self.force_limit_n:
+            x, y, z = arm.force_vector_n
+            return (
+                f'the force of {arm.force_size_n:.2f} N ({x:.2f} and {y:.2f} N along the surface, {z:.2f} N normal to '
+                f'it) is above the limit of {self.force_limit_n:g} N'
+            )
         if not all(map(math.isfinite, arm.position)):
             return f'the place of the finger is unknown: the arm tells {arm.position}'
         return ''
+
+    def friction_violation(self, arm: ArmState) -> str:
+        """Return in a sentence that more than friction holds the finger along the surface, '' if not."""
+        x, y, normal_n = arm.force_vector_n
+        most_n = self.friction_limit * abs(normal_n) + self.tangential_floor_n
+        if math.hypot(x, y) <= most_n:
+            return ''
+        return (
+            f'the force along the surface of {math.hypot(x, y):.2f} N is more than friction can be, {most_n:.2f} N '
+            f'under {normal_n:.2f} N: the finger met something, or its force is given in another frame; see '
+            "'friction_limit' and 'tangential_floor_n'"
+        )
 
     def workspace_violation(self, arm: ArmState) -> str:
         """Return in a sentence where the finger has left the workspace, '' if it has not."""

@@ -16,8 +16,9 @@ class ArmState:
     """Position, velocity and normal force of the fingertip in the frame of the surface.
 
     `time_ns` is when the arm measured it, of CLOCK_MONOTONIC; `position` in m, `velocity` in m/s; `force_n` is the
-    force normal to the surface, positive when pressing; `tangential_force_n` the force of the surface against the
-    direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
+    force normal to the surface, positive when pressing; `along_n` that of the surroundings on the finger along x and y
+    of the surface, NaN if the arm measures the normal force only; `tangential_force_n` the force of the surface against
+    the direction of travel, NaN if the arm does not measure it or the finger does not slide. `fault` says why the arm
     cannot move; '' if it can. For `watchdog_s` at most the arm goes on with its last velocity when it hears nothing
     more; 0 if it does not say.
     """
@@ -29,6 +30,18 @@ class ArmState:
     fault: str = ''
     watchdog_s: float = 0.0
     tangential_force_n: float = math.nan
+    along_n: tuple[float, float] = (math.nan, math.nan)
+
+    @property
+    def force_vector_n(self) -> Vector:
+        """The whole force on the finger, as far as the arm measures it."""
+        x, y = (0.0, 0.0) if all(map(math.isnan, self.along_n)) else self.along_n
+        return x, y, self.force_n
+
+    @property
+    def force_size_n(self) -> float:
+        """The size of the whole force, as far as the arm measures it."""
+        return math.hypot(*self.force_vector_n)
 
 
 @dataclass(frozen=True)

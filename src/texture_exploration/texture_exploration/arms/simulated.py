@@ -230,7 +230,8 @@ class SimulatedArm:
             command = STANDSTILL
             self._last_command = (STANDSTILL, now_ns)
         self._true_n = self._surface.force_n(x, z) + self._push_n
-        self._state = ArmState(now_ns, (x, y, z), velocity, self._measured_n(dt_s), self._fault)
+        along_n = (self._surface.wall_n(x), 0.0)
+        self._state = ArmState(now_ns, (x, y, z), velocity, self._measured_n(dt_s), self._fault, along_n=along_n)
         if self._velocity_control:
             self._velocity_control.ask(command, self._state, dt_s)
         self._emulator.send(FingerState(now_ns, x, y, z, *velocity, self._true_n))

@@ -53,6 +53,13 @@ class SimulatedSurfaceParams:
         low=10.0,
         high=200000.0,
     )
+    wall_m: float = param(
+        2.0,
+        'Sets the x coordinate of a wall of `base_stiffness_n_m` across the way of the finger.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
     adhesion_n: float = param(
         0.0,
         'Sets the largest pulling force with which the surface adheres to the finger; 0 removes adhesion.',
@@ -98,6 +105,10 @@ class SimulatedSurface:
         if not self._sticking:
             return 0.0
         return press + self._params.stick_slip_n * (2 * ((x_m / STICK_M) % 1.0) - 1)
+
+    def wall_n(self, x_m: float) -> float:
+        """Return the force with which a wall pushes the finger back along x."""
+        return -self._params.base_stiffness_n_m * max(0.0, x_m - self._params.wall_m)
 
     def _press_n(self, depth_m: float) -> float:
         """Return the force of the spring, or of the soft layer and what is below it."""

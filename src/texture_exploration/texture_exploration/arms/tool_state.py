@@ -119,6 +119,7 @@ class ToolState:
             self._force_n,
             fault,
             tangential_force_n=tangential_force_n(self._force_vector_n, self._velocity),
+            along_n=self._force_vector_n[:2],
         )
 
     def _is_new(self, kind: str, stamp_ns: int) -> bool:

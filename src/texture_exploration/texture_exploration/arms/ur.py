@@ -110,6 +110,7 @@ class UrArm:
             fault=self._fault(report),
             watchdog_s=report.watchdog_s,
             tangential_force_n=tangential_force_n(force, velocity),
+            along_n=force[:2],
         )
 
     def command(self, command: ArmCommand) -> None:

@@ -43,6 +43,10 @@ class Motion(Protocol):
         """The wanted force of the slide."""
 
     @property
+    def lifted(self) -> bool:
+        """Whether the finger was lifted at the end, and the measured force says so."""
+
+    @property
     def message(self) -> str:
         """What happened, in one sentence."""
 

@@ -9,7 +9,7 @@ from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState
 from texture_exploration.motions.contact import ContactLost
 from texture_exploration.motions.protocol import MotionStep
-from texture_exploration.motions.stages import SlideStage, Stage
+from texture_exploration.motions.stages import LiftStage, SlideStage, Stage
 
 SEEKS = 3  # a surface that is lost more often is not one to slide on
 
@@ -50,6 +50,8 @@ class StagedMotion:
             command = self._try_stage(time_ns, arm)
         if self._stage is None or command is None:
             self._stage, command = None, ArmCommand()
+            if isinstance(self._lift, LiftStage):
+                self._lift.see(arm)
             self._phase = Phase.ABORTED if self._abort_reason else Phase.DONE
         else:
             self._phase = self._stage.phase
@@ -79,6 +81,11 @@ class StagedMotion:
     def force_n(self) -> float:
         """The wanted force of the slide."""
         return self._slide.force_n
+
+    @property
+    def lifted(self) -> bool:
+        """Whether the finger was lifted at the end, and the measured force says so."""
+        return isinstance(self._lift, LiftStage) and self._lift.free
 
     @property
     def message(self) -> str:

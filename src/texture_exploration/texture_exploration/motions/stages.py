@@ -15,6 +15,8 @@ from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
 NEAR_M = 0.0005
+GROWTH_M = 0.002
+LEAST_LIFT_M_S = 0.005  # a lift that nothing has proven yet ends in time too
 PRESSING_S = 0.1  # from contact to the wanted force: a step would swing on a stiff surface
 STEADY_HORIZON_S = 0.1  # the longest time for which a slide guarantees speed and force; ending it early takes as long
 
@@ -65,7 +67,14 @@ class GoHomeStage(Stage):
         super().__init__(Phase.APPROACH, limits.approach_timeout_s, 'the finger to reach the start')
         self._home = home
         self._touch = touch
-        self._free_n = math.inf
+        self._timeout_s = limits.approach_timeout_s
+        self._speed_m_s = touch.travel_m_s(limits.force_limit_n)
+        self._free_n: Vector | None = None
+
+    def begin(self, time_ns: int, arm: ArmState) -> None:
+        """Allow the time that the way needs."""
+        super().begin(time_ns, arm)
+        self.timeout_s = self._timeout_s + math.dist(self._home, arm.position) / self._speed_m_s
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
         """Rise first; then speed up and slow down at half the allowed acceleration.
@@ -76,19 +85,20 @@ class GoHomeStage(Stage):
             If the finger meets something on its way.
         """
         x, y, z = (goal - at for goal, at in zip(self._home, arm.position, strict=True))
+        # A sensor that is zeroed as the arm moves off shows an offset before, and a finger that leaves the surface a
+        # contact: what counts is the change from the smallest force.
+        if self._free_n is None or arm.force_size_n < math.hypot(*self._free_n):
+            self._free_n = arm.force_vector_n
+        met_n = math.dist(arm.force_vector_n, self._free_n)
+        if not met_n <= self._touch.contact_force_n:
+            raise MotionAborted(f'the finger met something on the way to the start, {met_n:.2f} N')
         if z > NEAR_M:
-            return ArmCommand(normal_m_s=self._touch.lift_speed_m_s)
+            return ArmCommand(normal_m_s=min(self._touch.lift_speed_m_s, self._speed_m_s))
         distance = math.hypot(x, y)
         if distance < NEAR_M:
             return None
-        # A sensor that is zeroed as the arm moves off shows an offset before: only a rise is a touch.
-        self._free_n = min(self._free_n, arm.force_n)
-        if arm.force_n - self._free_n > self._touch.contact_force_n:
-            raise MotionAborted(f'the finger met something on the way to the start, {arm.force_n:.2f} N')
         gentle_m_s2 = 0.5 * self._touch.acceleration_m_s2
-        speed = min(
-            self._touch.travel_speed_m_s, math.sqrt(2 * gentle_m_s2 * distance), gentle_m_s2 * self.elapsed_s(time_ns)
-        )
+        speed = min(self._speed_m_s, math.sqrt(2 * gentle_m_s2 * distance), gentle_m_s2 * self.elapsed_s(time_ns))
         return ArmCommand(tangential_m_s=(speed * x / distance, speed * y / distance))
 
 
@@ -113,9 +123,10 @@ class ApproachStage(Stage):
         Raises
         ------
         MotionAborted
-            If there is no surface within the allowed travel.
+            If there is no surface within the allowed travel, or the force is not that of a surface.
         """
-        if arm.force_n > self._touch.contact_force_n:
+        if not arm.force_size_n <= self._touch.contact_force_n:
+            self._check_normal(arm)
             return None
         if self._start_m - arm.position[2] > self._touch.approach_travel_m:
             raise MotionAborted(
@@ -131,6 +142,19 @@ class ApproachStage(Stage):
                 f'{arm.watchdog_s * 1e3:.0f} ms when it hears nothing'
             )
         return ArmCommand(normal_m_s=-speed_m_s)
+
+    def _check_normal(self, arm: ArmState) -> None:
+        """Raise MotionAborted if what the finger met does not push it up: pressing harder would not end."""
+        x, y, z = arm.force_vector_n
+        if z * math.hypot(1.0, self._limits.friction_limit) >= arm.force_size_n:
+            return
+        what = f'({x:.2f}, {y:.2f}, {z:.2f}) N in the frame of the surface'
+        if -z > math.hypot(x, y):
+            raise MotionAborted(f'the finger came down and its force became {what}: its sign is wrong')
+        raise MotionAborted(
+            f'the finger met something from the side as it came down, {what}; if there is nothing, the force is given '
+            'in another frame than its name says'
+        )
 
 
 class SettleForceStage(Stage):
@@ -361,24 +385,67 @@ class LiftStage(Stage):
     """Leave the surface along its normal, to the height of the start or at least by the clearance.
 
     The clearance counts from where the finger came free: a soft surface follows it for a while. A force that does not
-    fall, as that of a frozen sensor, does not lift the finger beyond `approach_travel_m`.
+    fall, as that of a frozen sensor, does not lift the finger beyond `approach_travel_m`. It goes no faster than it
+    came down until the force has fallen: only that proves that up is up.
+
+    Attributes
+    ----------
+    free
+        Whether the newest force is that of a finger which touches nothing.
     """
 
-    def __init__(self, home: Vector, touch: TouchParams, limits: SafetyLimits) -> None:
+    def __init__(self, home: Vector, force_n: float, touch: TouchParams, limits: SafetyLimits) -> None:
         super().__init__(Phase.LIFT, limits.lift_timeout_s, 'the finger to be lifted')
+        self.free = False
         self._goal_m = home[2]
         self._highest_m = home[2]
         self._touch = touch
+        self._timeout_s = limits.lift_timeout_s
+        self._growth_n = max(touch.contact_force_n, limits.tangential_floor_n)
+        self._gentle_m_s = min(touch.lift_speed_m_s, max(touch.approach_m_s(force_n), LEAST_LIFT_M_S))
+        self._lowest_m = self._lowest_n = math.inf
+        self._newly = (math.inf, math.inf)  # height and force a little lower
+        self._proven = False
 
     def begin(self, time_ns: int, arm: ArmState) -> None:
         """Choose the height."""
         super().begin(time_ns, arm)
         self._highest_m = max(self._goal_m, arm.position[2] + self._touch.approach_travel_m)
+        slower_s_m = 1.0 / self._gentle_m_s - 1.0 / self._touch.lift_speed_m_s
+        self.timeout_s = self._timeout_s + max(0.0, self._goal_m - arm.position[2]) * slower_s_m
+        self._lowest_m, self._proven = math.inf, False
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Go up."""
+        """Go up.
+
+        Raises
+        ------
+        MotionAborted
+            If the force grows while the finger rises.
+        """
+        self.see(arm)
+        self._watch_rise(arm)
         if arm.force_n > self._touch.contact_force_n:
             self._goal_m = min(self._highest_m, max(self._goal_m, arm.position[2] + self._touch.clearance_m))
         if arm.position[2] >= self._goal_m - NEAR_M:
             return None
-        return ArmCommand(normal_m_s=self._touch.lift_speed_m_s)
+        return ArmCommand(normal_m_s=self._touch.lift_speed_m_s if self._proven else self._gentle_m_s)
+
+    def see(self, arm: ArmState) -> None:
+        """Take note of the force, also after the lift."""
+        self.free = arm.force_size_n <= self._touch.contact_force_n
+
+    def _watch_rise(self, arm: ArmState) -> None:
+        """See whether the force falls from what it was at the lowest place: a late arm goes on down for a while."""
+        height_m, force_n = arm.position[2], arm.force_size_n
+        if height_m <= self._lowest_m:
+            self._lowest_m, self._lowest_n = height_m, force_n
+        if height_m <= self._lowest_m or height_m - self._newly[0] > GROWTH_M:  # what grows more slowly is drift
+            self._newly = height_m, force_n
+        self._proven |= force_n < self._lowest_n - self._touch.contact_force_n
+        grown_n = force_n - self._newly[1]
+        if height_m - self._lowest_m > NEAR_M and grown_n > self._growth_n and not self._proven:
+            raise MotionAborted(
+                f'the force grew from {self._newly[1]:.2f} to {force_n:.2f} N while the finger rose; see that nothing '
+                'is above it, the pose of the surface and the frame of the force'
+            )

@@ -64,6 +64,6 @@ def plan_surface_slide(
         *come_down(),
         slide,
         BrakeStage(follower, speed, force, touch, limits, contact=contact),
-        LiftStage(home, touch, limits),
+        LiftStage(home, force, touch, limits),
     ]
     return StagedMotion(stages, slide, seek if touch.seek_lost_contact else None)

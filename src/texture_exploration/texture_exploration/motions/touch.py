@@ -18,7 +18,12 @@ class TouchParams:
     """Parameters of approach, contact, acceleration and lift."""
 
     travel_speed_m_s: float = param(
-        0.2, 'Sets the speed above the surface on the way back to the start.', unit='m/s', low=0.01, high=1.0
+        0.05,
+        'Sets the highest speed above the surface on the way back to the start; a stiff contact may ask for a lower '
+        'one.',
+        unit='m/s',
+        low=0.01,
+        high=1.0,
     )
     approach_speed_m_s: float = param(
         0.02,
@@ -162,6 +167,10 @@ class TouchParams:
         allowed_n = max(self.unheard_force_share * force_n, HARMLESS_N)
         unheard_m_s = allowed_n / (self.approach_stiffness_n_m * (watchdog_s + REACTION_S)) if watchdog_s else math.inf
         return min(self.approach_speed_m_s, heard_m_s, unheard_m_s)
+
+    def travel_m_s(self, limit_n: float) -> float:
+        """Return how fast the finger may go where something may stand in its way, for an impact below a force."""
+        return min(self.travel_speed_m_s, limit_n / (self.approach_stiffness_n_m * REACTION_S))
 
     def ramp_s(self, speed_m_s: float) -> float:
         """Return how long it takes to gain or lose a speed."""

@@ -61,7 +61,8 @@ class EmulatedTwistArm:
         """
         if self.params.active:
             delay_s = self.params.lag_s + self.jitter_s()
-            self._coming.append((now_ns + round(delay_s * 1e9), velocity_m_s))
+            sign = -1.0 if self.params.invert_twist else 1.0
+            self._coming.append((now_ns + round(delay_s * 1e9), sign * velocity_m_s))
 
     def press(self, force_n: Array) -> None:
         """Take the force of the tool on its surroundings, (3,), N, to which the arm yields from now on; 0: none.
@@ -89,14 +90,15 @@ class EmulatedTwistArm:
 
     @property
     def force_n(self) -> Array:
-        """Force of the surface on the finger in the base frame, (3,), N: elastic, with Coulomb friction."""
+        """Force on the finger in the base frame, (3,), N: elastic surface with Coulomb friction, and a wall."""
         params, normal = self.params, self._axes[:, 2]
         depth_m = -float((self.position - self._origin) @ normal)
+        behind_m = max(0.0, float((self.position - self._origin) @ self._axes[:, 0]) - params.wall_m)
         pressing_n = params.stiffness_n_m * max(0.0, depth_m)
         along = self.velocity - (self.velocity @ normal) * normal
         speed = math.sqrt(float(along @ along))
         force: Array = pressing_n * normal - params.friction * pressing_n * along / max(speed, STICTION_M_S)
-        return force
+        return force - params.wall_stiffness_n_m * behind_m * self._axes[:, 0]
 
     def reading_n(self) -> Array:
         """Return what the force sensor shows in the frame of the tool, (3,): with weight, offset and noise.
@@ -108,8 +110,9 @@ class EmulatedTwistArm:
         """
         weight = np.array([0.0, 0.0, -self.params.tool_mass_kg * GRAVITY_M_S2])
         noise = self.params.force_noise_n * self._rng.standard_normal(3)
-        reading: Array = TOOL_AXES.T @ (self.force_n + weight) + self.params.force_offset_n + noise
-        return reading
+        turned = rotation_matrix((0.0, self.params.turn_force_rad, 0.0))
+        reading: Array = turned @ TOOL_AXES.T @ (self.force_n + weight) + self.params.force_offset_n + noise
+        return -reading if self.params.invert_force else reading
 
     def finger(self) -> FingerState:
         """Return the true state of the finger in the frame of the surface."""

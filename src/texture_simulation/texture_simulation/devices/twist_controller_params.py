@@ -72,6 +72,27 @@ class TwistControllerParams:
     force_noise_n: float = param(
         0.002, 'Sets the standard deviation of the noise of the force sensor.', unit='N', low=0.0, high=5.0
     )
+    wall_m: float = param(
+        2.0,
+        'Sets the x coordinate, in the surface frame, of a wall across the way of the finger.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    wall_stiffness_n_m: float = param(
+        20000.0, 'Sets the stiffness of finger and wall.', unit='N/m', low=0.0, high=200000.0
+    )
+    invert_twist: bool = param(False, 'Moves against each commanded velocity, as behind a frame that is upside down.')
+    invert_force: bool = param(
+        False, 'Shows the force of the tool on its surroundings, as a sensor of the other convention.'
+    )
+    turn_force_rad: float = param(
+        0.0,
+        'Sets the angle about y by which the frame of the measured force is turned against its name.',
+        unit='rad',
+        low=-4.0,
+        high=4.0,
+    )
     compliance_m_s_n: float = param(
         0.002,
         'Sets the speed per force error with which the arm yields to a commanded force; a larger value settles faster.',

@@ -1,4 +1,4 @@
-"""The surface under the robot's finger: a plane that may slope and have a bump, elastic and with friction."""
+"""The surface under the robot's finger: a plane that may slope and have a bump, elastic and with friction; a wall."""
 
 from __future__ import annotations
 
@@ -39,15 +39,17 @@ class ContactPlane:
         Returns
         -------
         (3,)
-            Stiffness × depth along the normal, and Coulomb friction against the movement.
+            Stiffness × depth along the normal, Coulomb friction against the movement, and the push of the wall.
         """
+        behind_m = max(0.0, float(position_m[0] - self.origin[0]) - self._params.wall_m)
+        wall: Array = np.array([-self._params.wall_stiffness_n_m * behind_m, 0.0, 0.0])
         depth, normal = self._depth_and_normal(position_m)
         pressing = self._params.stiffness_n_m * max(0.0, depth)
         if pressing == 0.0:
-            return np.zeros(3)
+            return wall
         along = velocity_m_s - (velocity_m_s @ normal) * normal
         speed = math.sqrt(along @ along)
-        force: Array = pressing * normal - self.friction * pressing * along / max(speed, STICTION_M_S)
+        force: Array = wall + pressing * normal - self.friction * pressing * along / max(speed, STICTION_M_S)
         return force
 
     def _depth_and_normal(self, position_m: Array) -> tuple[float, Array]:

@@ -52,6 +52,16 @@ class UrControllerParams:
     friction: float = param(
         0.5, 'Sets the coefficient of Coulomb friction; a larger value drags the finger more.', low=0.0, high=3.0
     )
+    wall_m: float = param(
+        2.0,
+        'Sets the x coordinate of a wall across the way of the finger, from the centre of the surface.',
+        unit='m',
+        low=-2.0,
+        high=2.0,
+    )
+    wall_stiffness_n_m: float = param(
+        20000.0, 'Sets the stiffness of finger and wall.', unit='N/m', low=0.0, high=200000.0
+    )
     force_offset_n: float = param(1.5, 'Sets the offset of the force sensor until it is zeroed.', unit='N')
     force_noise_n: float = param(
         0.02, 'Sets the standard deviation of the noise of the force sensor.', unit='N', low=0.0
