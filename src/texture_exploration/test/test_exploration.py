@@ -318,4 +318,4 @@ def test_a_wall_in_the_path_ends_the_slide_and_the_finger_goes_back_before_it_is
     assert 'along the surface' in outcome.message
     assert max(held) < 10.0 + 20000.0 * 0.035 * speed_m_s
     assert sum(force_n > 10.0 for force_n in held) <= 10  # steps of 10 ms
-    assert held[-1] == 0.0
+    assert held[-1] < 0.01

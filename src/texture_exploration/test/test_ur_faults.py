@@ -20,7 +20,10 @@ from texture_core.finger_state import FingerState
 from texture_exploration.arms import ur_probe
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.ur import UrArm, UrArmParams
-from texture_exploration.explorer import Explorer
+from texture_exploration.exploration import Exploration
+from texture_exploration.explorer import Explorer, Pacer
+from texture_exploration.motions.catalogue import MOTIONS
+from texture_exploration.motions.lift_first import LiftFirst
 from texture_exploration.motions.touch import REACTION_S, TouchParams
 from texture_exploration.safety import SafetyLimits
 from texture_simulation.devices.ur.params import UrControllerParams
@@ -394,3 +397,52 @@ def test_a_controller_that_is_too_old_is_refused(version, oldest, monkeypatch):
         DeviceError, match=rf'has the software {version[0]}\.{version[1]}.*update it to {oldest} or newer'
     ):
         UrArm(UrArmParams(ip='127.0.0.82')).connect()
+
+
+@pytest.mark.parametrize(('ip', 'home_m', 'speed_m_s'), [('127.0.0.90', 0.0, 0.05), ('127.0.0.91', 0.05, 0.05)])
+def test_a_wall_in_the_slide_and_on_the_way_to_the_start_is_met_gently_and_left_again(
+    ip, home_m, speed_m_s, record_property
+):
+    request = ExplorationRequest('linear_slide', speed_m_s=speed_m_s, force_n=5.0, distance_m=0.06)
+    touch, limits = TouchParams(), SafetyLimits(state_timeout_s=2.0)
+    felt, done = [], threading.Event()
+    # The controller's own protective stop is not what is tested here.
+    with bench_at(ip, wall_m=0.02, stop_force_n=1e5) as emulator, connected(ip, silence_s=1.0) as arm:
+
+        def feel():
+            while not done.is_set():
+                state = arm.state()
+                if not felt or state.time_ns != felt[-1].time_ns:
+                    felt.append(state)
+                time.sleep(0.001)
+
+        x, y, z = arm.state().position
+        motion = MOTIONS[request.motion](request, (x + home_m, y, z), touch, limits)
+        exploration = Exploration(
+            'one',
+            request,
+            arm=arm,
+            motion=LiftFirst(motion, touch, limits, lambda: arm.zeroed),
+            limits=limits,
+            clock=time.monotonic_ns,
+            on_state=lambda state: None,
+        )
+        thread = threading.Thread(target=feel)
+        thread.start()
+        try:
+            outcome = exploration.run(Pacer(0.01, time.monotonic_ns))
+        finally:
+            done.set()
+            thread.join()
+        wait_for(emulator.rests)
+        left_n = arm.state().force_size_n
+    peak_n = max(state.force_size_n for state in felt)
+    above = [state.time_ns for state in felt if state.force_size_n > limits.force_limit_n]
+    above_s = (above[-1] - above[0]) * 1e-9 if above else 0.0
+    record_property('peak_n', peak_n)
+    print(f'{peak_n:.1f} N, {above_s:.3f} s above, {left_n:.1f} N left: {outcome}')
+    assert not outcome.success
+    assert 'met something' in outcome.message or 'along the surface' in outcome.message
+    assert peak_n < limits.force_limit_n + 20000.0 * 0.08 * speed_m_s  # 80 ms from the first contact to a standstill
+    assert above_s <= 0.1
+    assert left_n < 0.5

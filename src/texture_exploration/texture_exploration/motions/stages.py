@@ -412,7 +412,7 @@ class LiftStage(Stage):
         super().begin(time_ns, arm)
         self._highest_m = max(self._goal_m, arm.position[2] + self._touch.approach_travel_m)
         slower_s_m = 1.0 / self._gentle_m_s - 1.0 / self._touch.lift_speed_m_s
-        self.timeout_s = self._timeout_s + max(0.0, self._goal_m - arm.position[2]) * slower_s_m
+        self.timeout_s = self._timeout_s + (self._highest_m - arm.position[2]) * slower_s_m
         self._lowest_m, self._proven = math.inf, False
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
