@@ -27,6 +27,7 @@ from texture_exploration.free_air import FreeAir
 
 RISE_M_S = 0.02
 CALM_NS = 100_000_000  # at rest, before the force sensor is zeroed
+TURN_NS = 100_000_000  # in which an arm has turned back
 MAX_RISES = 5.0  # a finger that is lifted to zero its sensor rises at most by so many times what proves free air
 
 
@@ -76,6 +77,8 @@ class UrCommandStream:
         self._mode = Mode.STANDSTILL
         self._braking = False
         self._next_is_speed = False
+        self._led_m_s: Vector = (0.0, 0.0, 0.0)  # the newest velocity sent
+        self._turned_ns = -TURN_NS
 
     def observe(self, time_ns: int, position_m: Vector, force_n: Vector) -> None:
         """Take over what the controller measured last, in the base frame.
@@ -195,7 +198,13 @@ class UrCommandStream:
 
     def _speed(self, ur_command: UrCommand) -> bool:
         velocity = [*ur_command.velocity_m_s, 0.0, 0.0, 0.0]
-        return bool(self._control.speedL(velocity, self._params.arm_acceleration_m_s2, 1.0 / self._params.rate_hz))
+        if sum(now * before for now, before in zip(ur_command.velocity_m_s, self._led_m_s, strict=True)) < 0.0:
+            self._turned_ns = self._measured_ns
+        self._led_m_s = ur_command.velocity_m_s
+        # Whoever turns back has met something: as hard as a stop.
+        turns = self._measured_ns - self._turned_ns < TURN_NS
+        acceleration = max(STOP_DECELERATION_M_S2 if turns else 0.0, self._params.arm_acceleration_m_s2)
+        return bool(self._control.speedL(velocity, acceleration, 1.0 / self._params.rate_hz))
 
     def _force(self, ur_command: UrCommand) -> bool:
         """Say by turns how to press and how to slide."""
