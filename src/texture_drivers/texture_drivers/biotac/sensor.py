@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 
 from texture_core.errors import DeviceError
-from texture_core.signal import TactileSignal
+from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_drivers.biotac.bridge import SerialBridge
 from texture_drivers.biotac.cheetah import Cheetah
 from texture_drivers.biotac.link import SpiFrame, SpiLink
@@ -15,7 +15,6 @@ from texture_drivers.biotac.protocol import Replies, decode
 from texture_drivers.biotac.tables import (
     FULL_SCALE,
     LAYOUTS,
-    NANOSECONDS,
     PAC,
     PAC_SENSOR,
     SLOW_SENSOR,
