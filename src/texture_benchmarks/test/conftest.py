@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -5,6 +6,7 @@ import pytest
 
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
+sys.path.append(str(Path(__file__).parent))  # where tests of sensors find their rig
 SURFACES = ('glass', 'leather', 'ridge_2mm_deep')
 
 

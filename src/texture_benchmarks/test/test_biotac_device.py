@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sensor_rig import Rig, biotac
 
-from texture_benchmarks.load.rig import Rig
-from texture_benchmarks.load.rig_cases import biotac
 from texture_core.signal import lost_samples
 from texture_drivers.biotac.sensor import BioTac
 from texture_drivers.biotac.tables import LAYOUTS

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from texture_benchmarks.catalogue import BENCHMARKS
-from texture_benchmarks.overview.chart import LINE, PEERS, spread_heights
-from texture_benchmarks.overview.run import SHOWN, SOURCES, methods_of
-from texture_benchmarks.recipes.raw_windows import decisions, one_vote
-from texture_benchmarks.result import BenchmarkOptions
+from texture_benchmarks.overview import LINE, PEERS, SHOWN, SOURCES, methods_of, spread_heights
+from texture_benchmarks.recipes import decisions, one_vote
+from texture_benchmarks.study import BenchmarkOptions
 from texture_core.errors import InvalidData
 
 CHARTS = Path(__file__).resolve().parents[3] / 'docs' / 'charts'

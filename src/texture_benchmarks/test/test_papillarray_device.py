@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sensor_rig import CASES, Rig, feed_papillarray
 
-from texture_benchmarks.load.rig import Rig
-from texture_benchmarks.load.rig_cases import CASES, feed_papillarray
 from texture_core.errors import InvalidParameter
 from texture_core.signal import lost_samples
 from texture_drivers.papillarray.sensor import PapillArray

@@ -11,8 +11,8 @@ import pytest
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
-from texture_benchmarks.endurance.processes import Processes  # noqa: E402
 from texture_benchmarks.ros.graph import Graph  # noqa: E402
+from texture_benchmarks.soak import Processes  # noqa: E402
 from texture_core.features import FeatureVector  # noqa: E402
 from texture_core.ros.conversions import to_msg  # noqa: E402
 from texture_estimation.model import load_model  # noqa: E402

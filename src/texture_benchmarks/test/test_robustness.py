@@ -1,37 +1,179 @@
+import dataclasses
+import json
+import math
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from texture_benchmarks.sensors.trial import CHECKSUMMED, PROTOCOLS, link_statistics
-from texture_simulation.devices.faults import ByteFaults
+from texture_benchmarks.catalogue import BENCHMARKS
+from texture_benchmarks.recipes import comparable
+from texture_benchmarks.robustness import (
+    CONDITIONS,
+    DEGRADATIONS,
+    LATER,
+    SCENE,
+    TOPIC,
+    Degradation,
+    TouchConditions,
+    TrainedModels,
+    _sticking,
+    _usual,
+    breakdown,
+    degraded,
+    robustness_tables,
+    simulate_slide_signals,
+)
+from texture_benchmarks.study import BenchmarkOptions
+from texture_core.exploration import ExplorationState, Phase
+from texture_core.signal import TactileSignal
+from texture_estimation.channels import with_channels
+from texture_estimation.recipe import load_recipe
+from texture_recordings.labelled_slide import LabelledSlide
+from texture_recordings.slide_dataset import SlideDataset
+from texture_simulation.scene import load_scene
+
+DATA = Path(os.environ.get('TEXTURE_DATA') or Path(__file__).resolve().parents[4] / 'shared' / 'data')
+DOCS = Path(__file__).resolve().parents[3] / 'docs'
+RATE_HZ = 1000.0
 
 
-@pytest.mark.parametrize('sensor', PROTOCOLS)
-def test_a_good_line_loses_nothing(sensor: str) -> None:
-    figures = link_statistics(ByteFaults(), np.random.default_rng(0), n_packets=2000, sensor=sensor)
-    taken = figures.sent - PROTOCOLS[sensor].passed_over
-    assert (figures.correct_packets, figures.false_packets, figures.refused) == (taken, 0, 0)
+@pytest.fixture(params=DEGRADATIONS)
+def degradation(request: pytest.FixtureRequest) -> Degradation:
+    return DEGRADATIONS[request.param]
 
 
-@pytest.mark.parametrize('sensor', sorted(CHECKSUMMED))
-@pytest.mark.parametrize('kind', ['drop', 'insert', 'flip'])
-@pytest.mark.parametrize('rate', [1e-4, 1e-2])
-def test_a_checksum_lets_nothing_false_through(sensor: str, kind: str, rate: float) -> None:
-    figures = link_statistics(ByteFaults(**{kind: rate}), np.random.default_rng(3), n_packets=3000, sensor=sensor)
-    assert figures.false_packets == 0
-    assert 0 < figures.correct_packets < figures.sent
-    assert figures.refused > 0
+def samples() -> np.ndarray:
+    return 5.0 + np.random.default_rng(0).normal(size=(3000, 2)) * [1.0, 20.0]
 
 
-@pytest.mark.parametrize('faults', [ByteFaults(drop=1e-3), ByteFaults(insert=1e-3), ByteFaults(drop=1e-4)])
-def test_lost_and_added_bytes_let_no_false_packet_through(faults: ByteFaults) -> None:
-    figures = link_statistics(faults, np.random.default_rng(1))
-    assert figures.false_packets == 0
-    assert figures.correct_share > 0.93
-    assert figures.refused > 0
+def changed(name: str, strength: float) -> np.ndarray:
+    return DEGRADATIONS[name].change(samples(), RATE_HZ, strength, np.random.default_rng(1))
 
 
-def test_a_flipped_bit_is_refused_unless_it_hits_a_value() -> None:
-    figures = link_statistics(ByteFaults(flip=1e-3), np.random.default_rng(2))
-    assert figures.correct_share > 0.93
-    # Of the 47 bytes of a dynamic packet 36 are values (stamp, dynamic, inertial) and one the unused checksum.
-    assert 0 < figures.false_packets < 0.05 * figures.sent
+def test_no_strength_leaves_the_samples_as_they_are(degradation: Degradation) -> None:
+    same = degradation.change(samples(), RATE_HZ, degradation.nothing, np.random.default_rng(1))
+    np.testing.assert_array_equal(same, samples())
+
+
+def test_any_strength_gives_finite_samples_or_says_that_it_loses_some(degradation: Degradation) -> None:
+    for strength in degradation.strengths:
+        found = degradation.change(samples(), RATE_HZ, strength, np.random.default_rng(1))
+        assert found.ndim == 2
+        assert np.isfinite(found).all() or degradation.loses
+
+
+def test_strengths_only_rise_or_only_fall(degradation: Degradation) -> None:
+    assert list(degradation.strengths) in (sorted(degradation.strengths), sorted(degradation.strengths, reverse=True))
+
+
+def test_degradations_do_what_they_say() -> None:
+    np.testing.assert_allclose((changed('white noise', 1.0) - samples()).std(axis=0), samples().std(axis=0), rtol=0.1)
+    np.testing.assert_allclose((changed('offset drift', 3.0) - samples())[1000], 3.0 * samples().std(axis=0))
+    assert np.isnan(changed('lost samples', 0.1)).mean() == pytest.approx(0.1, abs=0.05)
+    assert (np.diff(changed('losses hidden', 0.5), axis=0) == 0).mean() == pytest.approx(0.5, abs=0.1)
+    assert len(changed('faster than trained', 2.0)) == 1500
+    np.testing.assert_allclose(np.ptp(changed('clipping', 0.5), axis=0), samples().std(axis=0))
+
+
+def test_wear_halves_the_power_at_its_cut_off() -> None:
+    tone = np.sin(2 * np.pi * 20.0 * np.arange(5000) / RATE_HZ)[:, None]
+    worn = DEGRADATIONS['wear'].change(tone, RATE_HZ, 20.0, np.random.default_rng(1))
+    assert worn[1000:].var() / tone.var() == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ('strengths', 'shares', 'expected'),
+    [
+        ((0.0, 1.0, 2.0), (1.0, 0.95, 0.85), 1.5),
+        ((1.0, 0.5), (0.5, 0.4), 0.75),
+        ((math.inf, 100.0, 50.0), (1.0, 0.5, 0.1), 100.0),
+        ((0.0, 1.0), (1.0, 0.9), None),
+    ],
+)
+def test_a_curve_breaks_down_where_it_crosses_nine_tenths_of_its_start(strengths, shares, expected) -> None:
+    assert breakdown(strengths, shares, 0.9) == (expected and pytest.approx(expected))
+
+
+def slide_signals(samples: np.ndarray, rate_hz: float, batch: int) -> LabelledSlide:
+    """Return a slide that came in batches."""
+    slide = LabelledSlide(Path(), 'a/1', 'a', 1, 0, None)
+    state = ExplorationState(0, 'a/1', 'linear_slide', Phase.SLIDE, steady_s=len(samples) / rate_hz, surface='a')
+    signals = [
+        TactileSignal(0, 'pac', ('pac',), (), rate_hz, first, samples[first : first + batch].astype(np.float32))
+        for first in range(0, len(samples), batch)
+    ]
+    return dataclasses.replace(slide, signals={TOPIC: signals}, states=[state])
+
+
+def test_a_slide_is_degraded_as_a_whole_though_it_came_in_batches() -> None:
+    time_s = np.arange(4400) / 2200.0
+    slide = slide_signals(np.sin(2 * np.pi * 100.0 * time_s)[:, None], 2200.0, batch=44)
+    slower = degraded(slide, DEGRADATIONS['slower than trained'], 0.5, RATE_HZ, np.random.default_rng(0))
+    [signal] = slower.signals[TOPIC]
+    assert (signal.sampling_rate_hz, signal.samples.shape) == (RATE_HZ, (2000, 1))
+    expected = np.sin(2 * np.pi * 50.0 * np.arange(2000) / RATE_HZ)
+    np.testing.assert_allclose(signal.samples[100:-100, 0], expected[100:-100], atol=0.01)
+
+
+def test_recipes_of_the_same_features_count_the_same_windows_and_lost_ones_are_not_cut() -> None:
+    rng = np.random.default_rng(0)
+    slides = [
+        dataclasses.replace(item, surface=name, exploration_id=f'{name}/{number}', number=number)
+        for name, size in (('weak', 1.0), ('strong', 5.0))
+        for number in range(3)
+        for item in [slide_signals(size * rng.normal(size=(2000, 1)), RATE_HZ, 2000)]
+    ]
+    recipes = [
+        comparable(with_channels(load_recipe(name), 'fast'), RATE_HZ, of_motion=False)
+        for name in ('kaboli-pa', 'kaboli-em')
+    ]
+    trained_models = TrainedModels.trained(recipes, slides)
+    assert trained_models.counts(slides)['kaboli-pa'] == (24, 24)
+    assert {count.cut for count in trained_models.counts(slides, 0.5).values()} == {24}
+    holed = [degraded(item, DEGRADATIONS['lost samples'], 0.05, RATE_HZ, rng) for item in slides]
+    assert trained_models.counts(holed)['kaboli-pa'].cut < 12
+
+
+@pytest.mark.parametrize('name', CONDITIONS)
+def test_simulated_slides_have_windows_and_differ_from_those_trained(name: str) -> None:
+    condition = CONDITIONS[name]
+    few = {surface: load_scene(SCENE).surfaces[surface] for surface in ('leather', 'ridge_2mm_deep')}
+
+    def touch_conditions(how: TouchConditions) -> list[np.ndarray]:
+        scene = dataclasses.replace(how.scene, surfaces={name: how.scene.surfaces[name] for name in few})
+        how = dataclasses.replace(how, scene=scene, sliding=dataclasses.replace(how.sliding, duration_s=0.5))
+        slides = simulate_slide_signals(how, len(how.fingers), np.random.default_rng(0))
+        recipe = load_recipe('fast')
+        return [vector.values for _, own in SlideDataset(tuple(slides)).vectors(recipe.feature_set) for vector in own]
+
+    otherwise = condition.touch_conditions(condition.strengths[-1])
+    usual, worst = touch_conditions(_sticking(1.0) if name == 'stick-slip' else _usual()), touch_conditions(otherwise)
+    assert (len(usual), len(worst)) == (2, 2 * len(otherwise.fingers))
+    assert max(np.abs(values - usual[0]).max() for values in worst[: len(otherwise.fingers)]) > 0.1
+
+
+def test_tables_show_where_each_recipe_breaks_down() -> None:
+    recipes = {
+        'fast': {'window_accuracy': [0.9, 0.8, 0.5], 'breakdown': 1.25},
+        'kaboli-pa': {'window_accuracy': [0.3, 0.3, 0.29], 'breakdown': None},
+    }
+    panels = {'noise': {'strength': 'rms', 'strengths': [0.0, 1.0, 2.0], 'slides': 'recorded', 'recipes': recipes}}
+    assert robustness_tables(panels).splitlines()[-2:] == ['| `fast` | 90.0 % | 1.25 |', '| `kaboli-pa` | 30.0 % | – |']
+
+
+def test_the_page_shows_what_the_bench_measured() -> None:
+    numbers = json.loads((DOCS / 'charts' / 'robustness.json').read_text())['numbers']
+    assert robustness_tables(numbers) == (DOCS / 'charts' / 'robustness.md').read_text()
+
+
+@pytest.mark.benchmark
+@pytest.mark.skipif(not DATA.is_dir(), reason=f'no recorded data in {DATA}; set TEXTURE_DATA to its folder')
+def test_noise_breaks_what_was_trained_without_it(tmp_path: Path) -> None:
+    result = BENCHMARKS['robustness'](BenchmarkOptions(tmp_path, DATA, quick=True))
+    assert set(result.numbers) < {*DEGRADATIONS, LATER, *CONDITIONS}
+    assert {found['slides'] for found in result.numbers.values()} == {'recorded', 'simulated'}
+    own = result.numbers['white noise']['recipes']['peaks-naive-bayes']
+    assert own['window_accuracy'][0] > own['window_accuracy'][-1]
+    assert '| `peaks-naive-bayes` |' in (tmp_path / 'robustness.md').read_text()

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sensor_rig import CASES, Feed, Rig
 
-from texture_benchmarks.load.rig import Rig
-from texture_benchmarks.load.rig_cases import CASES, Feed
 from texture_core.signal import lost_samples
 from texture_simulation.devices.daq import EmulatedDaq
 from texture_simulation.devices.faults import ByteFaults, FrameFaults

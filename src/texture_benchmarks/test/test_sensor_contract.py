@@ -10,9 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sensor_rig import CASES, Rig
 
-from texture_benchmarks.load.rig import Rig
-from texture_benchmarks.load.rig_cases import CASES
 from texture_core.errors import DeviceError
 from texture_core.signal import lost_samples
 from texture_drivers.catalogue import SENSORS

@@ -10,10 +10,9 @@ from typing import Any
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.lifecycle import TransitionCallbackReturn
+from sensor_rig import CASES, Rig
 from texture_msgs import msg
 
-from texture_benchmarks.load.rig import Rig
-from texture_benchmarks.load.rig_cases import CASES
 from texture_core.errors import InvalidParameter
 from texture_core.ros.local_graph import LocalGraph
 from texture_core.ros.qos import SENSOR_QOS

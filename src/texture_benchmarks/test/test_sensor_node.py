@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
+from sensor_rig import CASES, Rig, biotac
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
-from texture_benchmarks.load.rig import Rig
-from texture_benchmarks.load.rig_cases import CASES, biotac
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.local_graph import LocalGraph

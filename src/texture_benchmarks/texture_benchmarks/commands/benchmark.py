@@ -8,15 +8,14 @@ import time
 from functools import partial
 from pathlib import Path
 
-from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
-from texture_benchmarks.imported_data import importing_once
-from texture_benchmarks.result import BenchmarkOptions
-from texture_benchmarks.run_all import IMPORTED, LONG, run_all
+from texture_benchmarks.catalogue import BENCHMARKS, LONG, run_all, run_benchmark
+from texture_benchmarks.study import BenchmarkOptions, importing_once
 from texture_core.command_options import add_seed
 from texture_core.errors import InvalidData, InvalidParameter
 
 ALL = 'all'
 NO_DATA = 3  # exit code of a process
+IMPORTED = ('biotac20', 'ntp21')  # what many of them read is imported once
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -32,9 +31,6 @@ def configure(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--quick', action='store_true', help='fewer repetitions; not for publishing')
     parser.add_argument('--long', action='store_true', help=f'with {ALL}: also {", ".join(sorted(LONG))}')
-    parser.add_argument(
-        '--duration', type=float, default=30.0, metavar='S', help='length of the long measurement of `load`, s'
-    )
     parser.add_argument(
         '--recipe',
         nargs='+',
@@ -69,7 +65,6 @@ def run(options: argparse.Namespace) -> int:
         options.data,
         options.seed,
         options.quick,
-        options.duration,
         own_methods=(*options.recipe, *options.estimator),
         own_bags=tuple(options.bags),
     )
@@ -101,5 +96,5 @@ def _run_to_exit_code(name: str, benchmark_options: BenchmarkOptions) -> int:
 def _run_one(name: str, benchmark_options: BenchmarkOptions) -> None:
     began_s = time.monotonic()
     result, path = run_benchmark(name, benchmark_options)
-    took = f'{name}, {time.monotonic() - began_s:.0f} s: {result.measured}'
+    took = f'{name}, {time.monotonic() - began_s:.0f} s: {(result.measured or name).splitlines()[0]}'
     print('\n  '.join([took, *map(str, (path, *result.charts))]), flush=True)

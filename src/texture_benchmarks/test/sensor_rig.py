@@ -1,0 +1,261 @@
+"""A sensor on its emulated device, whose samples encode their own index, so that every fault is detected."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import AnyArray
+from texture_core.errors import DeviceError
+from texture_core.protocols import Sensor
+from texture_core.signal import NANOSECONDS, TactileSignal
+from texture_drivers.catalogue import SENSORS
+from texture_drivers.params import SensorParams
+from texture_simulation.devices.catalogue import DEVICES
+from texture_simulation.devices.device import EmulatedDevice
+
+DAQ = '{channels: [' + ', '.join(f'{{name: c{i}, unit: count}}' for i in range(8)) + ']}'
+Feed = Callable[[Any, int, int], None]
+
+
+@dataclass(frozen=True)
+class RigCase:
+    """How a device is fed, and how what arrives is to be read.
+
+    Sample i of `topic` holds `slope` · i and a constant, modulo `modulus`.
+    """
+
+    topic: str  # The fast one
+    # ticks_per_s, samples_per_tick: how often the device is fed, and how many samples that makes
+    ticks_per_s: float
+    samples_per_tick: int
+    feed: Feed  # Called with the device, the first tick and the number of ticks
+    # Unit of each topic that must come: one for all of its channels, or one for each
+    units: Mapping[str, str | tuple[str, ...]]
+    modulus: int
+    slope: int = 1
+    config: str = ''  # Settings of the sensor, so that it publishes counts
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second on `topic`."""
+        return self.ticks_per_s * self.samples_per_tick
+
+
+def feed_tsf85(shape: tuple[int, ...]) -> Feed:
+    """Return what feeds a TSF-85 with images of a shape; for two fingers both feel the same."""
+
+    def feed(device: Any, first: int, ticks: int) -> None:
+        numbers = np.arange(first, first + ticks) % 1000
+        dynamic = np.repeat(numbers[:, None], 2, axis=1) if len(shape) == 2 else numbers
+        device.advance(dynamic.astype(np.int16), np.full((1, *shape), first % 1000, dtype=np.uint16))
+
+    return feed
+
+
+def feed_biotac(slots: int, fingers: int) -> Feed:
+    """Return what feeds a board with frames of so many slots."""
+
+    def feed(device: Any, first: int, ticks: int) -> None:
+        numbers = np.arange(first * slots, (first + ticks) * slots) % 4096
+        device.advance(np.repeat(numbers[:, None], fingers, axis=1).astype(np.uint16).reshape(ticks, slots, fingers))
+
+    return feed
+
+
+def feed_alike(channels: int, kind: type[np.generic]) -> Feed:
+    """Return what feeds so many channels alike, with numbers of this type."""
+
+    def feed(device: Any, first: int, ticks: int) -> None:
+        numbers = np.arange(first, first + ticks) % 30_000
+        device.sample(np.outer(numbers, np.ones(channels)).astype(kind))
+
+    return feed
+
+
+def feed_pvdf(device: Any, first: int, ticks: int) -> None:
+    """Feed the film, and the force with every 64th tick."""
+    numbers = np.arange(first, first + ticks)
+    device.sample((numbers % 30_000).astype(np.int16), (numbers[numbers % 64 == 0] // 64 % 30_000).astype(np.int16))
+
+
+def feed_papillarray(arrays: int) -> Feed:
+    """Return what feeds a hub with so many arrays; it samples four times as often as it sends."""
+
+    def feed(device: Any, first: int, ticks: int) -> None:
+        numbers = np.repeat(np.arange(first, first + ticks) % 30_000, 4)
+        device.sample(np.broadcast_to(numbers[:, None, None, None], (4 * ticks, arrays, 9, 6)).astype(np.float64))
+
+    return feed
+
+
+def tsf85(prefix: str = '', shape: tuple[int, ...] = (28,)) -> RigCase:
+    """Return how a TSF-85 is fed."""
+    imu = ('m/s²',) * 3 + ('rad/s',) * 3
+    units: dict[str, str | tuple[str, ...]] = {
+        f'{prefix}signal': 'count',
+        f'{prefix}signal_static': 'count',
+        f'{prefix}imu': imu,
+    }
+    return RigCase(f'{prefix}signal', 1000.0, 1, feed_tsf85(shape), units, 1000)
+
+
+def biotac(prefix: str = '', slots: int = 44, fingers: int = 1) -> RigCase:
+    """Return how a BioTac is fed."""
+    units: dict[str, str | tuple[str, ...]] = {f'{prefix}signal': 'count', f'{prefix}signal_static': 'count'}
+    return RigCase(f'{prefix}signal', 4400 / slots, slots // 2, feed_biotac(slots, fingers), units, 4096, slope=2)
+
+
+def papillarray(prefix: str = '', arrays: int = 1) -> RigCase:
+    """Return how a hub of PapillArrays is fed."""
+    units: dict[str, str | tuple[str, ...]] = {
+        f'{prefix}signal': (*('N',) * 3, *('mm',) * 3) * 9,
+        f'{prefix}wrench': (*('N',) * 3, *('N mm',) * 3),
+    }
+    feed = feed_papillarray(arrays)
+    return RigCase(f'{prefix}signal', 250.0, 1, feed, units, 30_000, config='{rate_hz: 250}')
+
+
+CASES: Mapping[str, RigCase] = {
+    'tsf85': tsf85(),
+    'tsf85_pair': tsf85('finger1/', (2, 28)),
+    'tsf85_3x4': tsf85(shape=(12,)),
+    'biotac': biotac(),
+    'biotac_sp': biotac(slots=54),
+    'biotac_hand': biotac('finger2/', fingers=3),
+    'daq': RigCase('signal', 2500.0, 1, feed_alike(8, np.int16), {'signal': 'count'}, 30_000, config=DAQ),
+    'pvdf': RigCase(
+        'signal', 4096.0, 1, feed_pvdf, {'signal': 'pC', 'signal_static': 'N'}, 30_000,
+        config='{film_gain_pc: 1.0, force_gain_n: 1.0}',
+    ),
+    'anyskin': RigCase(
+        'signal', 250.0, 1, feed_alike(15, np.float64), {'signal': 'µT', 'temperature': '°C'}, 30_000,
+        config='{rate_hz: 250.0, temperature: true}',
+    ),
+    'papillarray': papillarray(),
+    'papillarray_pair': papillarray('finger1/', 2),
+}  # fmt: skip
+
+DEADLINE_S = 30.0
+STEP_S = 0.003
+MAX_TICKS_PER_S = 5000.0  # beyond this rate as many
+MAX_AT_ONCE_S = 0.04  # after a stall of the machine the line's buffer must not run over
+
+
+class Rig:
+    """A device, its driver, and the time that passes for the device; usable as a context manager."""
+
+    def __init__(
+        self,
+        name: str,
+        link: Path,
+        pace: float = 1.0,
+        case: RigCase | None = None,
+        device: EmulatedDevice | None = None,
+    ) -> None:
+        self.case = case or CASES[name]
+        self.link = link
+        self.device = device or DEVICES[name](link, np.random.default_rng(0))
+        self.device.plug()
+        self.start_ns = time.time_ns()
+        self._name = name
+        self._pace = pace
+        self.sensor: Sensor = self.another()
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='rig', daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> Rig:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def another(self) -> Sensor:
+        """Return another driver for the same device."""
+        return SENSORS[self._name](SensorParams(device=str(self.link), config=self.case.config), time.time_ns)
+
+    def close(self) -> None:
+        """Close the sensor and unplug the device."""
+        self.sensor.close()
+        self._stop.set()
+        self._thread.join()
+        self.device.unplug()
+
+    def _run(self) -> None:
+        done, most = 0, max(1, round(MAX_AT_ONCE_S * min(self.case.ticks_per_s, MAX_TICKS_PER_S)))
+        while not self._stop.wait(STEP_S):
+            due = int((time.time_ns() - self.start_ns) / NANOSECONDS * self.case.ticks_per_s * self._pace)
+            ticks = min(due - done, most)
+            if ticks > 0:
+                with self._lock:
+                    self.case.feed(self.device, done, ticks)
+                done += ticks
+
+    def set(self, **switches: Any) -> None:
+        """Throw switches of the device."""
+        with self._lock:
+            for name, value in switches.items():
+                setattr(self.device, name, value)
+
+    def run_locked(self, action: Callable[[], None]) -> None:
+        """Do something to the device between two of its steps."""
+        with self._lock:
+            action()
+
+    def read_s(self, seconds: float) -> dict[str, list[TactileSignal]]:
+        """Return, by topic, what comes until so many seconds of samples have; a device that is gone is opened again."""
+        topics: dict[str, list[TactileSignal]] = {}
+        deadline_s = time.monotonic() + DEADLINE_S
+        while sum(len(batch.samples) for batch in topics.get(self.case.topic, [])) < seconds * self.case.rate_hz:
+            if time.monotonic() > deadline_s:
+                raise TimeoutError(f'{self._name}: the samples did not come')
+            for topic, batches in self._read().items():
+                topics.setdefault(topic, []).extend(batches)
+        return topics
+
+    def signal_s(self, seconds: float) -> list[TactileSignal]:
+        """Return the batches of the first topic alone."""
+        return self.read_s(seconds)[self.case.topic]
+
+    def _read(self) -> Mapping[str, Sequence[TactileSignal]]:
+        try:
+            return self.sensor.read()
+        except DeviceError:
+            self.sensor.close()
+        with contextlib.suppress(DeviceError):
+            self.sensor.open()
+        return {}
+
+    def fault(self) -> str:
+        """Return the sentence with which reading ends."""
+        deadline_s = time.monotonic() + DEADLINE_S
+        try:
+            while time.monotonic() < deadline_s:
+                self.sensor.read()
+        except DeviceError as error:
+            return str(error)
+        raise TimeoutError(f'{self._name}: no error came')
+
+    def offsets(self, batches: Sequence[TactileSignal]) -> AnyArray:
+        """Return what each finite sample holds less what its index asks for: constant if each is in its place."""
+        values = np.concatenate([batch.samples[:, 0] for batch in batches])
+        indices = np.concatenate([np.arange(batch.first_sample, batch.next_sample) for batch in batches])
+        offsets: AnyArray = (values - self.case.slope * indices) % self.case.modulus
+        finite: AnyArray = offsets[np.isfinite(values)]
+        return finite
+
+    def lateness_s(self, batch: TactileSignal) -> float:
+        """Return by how much a stamp is later than its sample was taken."""
+        samples = (batch.stamp_ns - self.start_ns) / NANOSECONDS * self.case.rate_hz
+        turn = self.case.modulus / self.case.slope
+        late = samples - float(batch.samples[0, 0]) / self.case.slope
+        return ((late + turn / 2) % turn - turn / 2) / self.case.rate_hz

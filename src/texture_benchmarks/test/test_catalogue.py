@@ -1,0 +1,97 @@
+import os
+import re
+import signal
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from texture_benchmarks import catalogue
+from texture_benchmarks.catalogue import BENCHMARKS, LONG, SIDE_BY_SIDE, in_processes, run_all
+from texture_benchmarks.commands import benchmark as command
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
+from texture_bringup.command import main
+from texture_core.errors import InvalidData
+
+NAMES = ('good', 'killed', 'bad', 'clock', 'missing')
+
+
+def act(name: str, folder: Path) -> int:
+    if name == 'killed':
+        os.kill(os.getpid(), signal.SIGKILL)
+    if name == 'bad':
+        raise ValueError('deliberately, for the test')
+    (folder / name).touch(exist_ok=False)
+    return 3 if name == 'missing' else 0
+
+
+def test_one_that_fails_or_is_killed_stops_no_other(tmp_path: Path) -> None:
+    for at_once in (1, 3):
+        folder = tmp_path / str(at_once)
+        folder.mkdir()
+        codes = in_processes(NAMES, partial(act, folder=folder), at_once)
+        assert codes == {'good': 0, 'killed': -signal.SIGKILL, 'bad': 1, 'clock': 0, 'missing': 3}
+
+
+def test_all_run_once_whether_side_by_side_or_alone(tmp_path: Path) -> None:
+    assert run_all(['good', 'clock'], partial(act, folder=tmp_path)) == {'clock': 0, 'good': 0}
+    assert {path.name for path in tmp_path.iterdir()} == {'good', 'clock'}
+
+
+def test_every_benchmark_has_its_line_on_the_page_and_what_is_scheduled_exists() -> None:
+    assert {*SIDE_BY_SIDE, *LONG} < set(BENCHMARKS)
+    page = (Path(__file__).resolve().parents[3] / 'docs' / 'benchmarks.md').read_text()
+    assert re.findall(r'^\| `(\w+)` \|', page, re.MULTILINE) == list(BENCHMARKS)
+
+
+def good(benchmark: BenchmarkOptions) -> BenchmarkResult:
+    return BenchmarkResult('good', 'nothing', 'none', 'none', {})
+
+
+def bad(benchmark: BenchmarkOptions) -> BenchmarkResult:
+    raise ArithmeticError('deliberately, for the test')
+
+
+def missing(benchmark: BenchmarkOptions) -> BenchmarkResult:
+    raise InvalidData("no recorded data in 'no folder'")
+
+
+@pytest.fixture
+def benches(monkeypatch: pytest.MonkeyPatch) -> dict:
+    benches = {'missing': missing, 'recipes': good, 'good': good}
+    monkeypatch.setattr(command, 'BENCHMARKS', benches)
+    monkeypatch.setattr(catalogue, 'BENCHMARKS', benches)
+    return benches
+
+
+def test_all_go_on_when_data_is_missing_and_what_takes_long_runs_when_asked_for(benches, tmp_path: Path, capfd) -> None:
+    assert set(LONG) > {'recipes'}
+    for more, count in (([], 1), (['--long'], 2)):
+        assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path), *more]) == 0
+        said = capfd.readouterr().out
+        assert f'{count} benchmarks in ' in said
+        assert "missing: left out: no recorded data in 'no folder'" in said
+        assert 'left out, for their data is missing: missing; failed: none' in said
+
+
+def test_all_go_on_when_one_fails_and_the_command_ends_with_1(benches, tmp_path: Path, capfd) -> None:
+    benches['clock'] = bad
+    benches['last'] = good
+    assert main(['benchmark', 'all', '--out', str(tmp_path), '--data', str(tmp_path)]) == 1
+    said = capfd.readouterr()
+    assert '2 benchmarks in ' in said.out
+    assert 'failed: clock' in said.out
+    assert 'deliberately' in said.err
+    assert (tmp_path / 'good.json').is_file()
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [(['benchmark', 'recips'], "did you mean 'recipes'?"), (['benchmark', 'recipes', '--quick'], '--data')],
+)
+def test_a_mistake_is_answered_with_one_sentence_and_exit_code_2(arguments, sentence, capsys, monkeypatch) -> None:
+    monkeypatch.delenv('TEXTURE_DATA', raising=False)
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert sentence in said
+    assert said.count('\n') == 1

@@ -1,0 +1,41 @@
+from pathlib import Path
+
+import pytest
+
+from texture_benchmarks.catalogue import BENCHMARKS, run_benchmark
+from texture_benchmarks.study import BenchmarkOptions
+from texture_core.errors import InvalidData, UnknownName
+
+pytestmark = pytest.mark.realtime
+
+
+def test_an_unknown_benchmark_and_missing_data_are_refused_with_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="did you mean 'latency'"):
+        run_benchmark('latancy', BenchmarkOptions(tmp_path))
+    for data in (None, tmp_path):
+        with pytest.raises(InvalidData, match='no recorded data'):
+            BENCHMARKS['recipes'](BenchmarkOptions(tmp_path, data))
+
+
+@pytest.mark.benchmark
+@pytest.mark.ros
+def test_every_window_is_answered_through_the_graph(tmp_path: Path) -> None:
+    result, path = run_benchmark('latency', BenchmarkOptions(tmp_path, quick=True))
+    assert path.is_file()
+    assert all(chart.is_file() for chart in result.charts)
+    for recipe in ('default', 'vibration-and-taxels'):
+        dds = result.numbers[recipe]['dds']
+        assert dds['estimates'] == dds['expected']
+        assert 0 < dds['median_ms'] <= dds['p99_ms'] <= dds['longest_ms']
+        assert result.numbers[recipe]['cpu_percent']['all'] > 0
+
+
+@pytest.mark.benchmark
+@pytest.mark.ros
+def test_every_finger_of_a_hand_is_answered_through_the_graph(tmp_path: Path) -> None:
+    result, _ = run_benchmark('hand', BenchmarkOptions(tmp_path, quick=True))
+    row = result.numbers['default']
+    # Two fingers slide for 3 s: windows of 0.5 s every 0.1 s make 26 each.
+    assert row['estimates'] == row['expected'] == 52
+    assert 0 < row['median_ms'] <= row['p99_ms'] <= row['longest_ms']
+    assert row['cpu_percent']['all'] > 0

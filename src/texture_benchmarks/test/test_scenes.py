@@ -1,0 +1,109 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from texture_benchmarks.catalogue import BENCHMARKS
+from texture_benchmarks.scenes import (
+    ADDED,
+    FRICTION,
+    PATCH,
+    TOUCH_PROTOCOLS,
+    MeanDifference,
+    TermEffect,
+    TouchProtocol,
+    ablate,
+    completed,
+    extract_features,
+    simulate_features,
+    variants,
+    with_one_more,
+)
+from texture_benchmarks.study import BenchmarkOptions
+from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.effects.noise import Noise
+from texture_simulation.scene import Scene, load_scene, scene_from
+
+TOUCHING = TouchProtocol((0.1,), (1.0, 8.0), duration_s=0.2)
+
+
+def two_ridges(**effects: dict) -> Scene:
+    surfaces = {
+        name: [{'kind': 'grating', 'pitch_m': 2e-3, 'depth_m': depth}] for name, depth in (('a', 4e-6), ('b', 6e-6))
+    }
+    return scene_from('ridges', {'surfaces': surfaces, 'effects': effects})
+
+
+def test_every_band_holds_the_power_of_its_frequencies() -> None:
+    time_s = np.arange(1000) / 1000
+    tones = np.stack([np.sin(2 * np.pi * hertz * time_s) for hertz in (20.0, 200.0)])[..., None]
+    bands = extract_features(tones, 1000.0)
+    edges_hz = np.geomspace(5.0, 500.0, bands.shape[1] + 1)
+    for band, hertz in zip(bands.argmax(axis=1), (20.0, 200.0), strict=True):
+        assert edges_hz[band] - 2 <= hertz <= edges_hz[band + 1] + 2
+
+
+def test_a_term_that_decides_is_found_and_one_that_does_nothing_is_idle() -> None:
+    scene = two_ridges(noise={'fast_count': 300.0}, drift={'count_per_sqrt_s': 1e-6})
+    term_effects = {term_effect.term: term_effect for term_effect in ablate(scene, TOUCHING, 80, 4, 0).term_effects}
+    assert term_effects['noise'].easier.mean > 0.05
+    assert term_effects['noise'].verdict == 'decides'
+    assert abs(term_effects['drift'].unprepared.mean) < 0.05
+
+
+def test_what_grows_with_the_force_stays_at_its_mean_when_removed_and_comes_back_the_same(monkeypatch) -> None:
+    scene = two_ridges(patch_growth={})
+    removed = variants(scene, TOUCHING)['patch_growth']
+    assert removed.contact.blur_m == pytest.approx(scene.contact.blur_m * 4.5 ** (1 / 3))
+    monkeypatch.setattr('texture_benchmarks.scenes.REMOVED_EFFECTS', {'ridges': dict(scene.effects)})
+    again = completed(removed, TOUCHING)
+    assert again.effects == scene.effects
+    assert again.contact.blur_m == pytest.approx(scene.contact.blur_m)
+
+
+def test_friction_and_the_patch_filter_can_be_removed_as_effects_can() -> None:
+    scene = load_scene('sticky')
+    others = variants(scene, TOUCH_PROTOCOLS['sticky'])
+    assert set(others) == {*scene.effects, PATCH, FRICTION}
+    assert all(surface.friction is None for surface in others[FRICTION].surfaces.values())
+    assert others[PATCH].contact.blur_m < scene.contact.blur_m
+
+
+def test_slides_follow_from_the_seed_and_are_dealt_out_to_fingers() -> None:
+    scene = replace(two_ridges(), effects={'noise': Noise(5.0)})
+    first, again, other = (simulate_features(scene, TOUCHING, 3, seed, (0, 1)) for seed in ([1], [1], [2]))
+    assert np.array_equal(first[0], again[0])
+    assert not np.array_equal(first[0], other[0])
+    assert first[1].tolist() == [0] * 6 + [1] * 6
+
+
+def test_a_difference_matters_if_it_is_certain_and_large() -> None:
+    assert MeanDifference(0.02, 0.01).matters
+    assert not MeanDifference(0.02, 0.03).matters
+    assert not MeanDifference(0.002, 0.001).matters
+    nothing = MeanDifference(0.0, 0.005)
+    assert TermEffect('quiet', nothing, nothing, MeanDifference(-0.1, 0.01)).verdict == 'idle'
+    assert TermEffect('loud', nothing, MeanDifference(-0.1, 0.01), nothing).verdict == 'decides'
+    assert TermEffect('unclear', MeanDifference(0.003, 0.05), nothing, nothing).verdict == 'open'
+
+
+def test_every_effect_is_named_by_a_scene_or_measured_by_itself() -> None:
+    scenes_of_all = [completed(load_scene(name), touch_protocol) for name, touch_protocol in TOUCH_PROTOCOLS.items()]
+    named = {effect for scene in scenes_of_all for effect in scene.effects}
+    assert named | set(ADDED) == set(EFFECTS)
+    assert not named & set(ADDED)
+    assert {name for scene in with_one_more(two_ridges()).values() for name in scene.effects} == set(ADDED)
+
+
+@pytest.mark.benchmark
+def test_scenes_are_cheap_and_every_term_is_weighed(tmp_path: Path) -> None:
+    result = BENCHMARKS['scenes'](BenchmarkOptions(tmp_path, quick=True))
+    numbers = result.numbers
+    assert result.write(tmp_path).is_file()
+    assert all(drawn.is_file() for drawn in result.charts)
+    assert numbers['scan_ms']['ets_linear']['together_ms'] < 10 * numbers['target_ms']['without stick-slip']
+    assert set(load_scene('ets_linear').effects) < set(numbers['terms']['ets_linear'])
+    assert set(numbers['added']) == set(ADDED)

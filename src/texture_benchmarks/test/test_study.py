@@ -1,0 +1,164 @@
+"""What studies share: data sets imported once, work on all cores, charts with names."""
+
+import math
+import threading
+from itertools import combinations
+from pathlib import Path
+
+import matplotlib.image
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info
+
+from texture_benchmarks import study
+from texture_benchmarks.study import BenchmarkOptions, decided_at, imported, importing_once, map_forked
+from texture_core.errors import InvalidData
+from texture_core.estimates import TextureEstimate
+from texture_evaluation.metrics import SlideResult
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list:
+    """Return what is asked of an importer of one bag a material, for the data set 'wool', which is there."""
+    calls = []
+
+    def importer(source: Path, out: Path, slides: str = '', materials: tuple[str, ...] = ()) -> list[Path]:
+        calls.append((source.name, slides, materials))
+        bags = [Path(out) / name for name in materials or ('a', 'b')]
+        for bag in bags:
+            bag.mkdir(parents=True)
+        return bags
+
+    monkeypatch.setattr(study, 'IMPORTS', {'wool': importer, 'cork': importer})
+    (tmp_path / 'wool').mkdir()
+    return calls
+
+
+def test_all_that_run_together_get_the_same_bags(asked, tmp_path: Path) -> None:
+    with importing_once(BenchmarkOptions(tmp_path, tmp_path), ('wool', 'cork')) as options:
+        for _ in range(2):
+            with imported(options, 'wool') as bags:
+                assert [bag.name for bag in bags] == ['a', 'b']
+                assert all(bag.is_dir() for bag in bags)
+    assert asked == [('wool', '', ())]
+    assert not bags[0].exists()
+
+
+def test_a_part_is_imported_for_itself_and_so_is_what_one_benchmark_needs_alone(asked, tmp_path: Path) -> None:
+    options = BenchmarkOptions(tmp_path, tmp_path)
+    with importing_once(options, ('wool',)) as sharing, imported(sharing, 'wool', '1-3', ('b',)) as bags:
+        assert [bag.name for bag in bags] == ['b']
+    with imported(options, 'wool') as bags:
+        assert len(bags) == 2
+    assert not bags[0].exists()
+    assert asked == [('wool', '', ()), ('wool', '1-3', ('b',)), ('wool', '', ())]
+
+
+def test_what_is_missing_is_reported_by_the_benchmark_that_needs_it(asked, tmp_path: Path) -> None:
+    for data in (tmp_path, None):
+        with (
+            importing_once(BenchmarkOptions(tmp_path, data), ('cork',)) as options,
+            pytest.raises(InvalidData, match='cork/ with --data'),
+            imported(options, 'cork'),
+        ):
+            pass
+    assert asked == []
+
+
+def test_a_damaged_data_set_stops_no_benchmark_but_those_that_need_it(asked, monkeypatch, tmp_path: Path) -> None:
+    good = study.IMPORTS['wool']
+
+    def damaged(source: Path, out: Path, *_: object) -> list[Path]:
+        (Path(out) / 'half').mkdir(parents=True)
+        raise InvalidData('it is no file of this data set')
+
+    monkeypatch.setattr(study, 'IMPORTS', {'cork': damaged, 'wool': good})
+    (tmp_path / 'cork').mkdir()
+    with importing_once(BenchmarkOptions(tmp_path, tmp_path), ('cork', 'wool')) as options:
+        with imported(options, 'wool') as bags:
+            assert len(bags) == 2
+        with pytest.raises(InvalidData, match='no file of this data set'), imported(options, 'cork'):
+            pass
+
+
+def test_a_quick_run_imports_its_parts_alone(asked, tmp_path: Path) -> None:
+    with importing_once(BenchmarkOptions(tmp_path, tmp_path, quick=True), ('wool',)):
+        pass
+    assert asked == []
+
+
+def test_each_job_is_done_in_its_place_with_what_could_not_be_sent() -> None:
+    lock = threading.Lock()  # pickle refuses it
+    assert map_forked(lambda job: (job * job, lock.locked()), range(5)) == [(job * job, False) for job in range(5)]
+
+
+def test_an_error_of_a_job_is_the_error_of_all() -> None:
+    def work(job):
+        if job == 1:
+            raise InvalidData('job 1 has no slides')
+        return job
+
+    with pytest.raises(InvalidData, match='job 1 has no slides'):
+        map_forked(work, [0, 1, 2])
+
+
+def test_linear_algebra_keeps_to_one_thread_in_each() -> None:
+    def threads(_job):
+        np.ones((2, 2)) @ np.ones((2, 2))
+        return {pool['num_threads'] for pool in threadpool_info() if pool['user_api'] == 'blas'}
+
+    assert map_forked(threads, [0]) == [{1}]
+
+
+# Cost and share; the first three are the front.
+VALUES = [(100.0, 0.70), (130.0, 0.72), (450.0, 0.95), (440.0, 0.50), (445.0, 0.49), (2000.0, 0.60)]
+FRONT = [0, 1, 2]
+
+
+def test_every_method_of_the_front_has_its_name() -> None:
+    assert set(FRONT) <= set(study._named(VALUES, FRONT))
+
+
+def test_no_name_lies_on_another_or_on_a_point() -> None:
+    places = study._named(VALUES, FRONT)
+    assert 5 in places  # far from all others
+    assert not any(study._covers(one, other, study.LABEL_DECADES) for one, other in combinations(places.values(), 2))
+
+
+def test_no_name_leaves_the_chart_on_the_left() -> None:
+    crowded = [(50.0, 0.17), (55.0, 0.18), (72.0, 0.20), (80.0, 0.15)]
+    starts = [start for start, _ in study._named(crowded, [0]).values()]
+    assert min(starts) >= math.log10(50.0) - study.ROOM_DECADES
+
+
+def test_at_most_ten_methods_are_named() -> None:
+    many = [(10.0 ** (2 + 0.5 * column), 0.05 + 0.1 * row) for row in range(9) for column in range(4)]
+    assert len(study._named(many, [])) == study.DIRECT_LABELS
+
+
+def test_a_method_of_ones_own_is_named_even_where_its_name_covers_another_point() -> None:
+    crowded = [(100.0 + number, 0.70 + 0.002 * number) for number in range(12)]
+    assert 5 not in study._named(crowded, [11])
+    assert 5 in study._named(crowded, [11], always=[5])
+
+
+def test_the_evidence_chart_is_drawn_without_a_display(tmp_path: Path) -> None:
+    line = (np.array([0.5, 1.0]), np.array([0.8, 0.9]))
+    drawn = study.evidence_chart({f'm{k}': line for k in range(9)}, 'title', tmp_path / 'e.png')
+    assert matplotlib.image.imread(drawn).std() > 0
+
+
+def slide(surface: str, decisions: str, confidences: tuple[float, ...]) -> SlideResult:
+    """Return a slide whose windows of 0.5 s every 0.1 s decide letter by letter."""
+    estimates = [
+        TextureEstimate(0, 'e', label, True, confidences[k], windows=k + 1, evidence_s=0.5 + 0.1 * k)
+        for k, label in enumerate(decisions)
+    ]
+    return SlideResult(surface, list(decisions), estimates)
+
+
+def test_slides_end_at_a_confidence_or_go_on_to_their_end() -> None:
+    growing = [slide('a', 'baa', (0.5, 0.7, 0.9)), slide('b', 'abb', (0.6, 0.6, 0.6))]
+    seconds, shares = decided_at(growing, (0.5, 0.7, 0.99))
+    np.testing.assert_allclose(seconds, [0.5, 0.65, 0.7])
+    np.testing.assert_array_equal(shares, [0.0, 1.0, 1.0])

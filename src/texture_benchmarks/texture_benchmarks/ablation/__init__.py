@@ -1,1 +1,0 @@
-"""Benchmark: features, numbers, units and channels."""

@@ -1,1 +1,0 @@
-"""Benchmark: 20 recorded materials."""

@@ -1,1 +1,0 @@
-"""Benchmark: stamps in spite of late arrivals and drift."""

@@ -1,1 +1,0 @@
-"""Benchmark: early decisions, calibration, prediction sets and unknown surfaces."""

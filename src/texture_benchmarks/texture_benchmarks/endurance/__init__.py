@@ -1,1 +1,0 @@
-"""Endurance: hours of explorations on the emulator while faults is injected at random."""

@@ -1,1 +1,0 @@
-"""What an endurance run needs of a running ROS graph."""

@@ -1,1 +1,0 @@
-"""Benchmark: computing time of each feature."""

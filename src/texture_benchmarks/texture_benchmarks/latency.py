@@ -1,0 +1,161 @@
+"""How long from the last sample of a window to its estimate: in one process, through the nodes, and with a hand."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, histogram_chart
+from texture_core.arrays import Array
+from texture_estimation.model import TextureModel
+from texture_evaluation.evaluate import run_model
+from texture_evaluation.train import train_from_bags
+from texture_features.windowing.windows import WindowEvent
+from texture_recordings.slide_dataset import SlideDataset
+from texture_simulation.scene import load_scene
+from texture_simulation.simulated_bags import SlidePlan, write_simulated
+
+if TYPE_CHECKING:
+    from texture_benchmarks.ros.graph import LiveLatency
+
+RECIPES = ('default', 'vibration-and-taxels')
+CLASSES = 10
+PASSES = 8  # over the test slides
+PLAN, QUICK_PLAN = SlidePlan(slides=20, slide_s=3.0), SlidePlan(slides=3, slide_s=1.5)
+LIVE_S, QUICK_LIVE_S = 40.0, 3.0
+TARGETS = {'in_process_median_us': 150.0, 'in_process_p99_us': 400.0, 'dds_p99_ms': 5.0, 'cpu_percent': 60.0}
+
+
+def run(options: BenchmarkOptions) -> BenchmarkResult:
+    """Train on simulated slides over ten surfaces, then time windows in one process and through the graph.
+
+    Windows of 0.5 s at 1 kHz every 0.1 s. In one process: from window to estimate, after one pass to warm up. Through
+    DDS: from publishing the last sample to receiving the TextureEstimate, with feature_extractor and classifier as
+    processes while 1 kHz in batches of 10 ms and 28 taxels at 60 Hz stream. CPU in percent of one core; the sensor
+    node reads an emulated TSF-85.
+    """
+    from texture_benchmarks.ros.graph import driver_cpu  # noqa: PLC0415  # ROS is needed for this alone
+
+    plan = QUICK_PLAN if options.quick else PLAN
+    with tempfile.TemporaryDirectory() as folder:
+        surfaces = tuple(load_scene('twelve_textures').surfaces)[:CLASSES]
+        bags = write_simulated(Path(folder) / 'bags', plan, np.random.default_rng(options.seed), surfaces=surfaces)
+        timings = {recipe: _time(recipe, bags, plan.slides, Path(folder), options) for recipe in RECIPES}
+    driver = driver_cpu()
+    chart = histogram_chart(
+        {f'{name}, {recipe}': values for recipe, timing in timings.items() for name, values in timing.charted.items()},
+        'From the last sample of a window to the estimate (simulated slides)',
+        'time (ms)',
+        options.out / 'latency.png',
+    )
+    return BenchmarkResult(
+        name='latency',
+        measured=run.__doc__,
+        data='simulated TSF-85, scene bench',
+        split=f'trained on slides 1-{plan.slides - 1} of each surface; timed on slide {plan.slides}, live on a new one',
+        numbers={'targets': TARGETS, **{recipe: timing.numbers(driver) for recipe, timing in timings.items()}},
+        charts=(chart,),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Timing:
+    """Times of one recipe: in one process, with and without novelty detection in turn, and through the graph."""
+
+    alone_us: Array
+    without_novelty_us: Array
+    live: LiveLatency
+
+    @property
+    def charted(self) -> Mapping[str, Array]:
+        return {'in one process': self.alone_us / 1000, 'through DDS': 1000 * self.live.latency_s}
+
+    def numbers(self, driver: float) -> Mapping[str, Any]:
+        median, p99 = np.percentile(self.alone_us, (50, 99))
+        without = float(np.median(self.without_novelty_us))
+        live = self.live.numbers()
+        cpu = {'sensor': round(100 * driver, 1), **live.pop('cpu_percent')}
+        return {
+            'in_process': {'windows': len(self.alone_us), 'median_us': float(median), 'p99_us': float(p99)},
+            'novelty': {'median_us_without': without, 'ratio': float(median) / without},
+            'dds': live,
+            'cpu_percent': {**cpu, 'all': round(sum(cpu.values()), 1)},
+        }
+
+
+def _time(recipe: str, bags: list[Path], slides: int, folder: Path, options: BenchmarkOptions) -> _Timing:
+    from texture_benchmarks.ros.graph import LiveSlide, measure  # noqa: PLC0415
+
+    model = train_from_bags(recipe, bags, f'1-{slides - 1}', folder / recipe)
+    cut = [events for _, events in SlideDataset.from_bags(bags, str(slides)).windows(model.recipe.feature_set)]
+    alone_us, without_us = _in_turn((model, replace(model, novelty_detector=None)), cut)
+    slide = LiveSlide('twelve_textures', 'leather', QUICK_LIVE_S if options.quick else LIVE_S, options.seed)
+    [live] = measure(folder / f'{recipe}.skops', slide).values()
+    return _Timing(alone_us, without_us, live)
+
+
+def _in_turn(models: Sequence[TextureModel], cut: Sequence[Sequence[WindowEvent]]) -> list[Array]:
+    """Return the times of the windows of slides by each model, µs; the models take turns, so load meets them alike.
+
+    The last of each slide is its end, which is no window; the first pass warms up.
+    """
+    taken: list[list[Array]] = [[] for _ in models]
+    for number in range(1 + PASSES):
+        for place, model in enumerate(models):
+            timed = [run_model(model, events)[2][:-1] for events in cut]
+            taken[place] += timed if number else []
+    return [np.concatenate(own) for own in taken]
+
+
+HAND_SCENE, HAND_CLASSES = 'kaboli', 10
+HAND_RECIPES, QUICK_RECIPES = ('default', 'vibration-and-taxels'), ('default',)
+FINGERS, QUICK_FINGERS = 5, 2
+HAND_PLAN, HAND_QUICK_PLAN = (
+    SlidePlan(slides=20, slide_s=3.0, force_n=0.5),
+    SlidePlan(slides=3, slide_s=1.5, force_n=0.5),
+)
+HAND_LIVE_S, HAND_QUICK_LIVE_S = 40.0, 3.0
+HAND_TARGETS = {'cpu_percent': 50.0, 'p99_ms': 10.0}
+
+
+def run_hand(options: BenchmarkOptions) -> BenchmarkResult:
+    """Train on one simulated BioTac, then recognise with five of them at once through the running nodes.
+
+    Each finger has a feature extractor and a classifier of its own: 2.2 kHz of vibration in batches of 10 ms and 22
+    slow channels at 100 Hz; windows of 0.5 s every 0.1 s. Latency from publishing the last sample of a window to
+    receiving its estimate, ms; computing time of all extractors and classifiers, in percent of one core.
+    """
+    plan = HAND_QUICK_PLAN if options.quick else HAND_PLAN
+    surfaces = tuple(load_scene(HAND_SCENE).surfaces)[:HAND_CLASSES]
+    with tempfile.TemporaryDirectory() as folder:
+        rng = np.random.default_rng(options.seed)
+        bags = write_simulated(Path(folder) / 'bags', plan, rng, HAND_SCENE, surfaces)
+        recipes = QUICK_RECIPES if options.quick else HAND_RECIPES
+        for recipe in recipes:
+            train_from_bags(recipe, bags, f'1-{plan.slides}', Path(folder) / recipe)
+        rows = {recipe: _live_hand(Path(folder) / f'{recipe}.skops', surfaces[0], options) for recipe in recipes}
+    return BenchmarkResult(
+        name='hand',
+        measured=run_hand.__doc__,
+        data=f'simulated BioTacs, scene {HAND_SCENE}, {HAND_CLASSES} objects; sensor nodes are not part of it',
+        split=f'trained on {plan.slides} slides of each object; timed on new slides',
+        numbers={'targets': HAND_TARGETS, **rows},
+    )
+
+
+def _live_hand(model: Path, surface: str, options: BenchmarkOptions) -> Mapping[str, Any]:
+    from texture_benchmarks.ros.graph import LiveLatency, LiveSlide, measure  # noqa: PLC0415  # ROS is needed for this
+
+    slide = LiveSlide(HAND_SCENE, surface, HAND_QUICK_LIVE_S if options.quick else HAND_LIVE_S, options.seed)
+    names = [f'finger{i}' for i in range(QUICK_FINGERS if options.quick else FINGERS)]
+    fingers = list(measure(model, slide, names).values())
+    cpu = {node: sum(finger.cpu[node] for finger in fingers) for node in sorted(fingers[0].cpu)}
+    latency_s = np.concatenate([finger.latency_s for finger in fingers])
+    all_of_them = LiveLatency(latency_s, sum(finger.expected for finger in fingers), cpu | {'all': sum(cpu.values())})
+    numbers: dict[str, Any] = all_of_them.numbers()
+    return numbers

@@ -1,0 +1,231 @@
+"""A model trained more textures slide by slide against one trained again on the same recorded slides."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported, line_chart
+from texture_core.arrays import Array
+from texture_core.estimates import TextureEstimate
+from texture_estimation.classification.training import train
+from texture_estimation.evidence import EvidenceAccumulator
+from texture_estimation.incremental.incremental_classifier import IncrementalClassifier
+from texture_estimation.learners.mlp import Mlp
+from texture_estimation.model import TextureModel
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_evaluation.train import training_examples
+from texture_features.labelled_features import LabelledFeatures
+from texture_recordings.slide_dataset import SlideDataset
+
+
+@dataclass(frozen=True)
+class Score:
+    """Shares of test windows and of whole test slides that are right, 0 to 1.
+
+    `known` is the share of slides that are reported as known surfaces, `certain_and_wrong` that of slides which could
+    have been stopped at their end with a wrong label.
+    """
+
+    windows: float
+    slides: float
+    known: float
+    certain_and_wrong: float
+
+
+@dataclass(frozen=True, eq=False)
+class IncrementalRun:
+    """Result of incremental training: scores by the number of slides of each new texture, and times.
+
+    `before` and `old` are the scores on the old textures alone: without the new ones, and after each stage.
+    """
+
+    incremental: dict[int, Score]
+    retrained: dict[int, Score]
+    new: dict[int, Score]
+    old: dict[int, Score]
+    before: Score
+    add_s: Array
+    predict_us: tuple[float, float]
+
+
+def run_incremental(
+    recipe: Recipe,
+    examples: LabelledFeatures,
+    new: Sequence[str],
+    *,
+    last_training: int,
+    stages: Sequence[int],
+    path: Path,
+) -> IncrementalRun:
+    """Return how a model does that knows all labels but `new` and is trained these slide by slide."""
+    numbers = np.array([int(group.rsplit('/', 1)[1].removeprefix('slide')) for group in examples.groups])
+    is_new = np.isin(examples.labels, list(new))
+    test, training = numbers > last_training, numbers <= last_training
+    base = train(recipe, examples.take(training & ~is_new))
+    base.save(path)
+    incremental_classifier, add_s = IncrementalClassifier(base, path), []
+    incremental_run = IncrementalRun(
+        {}, {}, {}, {}, _score(base, examples.take(test & ~is_new)), np.empty(0), (0.0, 0.0)
+    )
+    for stage, before in zip(stages, (0, *stages), strict=False):
+        for number in range(before + 1, stage + 1):
+            for label in new:
+                [slide] = set(examples.groups[(numbers == number) & (examples.labels == label)].tolist())
+                add_s.append(_add_examples(incremental_classifier, examples, slide))
+        retrained = train(recipe, examples.take(training & (~is_new | (numbers <= stage))))
+        for scores, model, which in (
+            (incremental_run.incremental, incremental_classifier.model, test),
+            (incremental_run.retrained, retrained, test),
+            (incremental_run.new, incremental_classifier.model, test & is_new),
+            (incremental_run.old, incremental_classifier.model, test & ~is_new),
+        ):
+            scores[stage] = _score(model, examples.take(which))
+    window = examples.X[0]
+    return replace(
+        incremental_run,
+        add_s=np.array(add_s),
+        predict_us=(_predict_us(base, window), _predict_us(incremental_classifier.model, window)),
+    )
+
+
+def _add_examples(incremental_classifier: IncrementalClassifier, examples: LabelledFeatures, slide: str) -> float:
+    """Add one slide, and return the processor time that it took, s."""
+    for vector in examples.vectors(slide)[:-1]:  # the last one is the end
+        incremental_classifier.observe(vector)
+    began = time.process_time()
+    incremental_classifier.add(str(examples.labels[examples.groups == slide][0]), slide)
+    return time.process_time() - began
+
+
+def _score(model: TextureModel, examples: LabelledFeatures) -> Score:
+    log_probabilities = model.predict_log_proba(examples.values)
+    truth = np.array([model.labels.index(label) for label in examples.labels])
+    slides = [(str(slide), str(examples.labels[examples.groups == slide][0])) for slide in np.unique(examples.groups)]
+    finals = [(label, _final(model, examples, slide)) for slide, label in slides]
+    return Score(
+        windows=float((log_probabilities.argmax(axis=1) == truth).mean()),
+        slides=float(np.mean([final.label == label for label, final in finals])),
+        known=float(np.mean([final.known for _, final in finals])),
+        certain_and_wrong=float(np.mean([final.decided and final.label != label for label, final in finals])),
+    )
+
+
+def _final(model: TextureModel, examples: LabelledFeatures, slide: str) -> TextureEstimate:
+    """Return the final estimate of a slide, as the classifier reports it."""
+    evidence = EvidenceAccumulator(model)
+    *_, final = [evidence.update(vector) for vector in examples.vectors(slide)]
+    return final
+
+
+def _predict_us(model: TextureModel, window: Array, repeats: int = 200) -> float:
+    """Return the median time of classifying one window, µs."""
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        model.predict_log_proba(window)
+        times.append(time.perf_counter() - began)
+    return 1e6 * float(np.median(times))
+
+
+RECIPE = 'default'
+TRAINED, STAGES, NEW, DRAWS = 30, (1, 2, 5, 10, 30), 5, 3
+QUICK_SLIDES, QUICK_TRAINED, QUICK_STAGES = '1-3,31-32', 3, (1, 2)
+QUICK_MATERIALS = ('material01', 'material02', 'material03', 'material04')
+FOLDS = 2  # for the calibration alone: less to wait for
+TARGETS = {'add_ms': 50.0, 'behind_training_points': 3.0}
+
+
+def run(options: BenchmarkOptions) -> BenchmarkResult:
+    """Train on 15 materials, add 5 more, test on later slides of all; several draws of the five.
+
+    Share of test windows and of whole test slides (final estimate) that are right, mean over the draws; processor
+    time of adding a slide, stored on disk; time to classify a window.
+    """
+    recipe = load_recipe(RECIPE)
+    if isinstance(recipe.learner, Mlp):
+        recipe = replace(recipe, learner=replace(recipe.learner, folds=FOLDS))
+    stages, last_training = (QUICK_STAGES, QUICK_TRAINED) if options.quick else (STAGES, TRAINED)
+    slides, materials = (QUICK_SLIDES, QUICK_MATERIALS) if options.quick else ('', ())
+    with imported(options, 'biotac20', slides, materials) as bags, tempfile.TemporaryDirectory() as folder:
+        examples = training_examples(recipe, SlideDataset.from_bags(bags, topics=recipe.feature_set.topics))
+        labels, rng = np.unique(examples.labels), np.random.default_rng(options.seed)
+        draws = [rng.permutation(labels)[: 1 if options.quick else NEW] for _ in range(1 if options.quick else DRAWS)]
+        runs = [
+            run_incremental(
+                recipe,
+                examples,
+                draw.tolist(),
+                last_training=last_training,
+                stages=stages,
+                path=Path(folder) / f'draw{number}',
+            )
+            for number, draw in enumerate(draws)
+        ]
+    return BenchmarkResult(
+        name='learning',
+        measured=run.__doc__,
+        data=f'BioTac vibration, {len(labels)} materials (github dexrob/BioTac_slide_20_50, Gao et al. 2020), recipe '
+        f'{RECIPE} calibrated in {FOLDS} parts',
+        split=f'{len(runs)} draws of {len(draws[0])} new materials: trained on slides '
+        f'1-{last_training} of the others, '
+        f'trained slide by slide from slide 1 on, tested on the slides after {last_training} of all',
+        numbers=_numbers(runs, draws, stages),
+        charts=(_chart(runs, stages, len(draws[0]), options.out / 'learning.png'),),
+    )
+
+
+def _numbers(runs: Sequence[IncrementalRun], draws: Sequence[Any], stages: Sequence[int]) -> Mapping[str, Any]:
+    add_ms = 1000 * np.concatenate([one.add_s for one in runs])
+    gaps = [100 * (one.retrained[stage].windows - one.incremental[stage].windows) for one in runs for stage in stages]
+
+    def mean(scores: Iterable[Score]) -> dict[str, float]:
+        rows = [asdict(score) for score in scores]
+        return {name: round(float(np.mean([row[name] for row in rows])), 4) for name in rows[0]}
+
+    return {
+        'targets': TARGETS,
+        'new': [sorted(draw.tolist()) for draw in draws],
+        'slides': {
+            str(stage): {
+                'incremental': mean(one.incremental[stage] for one in runs),
+                'retrained': mean(one.retrained[stage] for one in runs),
+                'incremental, new textures': mean(one.new[stage] for one in runs),
+                'incremental, old textures': mean(one.old[stage] for one in runs),
+            }
+            for stage in stages
+        },
+        'old textures before any added slide': mean(one.before for one in runs),
+        'behind_training_points': {
+            'most, windows': round(max(gaps), 1),
+            'mean, windows': round(float(np.mean(gaps)), 1),
+        },
+        'add_ms': {
+            'added_slides': len(add_ms),
+            'median': round(float(np.median(add_ms)), 1),
+            '95 %': round(float(np.percentile(add_ms, 95)), 1),
+            'longest': round(float(add_ms.max()), 1),
+        },
+        'predict_us': dict(
+            zip(('retrained', 'incremental'), np.median([one.predict_us for one in runs], axis=0).round(1), strict=True)
+        ),
+    }
+
+
+def _chart(runs: Sequence[IncrementalRun], stages: Sequence[int], new: int, path: Path) -> Path:
+    lines = {}
+    for what in ('slides', 'windows'):
+        for how, which in (
+            ('added one slide at a time', 'incremental'),
+            ('trained again on the same slides', 'retrained'),
+        ):
+            shares = [[getattr(getattr(one, which)[stage], what) for one in runs] for stage in stages]
+            lines[f'{how}: {what}'] = (np.array(stages, dtype=float), 100 * np.mean(shares, axis=1))
+    title = f'{new} new materials added to the others (BioTac, later slides of all)'
+    return line_chart(lines, title, ('slides of each new material', 'right (%)'), path, logarithmic=True)

@@ -1,1 +1,0 @@
-"""Benchmark: classes added slide by slide."""

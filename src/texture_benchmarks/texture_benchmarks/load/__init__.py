@@ -1,1 +1,0 @@
-"""Benchmark: computing time and losses of sensor nodes."""

@@ -1,1 +1,0 @@
-"""Benchmark: force, speed and path by robot and surface."""

@@ -1,1 +1,0 @@
-"""Benchmark: choice of the next exploration."""

@@ -1,1 +1,0 @@
-"""Benchmark: accuracy against time in one picture, from the stored figures of other benchmarks."""

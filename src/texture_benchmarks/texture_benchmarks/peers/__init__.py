@@ -1,1 +1,0 @@
-"""General classifiers of time series on the slides on which the recipes are compared."""

@@ -1,1 +1,0 @@
-"""Benchmark: all recipes side by side."""

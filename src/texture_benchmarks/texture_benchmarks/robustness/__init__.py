@@ -1,1 +1,0 @@
-"""Benchmark: noise, wear, losses and speed errors."""

@@ -1,1 +1,0 @@
-"""Benchmark: what trainings and windows cost with many textures and many windows."""

@@ -1,0 +1,577 @@
+"""What simulated scenes cost, and what each of their terms contributes to recognition."""
+
+from __future__ import annotations
+
+import itertools
+import time
+import zlib
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from texture_benchmarks.papers import ets_linear, jamali
+from texture_benchmarks.papers.protocol import PaperProtocol, folds, halves
+from texture_benchmarks.papers.trial import of_task
+from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
+from texture_core.arrays import Array, Samples
+from texture_evaluation.charts import COLOURS, chart
+from texture_simulation.contact import Contact
+from texture_simulation.effects.catalogue import EFFECTS
+from texture_simulation.effects.contact_growth import ForceGain, PatchGrowth
+from texture_simulation.effects.finger_spread import FingerSpread
+from texture_simulation.effects.protocols import GrowthEffect
+from texture_simulation.effects.slide_error import SlideError
+from texture_simulation.effects.unevenness import Unevenness
+from texture_simulation.scene import Scene, load_scene
+from texture_simulation.sensors.catalogue import SENSORS
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.slide_batches import simulate_slide_streams
+from texture_simulation.surfaces.surface import MIN_BLUR_M
+
+PATCH = 'patch filter'
+FRICTION = 'friction'
+
+
+@dataclass(frozen=True)
+class TouchProtocol:
+    """How the surfaces of a scene are touched, as in its experiment."""
+
+    # speeds_m_s, forces_n, directions_rad: every combination is met equally often
+    speeds_m_s: Sequence[float]
+    forces_n: Sequence[float]
+    directions_rad: Sequence[float] = (0.0,)
+    # duration_s, radius_m: of each slide
+    duration_s: float = 0.5
+    radius_m: float = 0.0
+    # A surface is measured once in each of these directions, and all are evaluated together
+    turned_rad: Sequence[float] = (0.0,)
+    slow: bool = False  # Whether the slow channels are used, too
+    tested_forces_n: Sequence[float] = ()  # Other forces for the test; as in learning if empty
+    # training_by, tested_by: individuals of the sensor
+    training_by: Sequence[int] = (0,)
+    tested_by: Sequence[int] = (0,)
+
+
+RIGHT = np.pi / 2
+# The papers' conditions; slides of 2 and 3 s are cut to 1 s. On the bench, one learns as the demo does, and then
+# presses as one likes.
+TOUCH_PROTOCOLS: Mapping[str, TouchProtocol] = {
+    'twelve_textures': TouchProtocol((0.1,), (2.0,), tested_forces_n=(0.5, 2.0, 5.0)),
+    'ets_linear': TouchProtocol((0.10, 0.15, 0.20), (1.0, 2.5, 5.0)),
+    'ets_circular': TouchProtocol((0.1,), (2.5,), (RIGHT, np.pi / 3, np.pi / 4, 0.0), radius_m=0.02),
+    'ets_fine': TouchProtocol((0.125,), (2.0,), duration_s=0.8),
+    'roughness': TouchProtocol((0.10, 0.15, 0.20), (1.0, 2.5, 5.0), duration_s=0.7),
+    'jamali': TouchProtocol((0.05,), (1.0,), duration_s=1.0),
+    'kaboli': TouchProtocol((0.05,), (1.0,), duration_s=1.0, slow=True, training_by=(1, 2), tested_by=(0, 1)),
+    'hu': TouchProtocol((0.0255,), (1.5,), duration_s=1.0, turned_rad=(0.0, RIGHT)),
+    'sticky': TouchProtocol((0.02, 0.05), (1.0, 2.0)),
+}
+# Effects that left the scenes because they change no decision there; they are put back to be measured.
+REMOVED_EFFECTS: Mapping[str, Mapping[str, Any]] = {
+    'twelve_textures': {'slide_error': SlideError(0.01, 0.04), 'unevenness': Unevenness(0.15)},
+    'ets_circular': {'patch_growth': PatchGrowth(), 'force_gain': ForceGain(), 'unevenness': Unevenness(0.15)},
+    'ets_fine': {'patch_growth': PatchGrowth(), 'force_gain': ForceGain(), 'unevenness': Unevenness(0.1)},
+    'jamali': {'patch_growth': PatchGrowth()},
+    'kaboli': {
+        'patch_growth': PatchGrowth(),
+        'force_gain': ForceGain(),
+        'finger_spread': FingerSpread(0.05),
+        'unevenness': Unevenness(0.15),
+    },
+    'hu': {
+        'patch_growth': PatchGrowth(),
+        'force_gain': ForceGain(),
+        'slide_error': SlideError(0.005, 0.03),
+        'unevenness': Unevenness(0.2),
+    },
+    'sticky': {'patch_growth': PatchGrowth(), 'unevenness': Unevenness(0.1)},
+}
+# Effects that no scene names: each is put into `HOST` by itself, as strong as the catalogue has it, to be measured.
+HOST = 'twelve_textures'
+ADDED = ('skids', 'motor_vibration', 'skin', 'mains_hum', 'drift', 'dropouts', 'quantisation')
+
+
+def completed(scene: Scene, touch_protocol: TouchProtocol) -> Scene:
+    """Return a scene with what has left it for changing no decision (`REMOVED_EFFECTS`)."""
+    for name, effect in REMOVED_EFFECTS.get(scene.name, {}).items():
+        contact = _grown(scene.contact, effect, touch_protocol, -1)
+        scene = replace(scene, effects={**scene.effects, name: effect}, contact=contact)
+    return scene
+
+
+def variants(scene: Scene, touch_protocol: TouchProtocol) -> dict[str, Scene]:
+    """Return the scene without each of its effects, with a contact of a point, and without friction.
+
+    What grows with the force stays as large as at the mean force: a term that only sets a constant is none.
+    """
+    made = {
+        name: replace(_without(scene, name), contact=_grown(scene.contact, effect, touch_protocol, 1))
+        for name, effect in scene.effects.items()
+    }
+    made[PATCH] = replace(scene, contact=replace(scene.contact, blur_m=MIN_BLUR_M))
+    if any(surface.friction for surface in scene.surfaces.values()):
+        bare = {name: replace(surface, friction=None) for name, surface in scene.surfaces.items()}
+        made[FRICTION] = replace(scene, surfaces=bare)
+    return made
+
+
+def _without(scene: Scene, name: str) -> Scene:
+    """Return a scene without an effect; what else is random stays as it was, so that slides are compared one by one."""
+    if isinstance(scene.effects[name], SlideError):
+        return replace(scene, effects={**scene.effects, name: SlideError(0.0, 0.0)})
+    return scene.without(name)
+
+
+def _grown(contact: Contact, effect: Any, touch_protocol: TouchProtocol, sign: int) -> Contact:
+    """Return the contact with the growth of an effect at the mean force in it (sign 1), or taken out of it (-1)."""
+    if not isinstance(effect, GrowthEffect):
+        return contact
+    force_n = np.array([np.mean(touch_protocol.forces_n)])
+    blur, gain = (float(np.max(growth(force_n))) ** sign for growth in (effect.blur_growth, effect.gain_growth))
+    return replace(contact, blur_m=contact.blur_m * blur, stiffness_n_m=contact.stiffness_n_m * gain)
+
+
+def with_one_more(scene: Scene) -> dict[str, Scene]:
+    """Return the scene with each of the effects that no scene names (`ADDED`)."""
+    return {name: replace(scene, effects={**scene.effects, name: EFFECTS[name]()}) for name in ADDED}
+
+
+BANDS = 24  # of the spectrum, each of equal width on a logarithmic scale
+LOWEST_HZ = 5.0
+MIN_POWER = 1e-12
+CONFIDENCE = 0.95
+MIN_CHANGE = 0.01  # of the accuracy, or of the decisions: an effect with less change needs no term
+
+
+@dataclass(frozen=True, eq=False)
+class MeanDifference:
+    """A mean difference over repetitions, in shares, and its half interval of 95 %."""
+
+    mean: float
+    half: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether it is certain, and large enough to be seen."""
+        return bool(abs(self.mean) > self.half and abs(self.mean) >= MIN_CHANGE)
+
+    @property
+    def most(self) -> float:
+        """How large it may be, whichever sign it has."""
+        return abs(self.mean) + self.half
+
+
+@dataclass(frozen=True, eq=False)
+class TermEffect:
+    """What happens when a term is removed."""
+
+    term: str  # Name
+    easier: MeanDifference  # Accuracy without the term, in learning and in the test, less that with it
+    # Accuracy on slides with the term of a model trained without it, less that of one trained with it
+    unprepared: MeanDifference
+    # Share of the test slides decided otherwise by a model trained without it, less that by one trained with it
+    # from other slides
+    changed: MeanDifference
+    # Accuracy of the paper's method without the term, in learning and in the test, less that with it, if known
+    paper: MeanDifference | None = None
+    cost_us: float = 0.0  # What the term adds to the computing time of a slide
+
+    @property
+    def verdict(self) -> str:
+        """Return 'decides' if it certainly changes something, 'idle' if certainly nothing of note, else 'open'."""
+        known = [self.easier, self.unprepared, *([self.paper] if self.paper else [])]
+        if any(item.matters for item in known) or (self.changed.matters and self.changed.mean > 0):
+            return 'decides'
+        return 'idle' if max(item.most for item in known) < MIN_CHANGE else 'open'
+
+
+@dataclass(frozen=True, eq=False)
+class Ablation:
+    """A scene and the influence of each of its terms."""
+
+    scene: str  # Name
+    # accuracy, paper: with which its surfaces are distinguished, and by the paper's method, if known
+    accuracy: float
+    tested: int  # How many slides
+    term_effects: Sequence[TermEffect] = field(default=())  # Of its terms
+    slide_us: float = 0.0  # Computing time of a slide
+    paper: float | None = None
+
+
+def ablate(
+    scene: Scene, touch_protocol: TouchProtocol, slides: int, repeats: int, seed: int, *, terms: Collection[str] = ()
+) -> Ablation:
+    """Return the effect of each term of a scene, or of some, removed one at a time.
+
+    About so many slides are trained on, and as many tested; all is repeated with other random numbers.
+    """
+    others = {term: other for term, other in variants(scene, touch_protocol).items() if not terms or term in terms}
+    rows = [_repeat(scene, others, touch_protocol, slides, [seed, number]) for number in range(repeats)]
+    effects = []
+    for term in others:
+        easier, unprepared, changed = zip(*(own[term] for _, _, own in rows), strict=True)
+        effects.append(TermEffect(term, difference(easier), difference(unprepared), difference(changed)))
+    return Ablation(scene.name, float(np.mean([right for right, *_ in rows])), repeats * rows[0][1], effects)
+
+
+def timed(ablation: Ablation, scene: Scene, touch_protocol: TouchProtocol, count: int, repeats: int) -> Ablation:
+    """Return the same with the time that each term takes: medians of measurements taken in turn."""
+    others = variants(scene, touch_protocol)
+    compared = [scene, *(others[term_effect.term] for term_effect in ablation.term_effects)]
+    sliding = _sliding(touch_protocol, count, 0.0)
+
+    def slide_us(made: Scene) -> float:
+        rng, began = np.random.default_rng(0), time.thread_time()
+        for surface in made.surfaces:
+            simulate_slide_streams(made, surface, count, sliding, rng)
+        return 1e6 * (time.thread_time() - began) / (count * len(made.surfaces))
+
+    for made in compared:
+        slide_us(made)  # makes what is made once
+    taken_us = np.array([[slide_us(made) for made in compared] for _ in range(repeats)])
+    costs_us = np.median(taken_us[:, :1] - taken_us, axis=0)[1:].tolist()
+    effects = [replace(own, cost_us=cost) for own, cost in zip(ablation.term_effects, costs_us, strict=True)]
+    return replace(ablation, term_effects=effects, slide_us=float(np.median(taken_us[:, 0])))
+
+
+def simulate_features(
+    scene: Scene, touch_protocol: TouchProtocol, count: int, seed: Sequence[int], fingers: Sequence[int]
+) -> tuple[Array, NDArray[np.intp]]:
+    """Return features (n, n_features) and surfaces (n,) of `count` slides over each, by each finger in turn."""
+    values = [
+        np.concatenate(
+            [_extracted(scene, name, touch_protocol, count, ([*seed, finger], finger)) for finger in fingers]
+        )
+        for name in scene.surfaces
+    ]
+    return np.concatenate(values), np.repeat(np.arange(len(values)), [len(part) for part in values])
+
+
+def extract_features(samples: Samples, rate_hz: float) -> Array:
+    """Return the logarithm of the power in bands of each channel, (n, n_channels · BANDS)."""
+    n_samples = samples.shape[1]
+    spectrum = np.fft.rfft(samples * np.hanning(n_samples)[:, None], axis=1)
+    edges_hz = np.geomspace(LOWEST_HZ, rate_hz / 2, BANDS + 1)
+    edges = np.searchsorted(np.fft.rfftfreq(n_samples, 1 / rate_hz), edges_hz)
+    # Below, bands may be narrower than a bin: such a band takes the bin it lies in.
+    starts, ends = edges[:-1], np.maximum(edges[1:], edges[:-1] + 1)
+    total = np.concatenate([np.zeros_like(samples[:, :1]), np.cumsum(np.abs(spectrum) ** 2, axis=1)], axis=1)
+    ends = np.minimum(ends, total.shape[1] - 1)
+    power = (total[:, ends] - total[:, np.minimum(starts, ends - 1)]) / n_samples
+    return np.asarray(np.log10(np.maximum(power, 0.0) + MIN_POWER).reshape(len(samples), -1), dtype=np.float64)
+
+
+def _repeat(
+    scene: Scene, others: Mapping[str, Scene], touch_protocol: TouchProtocol, slides: int, seed: list[int]
+) -> tuple[float, int, dict[str, tuple[float, float, float]]]:
+    """Return of one repetition the accuracy with all terms, the number tested, and the three differences by term."""
+    count = max(2, round(slides / len(scene.surfaces)))
+    pressed = replace(touch_protocol, forces_n=touch_protocol.tested_forces_n or touch_protocol.forces_n)
+
+    def learned(of: Scene, part: int) -> Any:
+        each = max(1, count // len(touch_protocol.training_by))
+        examples = simulate_features(of, touch_protocol, each, [*seed, part], touch_protocol.training_by)
+        learner = LinearDiscriminantAnalysis(solver='lsqr', shrinkage='auto')
+        return make_pipeline(StandardScaler(), learner).fit(*examples)
+
+    def tested(of: Scene) -> tuple[Array, NDArray[np.intp]]:
+        each = max(1, count // len(touch_protocol.tested_by))
+        return simulate_features(of, pressed, each, [*seed, 2], touch_protocol.tested_by)
+
+    values, codes = tested(scene)
+    answers, again = (learned(scene, part).predict(values) for part in (0, 1))
+    right, usual = float(np.mean(answers == codes)), float(np.mean(answers != again))
+    differences = {}
+    for term, other in others.items():
+        own = learned(other, 0)
+        unprepared = own.predict(values)
+        differences[term] = (
+            own.score(*tested(other)) - right,
+            float(np.mean(unprepared == codes)) - right,
+            float(np.mean(unprepared != answers)) - usual,
+        )
+    return right, len(codes), differences
+
+
+def difference(values: Sequence[float] | Array) -> MeanDifference:
+    """Return the mean of differences, one of each repetition, with its interval."""
+    mean = float(np.mean(values))
+    if len(values) < 2:
+        return MeanDifference(mean, np.inf)
+    spread = float(np.std(values, ddof=1)) / np.sqrt(len(values))
+    return MeanDifference(mean, float(stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1)) * spread)
+
+
+def _extracted(
+    scene: Scene, surface: str, touch_protocol: TouchProtocol, count: int, who: tuple[Sequence[int], int]
+) -> Array:
+    """Return the features of slides over one surface, (count, n_features), by a finger with a seed."""
+    seed, finger = who
+    rng = np.random.default_rng([*seed, zlib.crc32(surface.encode())])
+    fast, *others = SENSORS[scene.sensor].streams
+    parts = []
+    for turned_rad in touch_protocol.turned_rad:
+        sliding = _sliding(touch_protocol, count, turned_rad)
+        measured = simulate_slide_streams(scene, surface, count, sliding, rng, finger=finger, slow=touch_protocol.slow)
+        parts.append(extract_features(measured[fast.topic], fast.rate_hz))
+        for stream in others if touch_protocol.slow else ():
+            parts += [measured[stream.topic].mean(axis=1), np.log10(measured[stream.topic].std(axis=1) + 1.0)]
+    return np.concatenate(parts, axis=1)
+
+
+def _sliding(touch_protocol: TouchProtocol, count: int, turned_rad: float) -> SimulatedSlide:
+    """Return slides that meet all conditions in turn."""
+    conditions = list(
+        itertools.product(touch_protocol.speeds_m_s, touch_protocol.forces_n, touch_protocol.directions_rad)
+    )
+    rows = np.array([conditions[number % len(conditions)] for number in range(count)])
+    return SimulatedSlide(
+        rows[:, 0], rows[:, 1], touch_protocol.duration_s, rows[:, 2] + turned_rad, touch_protocol.radius_m
+    )
+
+
+SCAN_S = 0.5
+SLIDE = SimulatedSlide(0.1, 2.0, SCAN_S)
+MANY = 100  # slides at once
+
+
+@dataclass(frozen=True)
+class ScanCost:
+    """Milliseconds of computing for a slide of 0.5 s with all its channels: medians over all surfaces of a scene.
+
+    `alone`: one slide at a time; `together`: each of many at once; `worst`: the dearest surface, together.
+    """
+
+    alone_ms: float
+    together_ms: float
+    worst_ms: float
+
+
+def scan_cost(scene: Scene, surfaces: Sequence[str], repeats: int, many: int = MANY) -> ScanCost:
+    """Return what slides over some surfaces of a scene cost; `repeats` is that of single slides."""
+    alone = [_scan_ms(scene, name, 1, repeats) for name in surfaces]
+    together = [_scan_ms(scene, name, many, max(1, repeats // 5)) for name in surfaces]
+    return ScanCost(float(np.median(alone)), float(np.median(together)), max(together))
+
+
+def _scan_ms(scene: Scene, surface: str, count: int, repeats: int) -> float:
+    """Return the median computing time of one of `count` slides at once."""
+    rng = np.random.default_rng(0)
+    simulate_slide_streams(scene, surface, 1, SLIDE, rng)  # makes what is made once: tiles of random relief
+    times = []
+    for _ in range(repeats):
+        began = time.thread_time()
+        simulate_slide_streams(scene, surface, count, SLIDE, rng)
+        times.append(time.thread_time() - began)
+    return 1000 * float(np.median(times)) / count
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A paper's experiment, its slides divided less often than there, and the method by which its scene was set."""
+
+    protocol: PaperProtocol
+    method: str
+
+
+# Scenes in which the quick learner is too good, or too bad, to see all that the paper's method sees.
+PAPERS: Mapping[str, Paper] = {
+    'ets_linear': Paper(replace(ets_linear.PROTOCOL, divide=halves(4)), ets_linear.SVM),
+    'jamali': Paper(replace(jamali.PROTOCOL, divide=folds(5, 1)), jamali.FIVE),
+}
+
+
+def with_paper(ablation: Ablation, repeats: int, seed: int, *, quick: bool = False) -> Ablation:
+    """Return the same with the change of accuracy of the paper's method, if there is one, without each effect."""
+    paper = PAPERS.get(ablation.scene)
+    if not paper:
+        return ablation
+    [task] = paper.protocol.tasks
+    task = replace(task, methods=tuple(method for method in task.methods if method.name == paper.method))
+
+    def right(world: Scene, number: int) -> float:
+        [(_, outcome)] = of_task(paper.protocol, task, world, seed + number, quick=quick)
+        return outcome.test.value
+
+    touch_protocol = TOUCH_PROTOCOLS[ablation.scene]
+    scene = completed(load_scene(ablation.scene), touch_protocol)
+    worlds = {term: world for term, world in variants(scene, touch_protocol).items() if term in scene.effects}
+    shares = np.array([[right(world, number) for world in (scene, *worlds.values())] for number in range(repeats)])
+    changes = {term: difference(column) for term, column in zip(worlds, (shares[:, 1:] - shares[:, :1]).T, strict=True)}
+    effects = [replace(effect, paper=changes.get(effect.term)) for effect in ablation.term_effects]
+    return replace(ablation, term_effects=effects, paper=float(shares[:, 0].mean()))
+
+
+COLUMNS = 2
+
+
+def ablation_chart(ablations: Sequence[Ablation], path: str | Path) -> Path:
+    """Draw for each scene how the accuracy changes when a term is left out; one panel for each scene."""
+    rows = -(-len(ablations) // COLUMNS)
+    most = max(len(ablation.term_effects) for ablation in ablations)
+    with chart(
+        path, (9.0, 0.9 + rows * (0.8 + 0.27 * most)), 'Change of accuracy when a term of a simulated scene is left out'
+    ) as figure:
+        panels = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
+        for axes, ablation in zip(panels, ablations, strict=False):
+            _draw_ablation(axes, ablation)
+        for axes in panels[len(ablations) :]:
+            axes.axis('off')
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc='outside lower left', title='the term is left out of')
+    return Path(path)
+
+
+def cost_chart(costs: Mapping[tuple[str, bool], ScanCost], path: str | Path) -> Path:
+    """Draw the time of a slide by scene, with what is allowed."""
+    with chart(path, (8.0, 4.6), 'Simulated slides computed offline') as figure:
+        axes, places = figure.subplots(), np.arange(len(costs))
+        together, alone = ([getattr(cost, which) for cost in costs.values()] for which in ('together_ms', 'alone_ms'))
+        axes.barh(places - 0.2, together, 0.38, color=COLOURS[0], label=f'each of {MANY} slides at once')
+        axes.barh(places + 0.2, alone, 0.38, color=COLOURS[4], label='one slide alone')
+        targets = [TARGET_MS[sticks] for _, sticks in costs]
+        axes.vlines(targets, places - 0.45, places + 0.45, color=COLOURS[5], linewidth=2, label='target')
+        axes.set_yticks(places, [f'{name}\nstick-slip' if sticks else name for name, sticks in costs])
+        axes.set(xscale='log', xlabel='computing time of a slide of 0.5 s (ms)')
+        axes.invert_yaxis()
+        axes.legend(loc='upper center', bbox_to_anchor=(0.5, -0.13), ncols=3)
+    return Path(path)
+
+
+def _draw_ablation(axes: Any, ablation: Ablation) -> None:
+    for label, which, colour, shift in (
+        ('training and test slides', 'easier', COLOURS[0], -0.2),
+        ('training slides only', 'unprepared', COLOURS[1], 0.2),
+        ("both, with the paper's method", 'paper', COLOURS[2], 0.0),
+    ):
+        differences = (getattr(effect, which) for effect in ablation.term_effects)
+        known = [(place + shift, item) for place, item in enumerate(differences) if item]
+        axes.errorbar(
+            [100 * item.mean for _, item in known], [place for place, _ in known],
+            xerr=[100 * item.half if np.isfinite(item.half) else 0.0 for _, item in known],
+            fmt='o', color=colour, markersize=4, capsize=2, label=label,
+        )  # fmt: skip
+    names = []
+    for effect in ablation.term_effects:  # those that decide nothing are marked
+        mark = '' if effect.verdict == 'decides' else f'{effect.verdict}, '
+        names.append(f'{effect.term.replace("_", " ")} ({mark}{effect.cost_us:+.0f} µs)')
+    axes.axvline(0.0, color='black', linewidth=0.8)
+    axes.set_yticks(np.arange(len(names)), names)
+    axes.set(xlabel='change of accuracy (percentage points)', ylim=(len(names) - 0.5, -0.5))
+    title = f'{ablation.scene}: {100 * ablation.accuracy:.0f} % right, {ablation.slide_us:.0f} µs a slide'
+    axes.set_title(title, fontsize=9)
+
+
+TARGET_MS = {False: 1.0, True: 10.0}  # without and with stick-slip
+# Dear scenes are measured less often: stick-slip costs ten times as much, eight channels five times.
+FEWER: Mapping[str, int] = {'sticky': 5, 'jamali': 3}
+
+
+@dataclass(frozen=True)
+class _Size:
+    """How much is measured."""
+
+    scenes: tuple[str, ...] = tuple(TOUCH_PROTOCOLS)
+    slides: int = 240
+    repeats: int = 5
+    paper_repeats: int = 3
+    scan_repeats: int = 15
+    many: int = MANY
+    timed: int = 10
+    timed_repeats: int = 5
+
+    def ablation(self, scene: Scene, seed: int, terms: Sequence[str] = ()) -> Ablation:
+        """Return what terms of a scene contribute, and what they cost."""
+        touch_protocol = TOUCH_PROTOCOLS[scene.name]
+        slides = self.slides // FEWER.get(scene.name, 1)
+        done = ablate(scene, touch_protocol, slides, self.repeats, seed, terms=terms)
+        return timed(done, scene, touch_protocol, self.timed, self.timed_repeats)
+
+
+QUICK = _Size(('ets_linear', 'sticky'), 32, 2, 1, 2, 10, 4, 1)
+
+
+def run(options: BenchmarkOptions) -> BenchmarkResult:
+    """Time slides, remove each term of each scene in turn, and add what none of them names.
+
+    Computing time (ms) of a slide of 0.5 s with all channels, alone and as one of many at once, median over surfaces;
+    accuracy of a linear discriminant (shrunk covariance) on the logarithm of 24 bands of the spectrum of each channel,
+    with and without each term; the effects that no scene names are put into one scene one at a time, as strong as the
+    catalogue has them.
+    """
+    size, costs = QUICK if options.quick else _Size(), {}
+    for name in size.scenes:
+        scene = load_scene(name)
+        sticks = {own: hasattr(surface.friction, 'bristle_1_m') for own, surface in scene.surfaces.items()}
+        for kind in sorted(set(sticks.values())):
+            surfaces = [own for own in sticks if sticks[own] is kind]
+            costs[name, kind] = scan_cost(scene, surfaces, size.scan_repeats, size.many)
+    whole = [size.ablation(completed(load_scene(name), TOUCH_PROTOCOLS[name]), options.seed) for name in size.scenes]
+    ablations = [with_paper(own, size.paper_repeats, 1000 + options.seed, quick=options.quick) for own in whole]
+    added = [size.ablation(more, options.seed, (name,)) for name, more in with_one_more(load_scene(HOST)).items()]
+    return BenchmarkResult(
+        name='scenes',
+        measured=run.__doc__,
+        data='simulated scenes; slides of 2 and 3 s are cut to 1 s; terms that left a scene are put back for it',
+        split=f'{size.slides} slides for training (jamali a third, sticky a fifth), others for test, '
+        f"{size.repeats} repetitions; the papers' methods on {size.paper_repeats} sets of slides as many as in the "
+        f'paper; intervals of {CONFIDENCE:.0%}',
+        numbers={
+            'target_ms': {'without stick-slip': TARGET_MS[False], 'with': TARGET_MS[True]},
+            'scan_ms': {f'{name}, stick-slip' if kind else name: asdict(cost) for (name, kind), cost in costs.items()},
+            'terms': {ablation.scene: _terms(ablation) for ablation in ablations},
+            'added': {
+                effect.term: {'strength': asdict(EFFECTS[effect.term]()), **_terms(ablation)}
+                for ablation in added
+                for effect in ablation.term_effects
+            },
+        },
+        charts=(
+            cost_chart(costs, options.out / 'scenes_cost.png'),
+            ablation_chart([*ablations, _together(added)], options.out / 'scenes_ablation.png'),
+        ),
+    )
+
+
+STORED = {
+    'easier': 'accuracy_without',
+    'unprepared': 'accuracy_trained_without',
+    'changed': 'decisions_changed',
+    'paper': 'paper_without',
+}
+
+
+def _terms(ablation: Ablation) -> dict[str, Any]:
+    found: dict[str, Any] = {'accuracy': round(ablation.accuracy, 4), 'tested': ablation.tested}
+    found['slide_us'] = round(ablation.slide_us)
+    if ablation.paper is not None:
+        found['paper_accuracy'] = round(ablation.paper, 4)
+    for effect in ablation.term_effects:
+        known = {name: getattr(effect, own) for own, name in STORED.items() if getattr(effect, own)}
+        found[effect.term] = {
+            **{name: {'change': round(d.mean, 4), 'half_interval': round(d.half, 4)} for name, d in known.items()},
+            'cost_us': round(effect.cost_us, 1),
+            'verdict': effect.verdict,
+        }
+    return found
+
+
+def _together(added: Sequence[Ablation]) -> Ablation:
+    """Return scenes with one more effect each as one: accuracy and time are those without any of them."""
+    term_effects = list(itertools.chain.from_iterable(ablation.term_effects for ablation in added))
+    pairs = list(zip(added, term_effects, strict=True))
+    return Ablation(
+        f'{HOST}, with one of',
+        float(np.mean([ablation.accuracy + term_effect.easier.mean for ablation, term_effect in pairs])),
+        added[0].tested,
+        term_effects,
+        float(np.median([ablation.slide_us - term_effect.cost_us for ablation, term_effect in pairs])),
+    )

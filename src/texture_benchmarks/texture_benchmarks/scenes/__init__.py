@@ -1,1 +1,0 @@
-"""Benchmark: cost of simulated slides, and the effect of each term of a scene."""

@@ -1,1 +1,0 @@
-"""Benchmark: start and end of sliding."""

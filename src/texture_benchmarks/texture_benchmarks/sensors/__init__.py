@@ -1,1 +1,0 @@
-"""Benchmark: faults on every sensor's line."""

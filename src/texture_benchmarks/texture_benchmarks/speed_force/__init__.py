@@ -1,1 +1,0 @@
-"""Benchmark: speeds, forces and directions outside the training."""

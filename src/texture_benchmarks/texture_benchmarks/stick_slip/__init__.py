@@ -1,1 +1,0 @@
-"""Benchmark: simulated friction."""
