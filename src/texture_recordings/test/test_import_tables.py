@@ -7,9 +7,8 @@ from foreign_tables import MAPPING, RATE_HZ, STROKE_ROWS, recordings, write_csv
 
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.tables.import_tables import import_tables
+from texture_recordings.tables.import_tables import ImportReport, import_tables
 from texture_recordings.tables.mapping import TableMapping, load_mapping, mapping_from
-from texture_recordings.tables.report import ImportReport
 
 FIRST_STROKE = 40  # row of the first stroke, after rest
 
