@@ -215,8 +215,8 @@ class DynamixelBus:
             return False
         if limit <= 0:
             raise DeviceError(
-                f'{profile.owner(motor)} has a Current Limit of {limit}; above 0 is needed, set it with DYNAMIXEL Wizard, '
-                f"or correct the table of the profile '{profile.name}'"
+                f'{profile.owner(motor)} has a Current Limit of {limit}; above 0 is needed, set it with DYNAMIXEL '
+                f"Wizard, or correct the table of the profile '{profile.name}'"
             )
         self.limits_a[motor] = limit * profile.current_a
         self._goal_currents[motor] = self._counts(motor, profile.move_a)
