@@ -22,7 +22,7 @@ from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
 from texture_core.exploration import ExplorationState, Phase
 from texture_core.labels import checked_label
-from texture_core.signal import MAX_HZ, NANOSECONDS, TactileSignal
+from texture_core.signal import MAX_HZ, MIN_HZ, NANOSECONDS, TactileSignal
 from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import is_bag
 from texture_recordings.tables.mapping import (
@@ -804,10 +804,10 @@ class _TableSlides:
         if time_column:
             own = estimated_rate_hz(self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)])
         counts.rate_hz = counts.rate_hz or own
-        if not 0.0 < counts.rate_hz <= MAX_HZ:
+        if not MIN_HZ <= counts.rate_hz <= MAX_HZ:
             raise InvalidData(
                 f"'{self._table.place}': the rate of '{name}' is {counts.rate_hz:g} Hz by its times; give a column of "
-                f'time that grows and its unit, or `rate_hz`, above 0 and at most {MAX_HZ:g}'
+                f'time that grows and its unit, or `rate_hz`, from {MIN_HZ:g} to {MAX_HZ:g}'
             )
         if own and not 1 / SAME_RATE <= own / counts.rate_hz <= SAME_RATE:
             raise InvalidData(

@@ -12,7 +12,7 @@ from texture_core.parameter_tree import tree_from_mapping
 from texture_core.parameters import param
 from texture_core.plain_data import load_yaml
 from texture_core.resources import find_file
-from texture_core.signal import MAX_HZ
+from texture_core.signal import MAX_HZ, MIN_HZ
 from texture_recordings.slides import STREAMS
 
 FIELD = re.compile(r'\{(\w*)\}|\*')
@@ -182,6 +182,12 @@ class StreamColumns:
         unit='s', low=0.0, high=10.0,
     )  # fmt: skip
     time: TimeColumn = field(default_factory=TimeColumn)
+
+    def __post_init__(self) -> None:
+        if 0.0 < self.rate_hz < MIN_HZ:
+            raise InvalidParameter(
+                f"parameter 'rate_hz' is {self.rate_hz:g}; allowed are 0 and {MIN_HZ:g} to {MAX_HZ:g}"
+            )
 
 
 @dataclass(frozen=True)
