@@ -148,7 +148,8 @@ class RecordNode(Node):
             'restarts': sum(self._continuity.restarts.values()),
             **{f'samples {topic}': count for topic, count in self._continuity.samples.items()},
         }
-        said = ', '.join(f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count)
+        others = [f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count]
+        said = ', '.join(filter(None, (self._continuity.losses, *others[bool(lost) :])))
         sentence = f'{self._counts["messages"]} messages recorded, {said or "nothing lost"}'
         return 'WARN' if said else 'OK', sentence, numbers
 
