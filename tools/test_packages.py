@@ -53,8 +53,8 @@ OTHERS = {'backports', 'compression', 'dashboard_client', 'rtde_control', 'rtde_
 # and to read bags is possible with the messages, the core, the drivers and texture_recordings alone.
 OPTIONAL = {
     'texture_recordings': {
-        'python3-scipy': {'importers.ntp21', 'tables.readers.wav_file'},
-        'texture_features': {'commands.segment', 'segment', 'slide_dataset', 'slide_samples', 'tables.borders'},
+        'python3-scipy': {'importers.ntp21', 'tables.tables'},
+        'texture_features': {'commands.segment', 'segment', 'slide_dataset', 'slide_samples', 'tables.import_tables'},
     }
 }
 # What launch files need, which no module imports.
@@ -95,7 +95,7 @@ LAYERS: Mapping[str, Layer] = {
         of('msgs', 'core', 'features'),
         tests=of('drivers'),
         never=LEARNING | DRAWING | SCIPY,
-        late={'texture_recordings.importers.ntp21': SCIPY, 'texture_recordings.tables.readers.wav_file': SCIPY},
+        late={'texture_recordings.importers.ntp21': SCIPY, 'texture_recordings.tables.tables': SCIPY},
     ),
     'texture_simulation': Layer(of('msgs', 'core', 'drivers', 'recordings'), never=LEARNING | DRAWING),
     'texture_exploration': Layer(of('msgs', 'core'), tests=of('features', 'simulation'), never=LEARNING | DRAWING),

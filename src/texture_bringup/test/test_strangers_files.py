@@ -69,7 +69,7 @@ from texture_recordings.importers.ntp21 import import_ntp21
 from texture_recordings.slide_dataset import SlideDataset
 from texture_recordings.tables.import_tables import import_tables
 from texture_recordings.tables.mapping import load_mapping, mapping_from
-from texture_recordings.tables.readers.catalogue import MAPPED
+from texture_recordings.tables.tables import MAPPED
 from texture_simulation.scene import load_scene
 
 SEED = int(os.environ.get('FUZZ_SEED', '0'))

@@ -75,3 +75,16 @@ def test_what_is_nested_too_deeply_to_be_shown_is_called_so() -> None:
     assert safe_repr(deep) == 'something nested too deeply'
     while deep:  # taken apart step by step: Python itself takes such a thing apart by recursion
         deep = deep.pop()
+
+
+@pytest.mark.parametrize('text', ['9' * 309, '-' + '9' * 400, '0x' + 'f' * 300, '9' * 5000])
+def test_whole_numbers_that_no_float_can_hold_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match='digits'):
+        parse_yaml(f'rate_hz: {text}')
+    assert parse_yaml(f'rate_hz: {"9" * 308}') == {'rate_hz': int('9' * 308)}
+
+
+@pytest.mark.parametrize('text', ['9' * 309, '-' + '9' * 400, '9' * 5000])
+def test_whole_numbers_of_json_that_no_float_can_hold_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match='digits'):
+        parse_json(f'{{"force_n": {text}}}')

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 import typing
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -94,7 +95,7 @@ class Parameter:
         if typing.get_origin(self.type) is list:
             return self._check_list(value)
         if self.type is float and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
+            value = float(value) if abs(value) <= sys.float_info.max else math.inf
         if not isinstance(value, self.type) or (self.type is not bool and isinstance(value, bool)):
             raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(value)}; {NOUNS[self.type]} is needed")
         self._check_range(value)
@@ -111,8 +112,8 @@ class Parameter:
         below = self.low is not None and not value >= self.low
         above = self.high is not None and not value <= self.high
         unlisted = bool(self.choices) and value not in self.choices
-        if below or above or unlisted or (isinstance(value, float) and math.isnan(value)):
-            allowed = self.range_text or 'a number that is not NaN'
+        if below or above or unlisted or (isinstance(value, float) and not math.isfinite(value)):
+            allowed = self.range_text or 'a finite number'
             raise InvalidParameter(f"parameter '{self.name}' is {safe_repr(value)}; allowed is {allowed}")
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -115,21 +116,34 @@ def parse_json(text: str) -> Any:
     if n_values > MAX_JSON_VALUES:
         raise FileRefused(f'it has {n_values} values; {MAX_JSON_VALUES} are allowed')
     try:
-        return json.loads(text)
+        return json.loads(text, parse_int=_whole_number)
     except RecursionError as error:
         raise ValueError('it is nested too deeply') from error
 
 
 def safe_repr(value: Any) -> str:
-    """Return a value as a sentence shows it, however it is nested."""
+    """Return a value as a sentence shows it, however it is nested and however many digits it has."""
     try:
         return repr(value)
     except RecursionError:
         return 'something nested too deeply'
+    except ValueError:
+        return 'a number of thousands of digits'
+
+
+def _whole_number(text: str) -> int:
+    """Return a whole number that a float can hold: nothing here is counted beyond."""
+    number = int(text)
+    if abs(number) > sys.float_info.max:
+        raise ValueError(f'it has a whole number of {len(text)} digits; 308 are allowed')
+    return number
 
 
 class _BoundedLoader(yaml.SafeLoader):
-    """Build a tree of nodes that is neither deep nor large."""
+    """Build a tree of nodes that is neither deep nor large, without whole numbers that no float can hold."""
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        return _whole_number(str(super().construct_yaml_int(node)))
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -142,6 +156,9 @@ class _BoundedLoader(yaml.SafeLoader):
         node = super().compose_node(parent, index)
         self._depth -= 1
         return node
+
+
+_BoundedLoader.add_constructor('tag:yaml.org,2002:int', _BoundedLoader.construct_yaml_int)
 
 
 def _among(marks: AnyArray, wanted: bytes) -> AnyArray:

@@ -13,6 +13,7 @@ from texture_core.errors import InvalidData
 
 NANOSECONDS = 1_000_000_000
 TARED = ' (tared)'  # ends the name of a sensor whose level without load has been subtracted
+MIN_HZ = 1e-3  # a sample in a quarter of an hour: below, stamps leave what 64 bits hold
 MAX_HZ = 1e6  # seconds of samples are kept: a rate from nowhere would take all memory
 
 
@@ -63,10 +64,10 @@ class TactileSignal:
                 f"signal of '{self.sensor}' has {len(self.units)} units for {len(self.channels)} channels; "
                 'give one for each, or none'
             )
-        if not 0 < self.sampling_rate_hz <= MAX_HZ:
+        if not MIN_HZ <= self.sampling_rate_hz <= MAX_HZ:
             raise InvalidData(
                 f"signal of '{self.sensor}' has a sampling rate of {self.sampling_rate_hz} Hz; "
-                f'give one above 0, at most {MAX_HZ:g}'
+                f'give one from {MIN_HZ:g} to {MAX_HZ:g}'
             )
         if self.first_sample < 0:
             raise InvalidData(f"signal of '{self.sensor}' starts at sample {self.first_sample}; 0 is the first")

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import pytest
 import serial
+import yaml
 
 from texture_core.errors import CommandRefused, DeviceError, InvalidParameter
 from texture_core.plain_data import load_yaml
@@ -25,6 +26,7 @@ from texture_simulation.devices.dynamixel import PING, READ, EmulatedDynamixelBu
 from texture_simulation.devices.dynamixel_motors import (
     GOAL_CURRENT,
     GOAL_POSITION,
+    MODE,
     OVERLOAD,
     TORQUE,
     TRIPPED,
@@ -190,6 +192,44 @@ def test_a_profile_of_motors_with_unlike_torques_is_refused():
     content = load_yaml(find_file('xm430', 'texture_exploration', 'config/hands', 'hand profile'), 'hand profile')
     with pytest.raises(InvalidParameter, match=r'model 1010 \(XH430-W210\) makes 1\.92 N·m/A at 1\.34 mA per count'):
         read_profile({**content, 'models': [1020, 1010]}, 'mine')
+
+
+def places(value, path=()):
+    """Yield where the numbers of a profile stand."""
+    for key, inner in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
+        if isinstance(inner, (dict, list)):
+            yield from places(inner, (*path, key))
+        elif not isinstance(inner, str):
+            yield (*path, key)
+
+
+@pytest.mark.parametrize('wrong', [math.nan, math.inf, -math.inf, 1e9, -1e9, pytest.param(10**400, id='400 digits')])
+def test_every_number_of_a_profile_has_a_range(tmp_path, wrong):
+    text = find_file('leap', 'texture_exploration', 'config/hands', 'hand profile').read_text()
+    for *outer, key in places(yaml.safe_load(text)):
+        content = place = yaml.safe_load(text)
+        for name in outer:
+            place = place[name]
+        place[key] = wrong
+        (tmp_path / 'mine.yaml').write_text(yaml.safe_dump(content))
+        with pytest.raises(InvalidParameter, match="hand profile 'mine'"):
+            load_profile(str(tmp_path / 'mine.yaml'))
+
+
+@pytest.mark.parametrize(('register', 'place'), [('bus_watchdog', [100, 1]), ('goal_current', [104, 2])])
+def test_a_register_at_another_place_than_in_the_motor_is_refused(register, place):
+    content = load_yaml(find_file('leap', 'texture_exploration', 'config/hands', 'hand profile'), 'hand profile')
+    with pytest.raises(InvalidParameter, match=rf"'{register}' stands at .* what protects would not be armed"):
+        read_profile({**content, 'table': {**content['table'], register: place}}, 'mine')
+
+
+@pytest.mark.parametrize('address', [WATCHDOG, GOAL_CURRENT, MODE])
+def test_a_motor_that_does_not_keep_what_bounds_its_force_is_refused(bus, hand, monkeypatch, address):
+    write = bus.motors.write
+    monkeypatch.setattr(bus.motors, 'write', lambda motor, at, data: 0 if at == address else write(motor, at, data))
+    with pytest.raises(DeviceError, match='what bounds its force is not armed'):
+        hand.connect()
+    assert torque_is_off(bus)
 
 
 @pytest.mark.parametrize('watchdog_s', [-1.0, 0.001, 3.0, math.nan])

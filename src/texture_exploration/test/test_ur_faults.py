@@ -340,12 +340,17 @@ def test_a_program_of_somebody_else_is_not_stopped_unless_it_is_said():
             assert emulator.controller.ask('programState') == 'PLAYING rtde_control'
 
 
+def test_a_controller_that_only_estimates_forces_is_told_of_when_it_is_connected():
+    with bench_at('127.0.0.77', version='3.15') as emulator, connected(emulator.ip, watchdog_hz=1.0) as arm:
+        assert 'is a CB3, which estimates forces within about 10 N' in arm.warning()
+
+
 def test_polyscope_x_which_has_no_dashboard_reports_by_rtde_that_a_program_runs():
     # On a busy machine the watchdog would end the program that is to be seen.
     with bench_at('127.0.0.77', version='10.10') as emulator, connected(emulator.ip, watchdog_hz=1.0) as arm:
         with pytest.raises(DeviceError, match=r"another program is on the controller .*'runtime state 2'"):
             UrArm(UrArmParams(ip=emulator.ip)).connect()
-        assert arm.state().fault == ''
+        assert (arm.state().fault, arm.warning()) == ('', '')
 
 
 def test_a_program_that_somebody_starts_meanwhile_is_a_fault_and_gets_no_commands():

@@ -1,3 +1,4 @@
+import math
 from itertools import pairwise
 from pathlib import Path
 
@@ -7,9 +8,8 @@ from foreign_tables import MAPPING, RATE_HZ, STROKE_ROWS, recordings, write_csv
 
 from texture_core.errors import InvalidData, InvalidParameter, TextureError
 from texture_recordings.slide_dataset import SlideDataset
-from texture_recordings.tables.import_tables import import_tables
+from texture_recordings.tables.import_tables import ImportReport, import_tables
 from texture_recordings.tables.mapping import TableMapping, load_mapping, mapping_from
-from texture_recordings.tables.report import ImportReport
 
 FIRST_STROKE = 40  # row of the first stroke, after rest
 
@@ -185,11 +185,24 @@ def test_a_label_that_changes_within_a_slide_is_refused_with_its_row(tmp_path: P
         ({'conditions': {'speed': {'unit': 'mph'}}}, "the unit of speed is 'mph'; use one of m/s, cm/s, mm/s"),
         ({'files': '{a}{b}.csv'}, 'fields without text between'),
         ([], 'a mapping of parameter names to values is needed'),
+        ({'streams': {'signal': {'columns': ['a'], 'scale': math.inf}}}, "'scale' is inf; allowed is a finite number"),
+        (
+            {'streams': {'signal': {'columns': ['a'], 'rate_hz': 1e-9}}},
+            "'rate_hz' is 1e-09; allowed are 0 and 0.001 to",
+        ),
+        ({'streams': {'signal': {'columns': ['a'], 'rate_hz': 10**5000}}}, "'rate_hz' is inf; allowed is 0.0 to"),
     ],
 )
 def test_a_mapping_that_makes_no_sense_is_refused_with_a_sentence(content: object, sentence: str) -> None:
     with pytest.raises(InvalidParameter, match=sentence):
         mapping_from(content)
+
+
+def test_a_column_whose_name_is_a_long_number_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    save(tmp_path, x=np.arange(300.0))
+    mapping = mapping_from({'streams': {'signal': {'columns': [f'1-{"9" * 30_000}']}}, 'label': {'value': 'cork'}})
+    with pytest.raises(InvalidData, match=r"no column '1-9+"):
+        import_tables(mapping, tmp_path / 'in', tmp_path / 'out')
 
 
 def test_a_column_in_braces_and_whole_numbers_are_names() -> None:

@@ -87,6 +87,22 @@ def test_a_sensor_is_recorded_without_numerical_libraries_and_without_the_rest_o
     assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
 
 
+def test_what_a_recorder_has_until_a_second_before_it_is_killed_is_read(tmp_path: Path) -> None:
+    np.savez(tmp_path / 'slide.npz', samples=np.arange(500.0)[:, None], rate_hz=1000.0, channels=['film'])
+    source = {'sensor': 'file', 'device': str(tmp_path / 'slide.npz'), 'config': "'{loop: true}'"}
+    with LocalGraph(DOMAIN, deadline_s=60.0) as graph:
+        reports = graph.listen(DiagnosticArray, '/diagnostics')
+        with (
+            alone('texture_recordings.nodes.record', tmp_path / 'log', out=str(tmp_path / 'bag')) as record,
+            alone('texture_drivers.nodes.sensor', tmp_path / 'other_log', **source),
+        ):
+            graph.until(lambda: recorded(reports) > 2500)
+            record.kill()
+    batches = [batch for _, _, batch in read_bag(tmp_path / 'bag', ('signal',))]
+    assert sum(len(batch.samples) for batch in batches) > 1000
+    assert all(batch.samples[0] == batch.first_sample % 500 for batch in batches)
+
+
 @pytest.mark.parametrize(
     'module', ['texture_recordings.slide_dataset', 'texture_features.spectra.spectrum', 'scipy.signal']
 )

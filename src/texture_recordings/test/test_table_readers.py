@@ -1,7 +1,11 @@
 """Every reader of the catalogue passes the same checks by being listed."""
 
+import os
+import resource
 import struct
 import sys
+import time
+import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -15,10 +19,8 @@ import scipy.io
 from scipy.io import wavfile
 
 from texture_core.errors import InvalidData
-from texture_recordings.tables.mapping import TableMapping, mapping_from
-from texture_recordings.tables.name_template import NameTemplate
-from texture_recordings.tables.readers.catalogue import READERS
-from texture_recordings.tables.table import Table
+from texture_recordings.tables.mapping import NameTemplate, TableMapping, mapping_from
+from texture_recordings.tables.tables import MAPPED, READERS, Table, TableFiles
 
 X = np.round(np.sin(np.arange(60.0)) * 0.5, 4)
 Y = np.round(np.cos(np.arange(60.0)) * 0.5, 4)
@@ -65,7 +67,7 @@ def made(folder: Path, suffix: str) -> Path:
     return path
 
 
-each = pytest.mark.parametrize('suffix', READERS)
+each = pytest.mark.parametrize('suffix', MAPPED['table'])
 
 
 @each
@@ -82,13 +84,13 @@ def test_columns_are_read_as_they_were_written(tmp_path: Path, suffix: str) -> N
 
 @each
 def test_a_file_that_is_something_else_is_refused_with_a_sentence_that_names_it(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f'other{suffix}'
-    path.write_bytes(b'')
-    with pytest.raises(InvalidData, match=f"'other{suffix}'"):
-        tables(path)
+    (tmp_path / f'other{suffix}').write_bytes(b'')
     (tmp_path / f'folder{suffix}').mkdir()
-    with pytest.raises(InvalidData, match=f"'folder{suffix}'"):
-        tables(tmp_path / f'folder{suffix}')
+    os.mkfifo(tmp_path / f'pipe{suffix}')
+    with TableFiles() as files:
+        for name in ('other', 'folder', 'pipe'):
+            with pytest.raises(InvalidData, match=f"'{name}{suffix}'"):
+                list(files.tables(suffix, tmp_path / f'{name}{suffix}', f'{name}{suffix}', mapping()))
 
 
 @each
@@ -96,16 +98,112 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, suffix: str) -> None:
     content = made(tmp_path, suffix).read_bytes()
     rng = np.random.default_rng(0)
     path = tmp_path / f'damaged{suffix}'
-    for _ in range(60):
-        data = bytearray(content[: int(rng.integers(1, len(content)))] if rng.random() < 0.3 else content)
-        for place in rng.integers(0, len(data), rng.integers(1, 6)).tolist():
-            data[place] = int(rng.integers(256))
-        path.write_bytes(data)
-        try:
-            for table in READERS[suffix](path, path.name, mapping()):
-                table.read(list(table.names), list(table.names))
-        except InvalidData as error:
-            assert path.name in str(error)
+    with TableFiles() as files:
+        for _ in range(60):
+            data = bytearray(content[: int(rng.integers(1, len(content)))] if rng.random() < 0.3 else content)
+            for place in rng.integers(0, len(data), rng.integers(1, 6)).tolist():
+                data[place] = int(rng.integers(256))
+            path.write_bytes(data)
+            try:
+                for table in files.tables(suffix, path, path.name, mapping()):
+                    table.read(list(table.names), list(table.names))
+            except InvalidData as error:
+                assert path.name in str(error)
+
+
+HUGE = 300_000_000  # values: 2.4 GB
+ZEROS = bytes(8_000_000)
+
+
+def huge_parquet(path: Path) -> None:
+    table = pa.table({'x': np.zeros(HUGE // 300)})
+    with pa.parquet.ParquetWriter(path, table.schema) as writer:
+        for _ in range(300):
+            writer.write_table(table)
+
+
+def huge_hdf5(path: Path) -> None:
+    with h5py.File(path, 'w') as file:
+        file.create_dataset('x', shape=(HUGE,), dtype='f8', compression='gzip')  # chunks that were never written
+
+
+def huge_mat(path: Path, megavalues: int) -> None:
+    """Claim a column of `HUGE` values, and hold some of them, compressed."""
+    scipy.io.savemat(path, {'x': X})
+    head = struct.pack('<IIII', 6, 8, 6, 0) + struct.pack('<IIii', 5, 8, HUGE, 1) + b'\1\0\1\0x\0\0\0'
+    head += struct.pack('<II', 9, 8 * HUGE)
+    packer = zlib.compressobj(1)
+    packed = packer.compress(struct.pack('<II', 14, len(head) + 8 * HUGE) + head)
+    packed += b''.join(packer.compress(ZEROS) for _ in range(megavalues)) + packer.flush()
+    path.write_bytes(path.read_bytes()[:128] + struct.pack('<II', 15, len(packed)) + packed)
+
+
+def numpy_header(count: int) -> bytes:
+    text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({count},), }}".ljust(117) + '\n'
+    return b'\x93NUMPY\1\0' + struct.pack('<H', len(text)) + text.encode()
+
+
+def huge_npz(path: Path) -> None:
+    with zipfile.ZipFile(path, 'w', zipfile.ZIP_DEFLATED, compresslevel=1) as archive, archive.open('x.npy', 'w') as x:
+        x.write(numpy_header(HUGE // 2))
+        for _ in range(HUGE // 2_000_000):
+            x.write(ZEROS)
+
+
+HOSTILE: dict[str, Callable[[Path], object]] = {
+    'unpacks.parquet': huge_parquet,
+    'unwritten.h5': huge_hdf5,
+    'unpacks.mat': lambda path: huge_mat(path, 150),
+    'claims.mat': lambda path: huge_mat(path, 0),
+    'claims.npy': lambda path: path.write_bytes(numpy_header(10**12)),
+    'unpacks.npz': huge_npz,
+    'one_line.csv': lambda path: path.write_bytes(b'1;' * 30_000_000),
+    'sparse.csv': lambda path: (path.write_bytes(b'x\n'), os.truncate(path, 2 * 10**9)),
+}
+
+
+@pytest.mark.parametrize('name', HOSTILE)
+def test_a_file_that_takes_the_machine_is_refused_in_one_sentence(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    HOSTILE[name](path)
+    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    began_s = time.monotonic()
+    with TableFiles() as files, pytest.raises(InvalidData, match=rf"^'{name}' .*; \w+"):
+        for table in files.tables(path.suffix, path, name, mapping()):
+            table.read(table.names[:1], [])
+    assert time.monotonic() - began_s < 60.0  # of which reading takes at most 10 s, but of the long text
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb < 50_000
+
+
+def test_a_file_that_takes_too_long_is_refused_and_the_next_one_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = made(tmp_path, '.csv')
+    with TableFiles() as files:
+        monkeypatch.setattr('texture_recordings.tables.tables.DEADLINE_S', 1e-6)
+        with pytest.raises(InvalidData, match=r"'a\.csv' was refused: it takes longer to read than a file of its size"):
+            list(files.tables('.csv', path, 'a.csv', mapping()))
+        monkeypatch.undo()
+        assert [table.names for table in files.tables('.csv', path, 'a.csv', mapping())] == [['x', 'y']]
+
+
+def test_a_wide_parquet_file_is_read_in_time(tmp_path: Path) -> None:
+    pa.parquet.write_table(pa.table({f'c{number}': X for number in range(5000)}), tmp_path / 'a.parquet')
+    with TableFiles() as files:
+        for table in files.tables('.parquet', tmp_path / 'a.parquet', 'a', mapping()):
+            np.testing.assert_array_equal(table.read(table.names, []).numbers['c4999'], X)
+
+
+def test_groups_of_hdf5_that_link_to_each_other_are_read_once(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / 'a.h5', 'w') as file:
+        groups = [file.create_group(f'g{number}') for number in range(60)]
+        for group in groups:
+            for other in groups:
+                group[f'to{other.name[1:]}'] = other
+        groups[-1]['x'] = X
+    with TableFiles() as files:
+        [names] = [table.names for table in files.tables('.h5', tmp_path / 'a.h5', 'a', mapping())]
+    assert len(names) == 1
 
 
 @each
@@ -129,29 +227,9 @@ def test_a_missing_library_is_told_in_one_sentence(
 def test_objects_in_arrays_are_refused_and_nothing_is_run(tmp_path: Path) -> None:
     np.save(tmp_path / 'a.npy', np.array([{'a': 1}], dtype=object), allow_pickle=True)
     np.savez(tmp_path / 'a.npz', x=np.array([{'a': 1}], dtype=object))
-    for name in ('a.npy', 'a.npz'):
-        with pytest.raises(InvalidData, match='Python objects, which would run code'):
-            tables(tmp_path / name)
-
-
-def test_a_matlab_file_that_claims_huge_dimensions_is_refused(tmp_path: Path) -> None:
-    scipy.io.savemat(tmp_path / 'a.mat', {'x': X})
-    content = bytearray((tmp_path / 'a.mat').read_bytes())
-    at = content.index(struct.pack('<ii', 1, 60))
-    content[at : at + 8] = struct.pack('<ii', 2**30, 2**30)
-    (tmp_path / 'a.mat').write_bytes(content)
-    with pytest.raises(InvalidData, match="array 'x' of shape"):
-        tables(tmp_path / 'a.mat')
-
-
-def test_a_matlab_file_that_unpacks_without_end_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('texture_recordings.tables.table.MAX_BYTES', 1_000_000)
-    scipy.io.savemat(tmp_path / 'a.mat', {'x': X})
-    head = (tmp_path / 'a.mat').read_bytes()[:128]
-    packed = zlib.compress(bytes(100_000_000))
-    (tmp_path / 'a.mat').write_bytes(head + struct.pack('<II', 15, len(packed)) + packed)
-    with pytest.raises(InvalidData, match='unpacks to more than'):
-        tables(tmp_path / 'a.mat')
+    for suffix in ('.npy', '.npz'):
+        with TableFiles() as files, pytest.raises(InvalidData, match='Object arrays cannot be loaded'):
+            list(files.tables(suffix, tmp_path / f'a{suffix}', 'a', mapping()))
 
 
 def test_structs_of_matlab_are_folders_and_row_vectors_are_columns(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """Limits for bags of any origin where rosbags has none: what unpacks, how often, and which files are opened at all.
 
+An MCAP file without its end, of a recorder that was killed, is opened as if it ended behind its last whole chunk.
+
 rosbags unpacks first and compares afterwards, when a chunk of a kilobyte may have filled the memory; it believes the
 index of an MCAP file, in which a chunk may stand a hundred thousand times; and what an SQLite file computes is not
 bounded by its size.
@@ -7,6 +9,8 @@ bounded by its size.
 
 from __future__ import annotations
 
+import io
+import logging
 import re
 import struct
 import sys
@@ -15,6 +19,7 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import IO, Any, BinaryIO
+from zlib import crc32
 
 import apsw
 from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
@@ -24,9 +29,9 @@ from texture_core.files import MB, Budget, FileRefused, open_regular, read_text,
 from texture_core.signal import TactileSignal
 
 if sys.version_info >= (3, 14):
-    from compression.zstd import ZstdDecompressor
+    from compression.zstd import ZstdDecompressor, ZstdError
 else:
-    from backports.zstd import ZstdDecompressor
+    from backports.zstd import ZstdDecompressor, ZstdError
 
 MAX_METADATA_BYTES = 100_000  # of metadata.yaml: a file of 600 parts
 # Each record in a chunk becomes objects of 150 bytes, however little it takes in the file.
@@ -34,7 +39,12 @@ RECORDS_AT_LEAST = 16
 PACKED_RECORD_BYTES = 8
 CHUNK = 0x06
 CHUNK_HEAD = struct.Struct('<QQQI')  # start and end time, size of what it unpacks to, checksum
+CHUNK_CHECKSUM_AT = 33  # from the beginning of the record of a chunk
 RECORD_HEAD = struct.Struct('<BQ')
+MAGIC = b'\x89MCAP0\r\n'
+# The end of a file: the footer with the place of the summary, which is 0 if there is none, and its checksum; the magic.
+END = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + MAGIC
+FOOTER_BYTES, CHECKSUM_FROM_END = len(END), 12
 # Signals are read in 10 µs each, other messages in 25 µs, and each becomes objects of up to 1.5 kB; a bag of 5 MB may
 # hold so many signals, or a third of it of other messages, and larger ones another for every 8 bytes.
 SIGNALS_AT_LEAST, OTHERS_COUNT = 200_000, 3
@@ -64,12 +74,96 @@ class CheckedPath(type(Path())):  # type: ignore[misc]
     """
 
     def open(self, *_args: Any, **_options: Any) -> IO[Any]:
-        """Open the file for reading bytes."""
-        return open_regular(self)
+        """Open the file for reading bytes, an MCAP file without its end up to its last whole chunk."""
+        file = open_regular(self)
+        if self.suffix != '.mcap' or _has_end(file):
+            return file
+        end = _end_of_chunks(file)
+        logging.getLogger(__name__).warning("'%s' was cut off; it is read up to its last whole chunk", self)
+        return io.BufferedReader(_Ended(file, end))
 
     def read_text(self, encoding: str | None = None, errors: str | None = None) -> str:
         """Return the text of a short file."""
         return read_text(self, MAX_METADATA_BYTES, encoding or 'utf-8')
+
+
+class _Ended(io.RawIOBase):
+    """The first bytes of a file, and the end that it lacks."""
+
+    def __init__(self, file: BinaryIO, length: int) -> None:
+        self._file, self._length, self._at = file, length, 0
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        self._at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length + len(END)}[whence]
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        if self._at < self._length:
+            self._file.seek(self._at)
+            part = self._file.read(min(len(buffer), self._length - self._at))
+        else:
+            part = END[self._at - self._length :][: len(buffer)]
+        buffer[: len(part)] = part
+        self._at += len(part)
+        return len(part)
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+
+def _has_end(file: BinaryIO) -> bool:
+    """Return whether an MCAP file has its end; FileRefused if the checksum of its summary is wrong."""
+    size = file.seek(0, io.SEEK_END)
+    file.seek(max(0, size - FOOTER_BYTES))
+    end = file.read()
+    if end[:9] != END[:9] or not end.endswith(MAGIC):
+        file.seek(0)
+        return False
+    summary, checksum = int.from_bytes(end[9:17], 'little'), int.from_bytes(end[-12:-8], 'little')
+    if summary and checksum:
+        file.seek(min(summary, size))
+        if crc32(file.read()[:-CHECKSUM_FROM_END]) != checksum:
+            raise FileRefused('its index was altered: the checksum is another')
+    file.seek(0)
+    return True
+
+
+def _end_of_chunks(file: BinaryIO) -> int:
+    """Return where the last whole chunk of an MCAP file ends; power that fails may leave one of the right length."""
+    size = file.seek(0, io.SEEK_END)
+    chunks = []
+    at = end = len(MAGIC)
+    for kind, length, _ in _records(file, size):
+        at += RECORD_HEAD.size + length
+        if at > size or not kind:
+            break
+        if kind == CHUNK:
+            chunks.append((at - length, length))
+        end = at
+    while chunks and not _is_whole(file, *chunks[-1]):
+        end = chunks.pop()[0] - RECORD_HEAD.size
+    file.seek(0)
+    return end
+
+
+def _is_whole(file: BinaryIO, at: int, length: int) -> bool:
+    file.seek(at)
+    content = file.read(length)
+    try:
+        _, _, size, checksum = CHUNK_HEAD.unpack_from(content)
+        packed = CHUNK_HEAD.size + 4 + int.from_bytes(content[CHUNK_HEAD.size :][:4], 'little')
+        kind = content[CHUNK_HEAD.size + 4 : packed].decode()
+        storage_mcap.decompress(content[packed + 8 :], kind, size, checksum)
+    except (ReaderError, ValueError, struct.error, RuntimeError, ZstdError):
+        return False
+    return True
 
 
 def check_storage(path: Path) -> None:
@@ -170,21 +264,21 @@ def _budget(file_bytes: int) -> Budget:
 def _check_mcap(file: BinaryIO) -> None:
     size = file.seek(0, 2)
     budget = _budget(size)
-    for kind, head in _records(file, size):
+    for kind, _, head in _records(file, size):
         if kind == CHUNK and len(head) == CHUNK_HEAD.size:
             budget.spend(CHUNK_HEAD.unpack(head)[2])
 
 
-def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, bytes]]:
-    """Yield the kind and the first bytes of each record; what is damaged is left to who reads on."""
-    at = len(b'\x89MCAP0\r\n')
+def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, int, bytes]]:
+    """Yield the kind, the length and the first bytes of each record; what is damaged is left to who reads on."""
+    at = len(MAGIC)
     while at + RECORD_HEAD.size <= size:
         file.seek(at)
         head = file.read(RECORD_HEAD.size + CHUNK_HEAD.size)
         if len(head) < RECORD_HEAD.size:
             return
         kind, length = RECORD_HEAD.unpack_from(head)
-        yield kind, head[RECORD_HEAD.size :]
+        yield kind, length, head[RECORD_HEAD.size :]
         at += RECORD_HEAD.size + length
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 from rosbags.interfaces import (
     Connection,
@@ -18,6 +20,7 @@ from rosbags.interfaces import (
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from texture_core.errors import InvalidData
+from texture_recordings.bag_limits import CHECKSUM_FROM_END, CHUNK_CHECKSUM_AT, FOOTER_BYTES
 from texture_recordings.bags import RawMessage
 from texture_recordings.cdr import TYPES, encode, typestore
 from texture_recordings.topic_names import short_name
@@ -51,6 +54,8 @@ class BagWriter:
     namespace
         Put before topics that do not start with '/': 'signal' becomes '/left/signal' in '/left'.
 
+    Each chunk carries its checksum, and `flush` ends one: a bag whose writer was killed is read up to the last.
+
     Raises
     ------
     InvalidData
@@ -83,6 +88,10 @@ class BagWriter:
             self._writer.open()
         except OSError as error:
             raise InvalidData(f"no bag can be made at '{path}': {error.strerror}; name another place") from error
+        storage: Any = self._writer.storage
+        self._storage = storage
+        self._close_chunk = self._storage.close_chunk  # without a checksum
+        self._storage.close_chunk = self._close_with_checksum
 
     def write(self, topic: str, value: Any, log_ns: int) -> None:
         """Write a data class of texture_core as received at `log_ns`.
@@ -105,9 +114,30 @@ class BagWriter:
             self._connections[key] = self._connect(*key)
         self._writer.write(self._connections[key], message.log_ns, message.data)
 
+    def flush(self) -> None:
+        """Bring to the disk what was written: it can be read whatever happens to this process or machine."""
+        if self._storage.chunk.msgs:
+            self._storage.close_chunk()
+        self._storage.bio.flush()
+        os.fsync(self._storage.bio.fileno())
+
     def close(self) -> None:
-        """Complete the bag; without this it cannot be read."""
+        """Complete the bag."""
         self._writer.close()
+        with self._storage.path.open('r+b') as file:
+            file.seek(-FOOTER_BYTES, os.SEEK_END)
+            file.seek(int.from_bytes(file.read(FOOTER_BYTES)[9:17], 'little'))
+            checksum = crc32(file.read()[:-CHECKSUM_FROM_END])
+            file.seek(-CHECKSUM_FROM_END, os.SEEK_END)
+            file.write(checksum.to_bytes(4, 'little'))
+
+    def _close_with_checksum(self) -> None:
+        file, checksum = self._storage.bio, crc32(self._storage.chunk.bio.getbuffer())
+        at = file.tell() + CHUNK_CHECKSUM_AT
+        self._close_chunk()
+        file.seek(at)
+        file.write(checksum.to_bytes(4, 'little'))
+        file.seek(0, os.SEEK_END)
 
     def _connect(self, topic: str, msgtype: str) -> Connection:
         name = topic if topic.startswith('/') else f'{self._namespace.rstrip("/")}/{topic}'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -50,8 +51,17 @@ class RawMessage(NamedTuple):
 
 
 def is_bag(path: Path) -> bool:
-    """Say whether something looks like a bag: a folder with metadata.yaml, or an MCAP file."""
-    return (path / 'metadata.yaml').is_file() or (path.is_file() and path.suffix == '.mcap')
+    """Say whether something looks like a bag: a folder with metadata.yaml or that was cut off, or an MCAP file."""
+    whole = (path / 'metadata.yaml').is_file() or (path.is_file() and path.suffix == '.mcap')
+    return whole or _cut_off_file(path) is not None
+
+
+def _cut_off_file(path: Path) -> Path | None:
+    """Return the one file of a bag whose recorder could not write the metadata."""
+    if not path.is_dir() or os.path.lexists(path / 'metadata.yaml'):
+        return None
+    files = list(path.glob('*.mcap'))
+    return files[0] if len(files) == 1 else None
 
 
 def find_bags(paths: Iterable[str | Path]) -> list[Path]:
@@ -77,10 +87,7 @@ def _no_bag(path: Path) -> str:
     if not path.exists():
         return f"there is no bag '{path}'; give the folder that was recorded or imported"
     if path.is_dir() and next(path.glob('*.mcap'), None):
-        return (
-            f"the bag '{path}' has no metadata.yaml, its recording was cut off; "
-            '`mcap recover` may save the .mcap file, which can be given by itself'
-        )
+        return f"the bag '{path}' has no metadata.yaml, its recording was cut off; give its .mcap files one by one"
     return f"'{path}' is no bag; a folder with metadata.yaml and an .mcap file, or a folder of such bags, is needed"
 
 
@@ -240,7 +247,7 @@ def _read(
     if not is_bag(path):
         raise InvalidData(_no_bag(path))
     try:
-        checked = CheckedPath(path)
+        checked = CheckedPath(_cut_off_file(path) or path)
         files = _files(checked)
         for file in files:
             check_storage(file)

@@ -19,6 +19,8 @@ class Continuity:
     ...     continuity.update('signal', TactileSignal(0, 'finger', ('pac',), (), 1000.0, first_sample, samples))
     >>> continuity.lost['signal'], continuity.restarts['signal']
     (5, 1)
+    >>> continuity.losses
+    '5 samples lost, and unknown losses in 1 restart of a driver or bridge'
     """
 
     def __init__(self) -> None:
@@ -26,6 +28,13 @@ class Continuity:
         self.lost: Counter[str] = Counter()
         self.restarts: Counter[str] = Counter()
         self._next: dict[str, int] = {}
+
+    @property
+    def losses(self) -> str:
+        """What was lost, in words, '' if nothing: of a restart, which numbers anew, nobody can tell how much."""
+        lost, restarts = self.lost.total(), self.restarts.total()
+        unknown = f'unknown losses in {restarts} restart{"s" if restarts > 1 else ""} of a driver or bridge'
+        return ', and '.join(filter(None, (f'{lost} samples lost' if lost else '', unknown if restarts else '')))
 
     def update(self, stream: str, signal: TactileSignal) -> None:
         """Take the next batch of a stream; an index that goes back is a restart of its driver, not a loss."""

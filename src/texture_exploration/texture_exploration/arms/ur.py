@@ -16,7 +16,7 @@ from texture_exploration.arms.ur_messages import RECOVER, STOP, UrCommand, UrRep
 from texture_exploration.arms.ur_params import UrArmParams
 from texture_exploration.arms.ur_probe import check_ready, unlock_protective_stop
 from texture_exploration.arms.ur_program import check_program
-from texture_exploration.arms.ur_tables import SAFETY_FAULTS
+from texture_exploration.arms.ur_tables import CB3, SAFETY_FAULTS
 
 BASE_FRAME_ID = 'base'  # as ur_robot_driver and UR's own description call it, without a prefix
 STANDSTILL = ArmCommand()
@@ -45,6 +45,7 @@ class UrArm:
         self._params = params
         self._frame = SurfaceFrame(params.surface_pose)
         self._link: WorkerLink | None = None
+        self._series = 0  # of the controller that was connected last
         self._paused = False  # a stop by the safety system may have left our program paused
 
     def check(self) -> None:
@@ -88,7 +89,16 @@ class UrArm:
         except DeviceError:
             link.end()
             raise
-        self._link = link
+        self._link, self._series = link, version[0]
+
+    def warning(self) -> str:
+        """Return in a sentence that the controller is a CB3, which only estimates forces; '' if it is another."""
+        if self._series != CB3:
+            return ''
+        return (
+            f'the controller at {self._params.ip} is a CB3, which estimates forces within about 10 N: what is pressed '
+            'may be far from what is asked; use an e-Series, or a force sensor in the flange'
+        )
 
     def close(self) -> None:
         """Stop and end the worker process."""

@@ -15,6 +15,7 @@ FIRST_WITH_REMOTE_CONTROL = (5, 6)
 # Oldest software by series: the oldest CB3 that ur-rtde 1.6.5 is tested with (its README); an e-Series with remote
 # control; a PolyScope X that takes programs on the port where ur-rtde sends its own.
 OLDEST: Mapping[int, tuple[int, int]] = {3: (3, 12), 5: (5, 6), 10: (10, 10)}
+CB3 = 3  # the series without a force sensor in the flange
 CONTROL_SCRIPT = 'rtde_control'  # the program of ur-rtde
 # Which it obeys; one client only may write it. By whether the upper range is used (FLAG_UPPER_RANGE_REGISTERS).
 COMMAND_REGISTERS: Mapping[bool, str] = {False: 'input_int_register_0', True: 'input_int_register_24'}

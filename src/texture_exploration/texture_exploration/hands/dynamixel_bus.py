@@ -203,7 +203,7 @@ class DynamixelBus:
         self.write(motor, 'torque_enable', 0)  # or the mode cannot be set
         if self.read_register(motor, 'bus_watchdog'):  # old firmware has none and refuses to write it
             self.write(motor, 'bus_watchdog', 0)  # or no goal is taken after it has stopped the motor
-        self.write(motor, 'operating_mode', profile.operating_mode)
+        self._arm(motor, 'operating_mode', profile.operating_mode)
         for register, value in profile.gains.items():
             self.write(motor, register, value)
         with self._line():
@@ -213,19 +213,36 @@ class DynamixelBus:
         limit = self.read_register(motor, 'current_limit')
         if limit is None:
             return False
+        if limit <= 0:
+            raise DeviceError(
+                f'{profile.owner(motor)} has a Current Limit of {limit}; above 0 is needed, set it with DYNAMIXEL '
+                f"Wizard, or correct the table of the profile '{profile.name}'"
+            )
         self.limits_a[motor] = limit * profile.current_a
         self._goal_currents[motor] = self._counts(motor, profile.move_a)
-        self.write(motor, 'goal_current', self._goal_currents[motor])
+        self._arm(motor, 'goal_current', self._goal_currents[motor])
         self.write(motor, 'goal_position', position)
         return True
 
     def _energise(self, motor: int) -> None:
         """Arm the motor's watchdog, then switch its torque on: it holds where it is."""
         if self._profile.watchdog:
-            self.write(motor, 'bus_watchdog', self._profile.watchdog)
+            self._arm(motor, 'bus_watchdog', self._profile.watchdog)
         self.write(motor, 'torque_enable', 1)
         self._energised.add(motor)
         self.missing.discard(motor)
+
+    def _arm(self, motor: int, register: str, value: int) -> None:
+        """Write a register that bounds the force, and read it back: a motor may confirm what it does not keep."""
+        self.write(motor, register, value)
+        kept = self.read_register(motor, register)
+        if kept is None:
+            raise NoAnswer(f"{self._profile.owner(motor)} did not tell '{register}': it {SILENT}")
+        if kept != value:
+            raise DeviceError(
+                f"{self._profile.owner(motor)} was told {value} for '{register}' and holds {kept}: what bounds its "
+                f"force is not armed; update its firmware, or correct the table of the profile '{self._profile.name}'"
+            )
 
     def reboot(self) -> list[int]:
         """Reboot the motors that report a hardware error, all without torque; return which.

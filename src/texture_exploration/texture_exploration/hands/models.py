@@ -30,6 +30,13 @@ MODELS: Mapping[int, MotorModel] = {
     1230: MotorModel('XC330-M181', 0.001, 0.60 / 1.80),
     1240: MotorModel('XC330-M288', 0.001, 0.93 / 1.80),
 }
+# Address and bytes of the registers in all models above. Source: the same, section Control Table.
+X_SERIES: Mapping[str, tuple[int, int]] = {
+    'operating_mode': (11, 1), 'current_limit': (38, 2), 'torque_enable': (64, 1), 'hardware_error': (70, 1),
+    'position_d': (80, 2), 'position_i': (82, 2), 'position_p': (84, 2), 'bus_watchdog': (98, 1),
+    'goal_current': (102, 2), 'goal_position': (116, 4), 'present_current': (126, 2), 'present_velocity': (128, 4),
+    'present_position': (132, 4),
+}  # fmt: skip
 TOLERANCE = 0.2  # of the torque of a count: motors of one model differ by less, and friction hides the rest
 
 SIZE_330 = range(1190, 1250)

@@ -10,7 +10,7 @@ from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidParameter, TextureError
 from texture_core.plain_data import load_yaml
 from texture_core.resources import find_file
-from texture_exploration.hands.models import differs
+from texture_exploration.hands.models import MODELS, X_SERIES, describe, differs
 from texture_exploration.hands.protocol import FingerSet
 
 ROLES = ('press', 'across', 'along')
@@ -30,6 +30,27 @@ REGISTERS = (
     'present_position',
 )
 WATCHDOG_UNIT_S, MAX_WATCHDOG = 0.02, 127  # the register counts by these
+# Lowest and highest of every number: what motors of this kind have, with room. A number beyond is a slip of the pen,
+# and the motors would press with it.
+RANGES: Mapping[str, tuple[float, float]] = {
+    'model': (0, 65535),
+    'baud': (9600, 4_500_000),
+    'rate_hz': (1.0, 1000.0),
+    'operating_mode': (5, 5),  # current-based position: in any other the current does not bound the force
+    'gain': (0, 16383),
+    'position_rad': (1e-5, 0.1),
+    'zero': (-1_048_575, 1_048_575),
+    'velocity_rad_s': (1e-5, 1.0),
+    'current_a': (1e-5, 0.1),
+    'torque_nm_a': (0.01, 100.0),
+    'idle_a': (0.0, 0.5),
+    'move_a': (0.001, 5.0),
+    'lever_m': (0.001, 1.0),  # of either sign
+    'start_height_m': (0.0, 1.0),
+    'id': (0, 252),
+    'address': (0, 2047),
+}
+SIZES = (1, 2, 4)  # bytes of a register
 
 
 @dataclass(frozen=True)
@@ -154,6 +175,7 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
         hold_pose=tuple(content.get('hold_pose', ())),
         watchdog_s=float(content.get('watchdog_s', Profile.watchdog_s)),
     )
+    _check_numbers(profile, where)
     _check_models(profile, where)
     if profile.watchdog_s != 0 and not 1 <= profile.watchdog_s / WATCHDOG_UNIT_S <= MAX_WATCHDOG:
         raise InvalidParameter(
@@ -165,9 +187,30 @@ def read_profile(content: Mapping[str, Any], name: str) -> Profile:
     return profile
 
 
+def _check_numbers(profile: Profile, where: str) -> None:
+    joints = [joint for finger in profile.fingers.values() for joint in finger.values()]
+    numbers = [(name, getattr(profile, name)) for name in RANGES if hasattr(profile, name)]
+    numbers += [('model', model) for model in profile.models] + [('gain', gain) for gain in profile.gains.values()]
+    numbers += [('id', motor) for motor in profile.ids] + [('lever_m', abs(joint.lever_m)) for joint in joints]
+    numbers += [('address', address) for address, _ in profile.table.values()]
+    for name, number in numbers:
+        low, high = RANGES[name]
+        if not low <= number <= high:  # so is NaN
+            raise InvalidParameter(f'{where}: {name} is {number:g}; allowed are {low:g} to {high:g}')
+    for register, (_, size) in profile.table.items():
+        if size not in SIZES:
+            raise InvalidParameter(f"{where}: register '{register}' has {size} bytes; 1, 2 or 4 are possible")
+
+
 def _check_models(profile: Profile, where: str) -> None:
     """Refuse motors for which the torque of the profile is wrong: they would press harder or softer than asked."""
     for model in profile.models:
+        for register, place in profile.table.items():
+            if model in MODELS and place != X_SERIES.get(register, place):
+                raise InvalidParameter(
+                    f"{where}: '{register}' stands at {list(place)} in the table; motors of model {describe(model)} "
+                    f'have it at {list(X_SERIES[register])}, and what protects would not be armed'
+                )
         if difference := differs(model, profile.current_a, profile.torque_nm_a):
             raise InvalidParameter(
                 f'{where}: {difference}; give each model a profile of its own, with its current_a and torque_nm_a'

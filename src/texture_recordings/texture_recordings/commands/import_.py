@@ -11,7 +11,7 @@ from texture_core.errors import InvalidParameter
 from texture_recordings.importers.catalogue import IMPORTS
 from texture_recordings.tables.import_tables import import_tables
 from texture_recordings.tables.mapping import load_mapping
-from texture_recordings.tables.readers.catalogue import MAPPED
+from texture_recordings.tables.tables import MAPPED
 
 USAGE = 'texture import DATA_SET SOURCE OUT, or texture import {table,bag} MAPPING SOURCE OUT'
 

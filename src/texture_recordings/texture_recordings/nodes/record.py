@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import time
 from collections import Counter
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,8 @@ from texture_recordings.topic_names import short_name
 
 QUEUE = 20_000  # a minute of one finger: a disk that stalls longer loses messages, and they are counted
 POLL_S = 0.2
+FLUSH_S = 1.0  # what a killed recorder, a failing supply or a full disk may take
+NOTHING = RawMessage('', '', 0, b'')
 DISCOVERY_S = 0.5  # how often it is asked what else is published
 
 
@@ -100,14 +103,26 @@ class RecordNode(Node):
 
     def _write(self) -> None:
         """Take messages from the queue to the disk until told to stop."""
-        while (message := self._queue.get()) is not None:
+        flushed_s = time.monotonic()
+        while (message := self._next()) is not None:
             try:
-                self._bag.write_raw(message)
+                if message is not NOTHING:
+                    self._bag.write_raw(message)
+                if time.monotonic() - flushed_s >= FLUSH_S:
+                    flushed_s = time.monotonic()
+                    self._bag.flush()
             except OSError as error:
                 self._error = self._error or error
                 continue
-            self._counts['messages'] += 1
-            self._count_losses(message)
+            if message is not NOTHING:
+                self._counts['messages'] += 1
+                self._count_losses(message)
+
+    def _next(self) -> RawMessage | None:
+        try:
+            return self._queue.get(timeout=FLUSH_S)
+        except queue.Empty:
+            return NOTHING
 
     def _count_losses(self, message: RawMessage) -> None:
         if not message.msgtype.endswith('/TactileSignal'):
@@ -133,7 +148,8 @@ class RecordNode(Node):
             'restarts': sum(self._continuity.restarts.values()),
             **{f'samples {topic}': count for topic, count in self._continuity.samples.items()},
         }
-        said = ', '.join(f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count)
+        others = [f'{count} {name.replace("_", " ")}' for name, count in faults.items() if count]
+        said = ', '.join(filter(None, (self._continuity.losses, *others[bool(lost) :])))
         sentence = f'{self._counts["messages"]} messages recorded, {said or "nothing lost"}'
         return 'WARN' if said else 'OK', sentence, numbers
 

@@ -2,30 +2,580 @@
 
 from __future__ import annotations
 
+import fnmatch
 import math
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import shutil
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
+from types import TracebackType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from texture_core.arrays import AnyArray, Array
 from texture_core.catalogue import unknown_name
 from texture_core.errors import InvalidData, InvalidParameter
+from texture_core.exploration import ExplorationState, Phase
 from texture_core.labels import checked_label
-from texture_core.signal import MAX_HZ
+from texture_core.signal import MAX_HZ, MIN_HZ, NANOSECONDS, TactileSignal
+from texture_recordings.bag_writer import BagWriter
 from texture_recordings.bags import is_bag
-from texture_recordings.tables.borders import SlideRows, spans
-from texture_recordings.tables.mapping import CONDITION_UNITS, TableMapping
-from texture_recordings.tables.name_template import NameTemplate
-from texture_recordings.tables.readers.catalogue import BAG, READERS
-from texture_recordings.tables.report import ImportReport, StreamCounts
-from texture_recordings.tables.slide_bags import ImportedSlide, SlideBags, StateSpan, StreamSamples
-from texture_recordings.tables.table import Columns, Table, TableReader
-from texture_recordings.tables.table_columns import TIME_UNITS, Quantity, StreamColumns
-from texture_recordings.tables.time_grid import estimated_rate_hz, on_grid, repaired
+from texture_recordings.tables.mapping import (
+    CONDITION_UNITS,
+    TIME_UNITS,
+    NameTemplate,
+    Quantity,
+    SlideBorders,
+    StreamColumns,
+    TableMapping,
+)
+from texture_recordings.tables.tables import BAG, EXAMPLES, MAPPED, Columns, MalformedRow, Table, TableFiles
+
+SIGNIFICANT = 4  # digits of an estimated rate: the resolution of time stamps allows no more
+ROUND_RATE = 1e-3  # a rate that is so near to one of two digits is taken for that one
+
+
+@dataclass(frozen=True, eq=False)
+class GridRows:
+    """Samples of one slide on an even grid.
+
+    Parameters
+    ----------
+    samples : (n, n_channels)
+        NaN for bad ones.
+    index : (n,)
+        Place of each on the grid from 0; it jumps where samples were lost.
+    jitter_s : (m,)
+        By how much steps of time differ from the sampling interval, gaps left out.
+    gaps, lost
+        Number of gaps, and of samples lost in them.
+    disordered
+        Number of rows left out because their time does not come after that of all rows before.
+
+    Examples
+    --------
+    >>> rows = on_grid(np.zeros((4, 1)), np.array([0.0, 0.01, 0.05, 0.06]), 100.0, gap=1.75, interpolated=False)
+    >>> rows.index.tolist(), rows.gaps, rows.lost
+    ([0, 1, 5, 6], 1, 3)
+    """
+
+    samples: Array
+    index: NDArray[np.int64]
+    jitter_s: Array
+    gaps: int = 0
+    lost: int = 0
+    disordered: int = 0
+
+
+def estimated_rate_hz(time_s: Array) -> float:
+    """Return the rate of rows in spite of jitter and gaps, of four digits; NaN if no two times follow each other.
+
+    Parameters
+    ----------
+    time_s : (n,)
+        Time of each row, NaN where it is unknown.
+
+    Examples
+    --------
+    >>> estimated_rate_hz(np.array([0.0, 0.011, 0.019, 0.03, 0.53, 0.54]))
+    100.0
+    """
+    steps = np.diff(_spread(time_s[np.isfinite(time_s)]))
+    steps = steps[steps > 0]
+    if not len(steps):
+        return float('nan')
+    usual = steps[steps < 1.75 * np.median(steps)]
+    rate_hz = 1.0 / float(usual.mean())
+    simple = float(f'{rate_hz:.2g}')
+    return simple if abs(rate_hz / simple - 1.0) < ROUND_RATE else float(f'{rate_hz:.{SIGNIFICANT}g}')
+
+
+def on_grid(samples: Array, time_s: Array | None, rate_hz: float, *, gap: float, interpolated: bool) -> GridRows:
+    """Return the rows of one slide on a grid that begins with its first row.
+
+    Parameters
+    ----------
+    samples : (n, n_channels)
+        Rows in their order; NaN for bad values.
+    time_s : (n,)
+        Time of each row, NaN where it is unknown; None: rows are evenly spaced.
+    rate_hz
+        Rate of the grid.
+    gap
+        Steps longer than so many intervals are gaps.
+    interpolated
+        Whether samples are interpolated at the times of the grid; else they are taken as evenly spaced between gaps.
+
+    Returns
+    -------
+    GridRows
+        Rows whose time comes after that of all before.
+    """
+    if time_s is None or len(samples) < 2:
+        return GridRows(samples, np.arange(len(samples)), np.empty(0))
+    times = _known(time_s) if interpolated else _spread(_known(time_s))
+    later = np.concatenate(([True], times[1:] > np.maximum.accumulate(times)[:-1]))
+    samples, times = samples[later], times[later]
+    steps = np.diff(times) * rate_hz
+    gaps = steps > gap
+    missing = np.where(gaps, np.maximum(np.rint(steps) - 1, 0), 0).astype(np.int64)
+    jitter = (steps[~gaps] - 1.0) / rate_hz
+    disordered = int((~later).sum())
+    if not interpolated:
+        index = np.concatenate(([0], np.cumsum(1 + missing)))
+        return GridRows(samples, index, jitter, int(gaps.sum()), int(missing.sum()), disordered)
+    parts = [
+        _interpolated(samples[rows], (times[rows] - times[0]) * rate_hz)
+        for rows in np.split(np.arange(len(times)), np.flatnonzero(gaps) + 1)
+    ]
+    index = np.concatenate([own for own, _ in parts])
+    lost = int(index[-1] + 1 - len(index)) if len(index) else 0
+    return GridRows(np.concatenate([x for _, x in parts]), index, jitter, int(gaps.sum()), lost, disordered)
+
+
+def repaired(rows: GridRows, longest: int) -> tuple[GridRows, int]:
+    """Return rows whose holes of bad samples, up to `longest` of them, are interpolated, and how many samples that are.
+
+    Holes at the edges of the slide and beside lost samples stay.
+    """
+    bad = np.logical_or.reduce(np.isnan(rows.samples), axis=1)
+    if not longest or not bad.any() or bad.all():
+        return rows, 0
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], bad, [0])).astype(int))).reshape(-1, 2)
+    fill = np.zeros(len(bad), dtype=bool)
+    for first, last in edges.tolist():
+        inside = first > 0 and last < len(bad)
+        if inside and last - first <= longest and rows.index[last] - rows.index[first - 1] == last - first + 1:
+            fill[first:last] = True
+    samples = rows.samples.copy()
+    for channel in samples.T:
+        channel[fill] = np.interp(rows.index[fill], rows.index[~bad], channel[~bad])
+    return GridRows(samples, rows.index, rows.jitter_s, rows.gaps, rows.lost, rows.disordered), int(fill.sum())
+
+
+def _known(time_s: Array) -> Array:
+    """Return times in which an unknown one lies between its neighbours."""
+    known = np.isfinite(time_s)
+    if known.all() or not known.any():
+        return time_s if known.any() else np.arange(len(time_s), dtype=np.float64)
+    rows = np.arange(len(time_s))
+    filled: Array = np.interp(rows, rows[known], time_s[known])
+    return filled
+
+
+def _spread(times: Array) -> Array:
+    """Return times in which rows of one time are spread to the next: of a coarse clock, or of samples in batches."""
+    starts = np.flatnonzero(np.concatenate(([True], times[1:] != times[:-1])))
+    if len(starts) == len(times) or len(starts) < 2:
+        return times
+    counts = np.diff(np.append(starts, len(times)))
+    steps = np.diff(times[starts]) / counts[:-1]
+    steps = np.append(steps, steps[-1])
+    within = np.arange(len(times)) - np.repeat(starts, counts)
+    forward = np.where(steps > 0, steps, 0.0)  # a time that goes back tells nothing
+    spread: Array = np.repeat(times[starts], counts) + within * np.repeat(forward, counts)
+    return spread
+
+
+def _interpolated(samples: Array, place: Array) -> tuple[AnyArray, Array]:
+    grid = np.arange(np.ceil(place[0] - 1e-6), np.floor(place[-1] + 1e-6) + 1)
+    values = np.stack([np.interp(grid, place, channel) for channel in samples.T], axis=1)
+    return grid.astype(np.int64), values
+
+
+@dataclass
+class StreamCounts:
+    """Counts of one stream over all slides."""
+
+    rate_hz: float = 0.0
+    samples: int = 0
+    gaps: int = 0
+    lost: int = 0
+    disordered: int = 0
+    repaired: int = 0
+    steps: int = 0
+    jitter_sum_s2: float = 0.0
+    jitter_max_s: float = 0.0
+
+    def add(self, rows: GridRows, repaired: int) -> None:
+        """Count one slide."""
+        self.samples += len(rows.samples)
+        self.gaps += rows.gaps
+        self.lost += rows.lost
+        self.disordered += rows.disordered
+        self.repaired += repaired
+        self.steps += len(rows.jitter_s)
+        self.jitter_sum_s2 += float(np.square(rows.jitter_s).sum())
+        self.jitter_max_s = max(self.jitter_max_s, float(np.abs(rows.jitter_s).max(initial=0.0)))
+
+    @property
+    def jitter_s(self) -> float:
+        """Root mean square of what steps of time differ from the sampling interval."""
+        return float(np.sqrt(self.jitter_sum_s2 / self.steps)) if self.steps else 0.0
+
+
+@dataclass
+class ImportReport:
+    """Counts of an import.
+
+    Examples
+    --------
+    >>> report = ImportReport(files=1, rows=10, streams={'signal': StreamCounts(rate_hz=100.0, samples=10)})
+    >>> report.note('run.csv', 2, [])
+    >>> report.lines()[1]
+    'malformed rows: 2 of 10'
+    """
+
+    bags: list[Path] = field(default_factory=list)
+    files: int = 0
+    ignored_files: int = 0
+    rows: int = 0
+    malformed_rows: int = 0
+    examples: list[str] = field(default_factory=list)
+    short_slides: int = 0
+    slides: Counter[str] = field(default_factory=Counter)
+    streams: dict[str, StreamCounts] = field(default_factory=dict)
+
+    def note(self, place: str, count: int, rows: Iterable[MalformedRow]) -> None:
+        """Count malformed rows of a table, and keep the first ones.
+
+        Parameters
+        ----------
+        place
+            File, and array in it.
+        count
+            Number of malformed rows.
+        rows
+            The first of them.
+        """
+        self.malformed_rows += count
+        if count:
+            self.examples += [f"'{place}', {row}" for row in rows][: EXAMPLES - len(self.examples)]
+
+    def lines(self) -> list[str]:
+        """Return the counts in lines for people."""
+        slides = sum(self.slides.values())
+        said = [
+            f'{slides} slides over {len(self.slides)} surfaces from {self.files} files'
+            + (f'; {self.ignored_files} files have other names' if self.ignored_files else ''),
+            f'malformed rows: {self.malformed_rows} of {self.rows}',
+            *(f'  {example}' for example in self.examples),
+        ]
+        for name, stream in self.streams.items():
+            said.append(
+                f'{name}: {stream.samples} samples at {stream.rate_hz:g} Hz; jitter {1e3 * stream.jitter_s:.2f} ms '
+                f'rms, {1e3 * stream.jitter_max_s:.2f} ms at most; {stream.lost} samples lost in {stream.gaps} gaps, '
+                f'{stream.disordered} rows out of order left out, {stream.repaired} samples interpolated'
+            )
+        if self.short_slides:
+            said.append(f'slides too short, left out: {self.short_slides}')
+        return said
+
+
+DETECTION_BATCH = 1000  # rows
+
+
+@dataclass(frozen=True, eq=False)
+class SlideRows:
+    """The rows of one stream by which slides are cut.
+
+    Parameters
+    ----------
+    time_s : (n,)
+        Time of each row; NaN where it is unknown.
+    samples : (n, n_channels)
+        Values.
+    rate_hz
+        Sampling rate.
+    keys : (n,)
+        Values of the column that changes between slides, if one does.
+    place
+        File, for sentences.
+
+    Examples
+    --------
+    >>> time_s = np.array([0.0, 0.1, 0.2, 5.0, 5.1])  # a pause after the third row
+    >>> rows = SlideRows(time_s, np.zeros((5, 1)), rate_hz=10.0, keys=None, place='run.csv')
+    >>> spans(rows, SlideBorders(by='pause', pause_s=1.0))
+    [slice(0, 3, None), slice(3, 5, None)]
+    """
+
+    time_s: Array
+    samples: Array
+    rate_hz: float
+    keys: AnyArray | None
+    place: str
+
+
+def spans(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    """Return the rows of each slide in their order, the ends that are left out already taken away."""
+    found = RULES[borders.by](rows, borders)
+    skip, drop = (round(seconds * rows.rate_hz) for seconds in (borders.start_s, borders.end_s))
+    return [slice(span.start + skip, max(span.start + skip, span.stop - drop)) for span in found]
+
+
+def _by_file(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    return [slice(0, len(rows.time_s))]
+
+
+def _by_column(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    if rows.keys is None:
+        return _by_file(rows, borders)  # a field of the file's name: it holds for the whole file
+    edges = [0, *(np.flatnonzero(rows.keys[1:] != rows.keys[:-1]) + 1).tolist(), len(rows.keys)]
+    chosen = [
+        slice(first, last) for first, last in pairwise(edges) if _slides_at(str(rows.keys[first]), borders.values)
+    ]
+    if not chosen:
+        raise InvalidData(
+            f"'{rows.place}': column '{borders.column}' has none of the values "
+            f'{", ".join(borders.values) or "but empty"}; it has {", ".join(np.unique(rows.keys)[:5].tolist())}'
+        )
+    return chosen
+
+
+def _slides_at(value: str, wanted: Sequence[str]) -> bool:
+    """Return whether the finger slides at a value of the column: one of those wanted, or any that is not empty."""
+    return any(fnmatch.fnmatchcase(value, one) or value == one for one in wanted) if wanted else value != ''
+
+
+def _by_pause(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    known = np.flatnonzero(np.isfinite(rows.time_s))
+    steps = np.diff(rows.time_s[known])
+    edges = [0, *known[1:][(steps >= borders.pause_s) | (steps < 0)].tolist(), len(rows.time_s)]
+    return [slice(first, last) for first, last in pairwise(edges)]
+
+
+def _by_time(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    since = rows.time_s - np.nanmin(rows.time_s)
+    number = np.floor(np.maximum.accumulate(np.nan_to_num(since, nan=0.0)) / borders.length_s + 1e-9)
+    edges = [0, *(np.flatnonzero(np.diff(number)) + 1).tolist(), len(number)]
+    whole = (1.0 - 1e-6) * borders.length_s * rows.rate_hz - 1.0
+    return [slice(a, b) for a, b in pairwise(edges) if b - a >= whole]
+
+
+def _by_detection(rows: SlideRows, borders: SlideBorders) -> list[slice]:
+    # These need scipy, which reading and writing of bags does without.
+    from texture_features.segmentation.segments import SegmentationParams  # noqa: PLC0415
+    from texture_features.segmentation.slide_segmenter import segment_recording  # noqa: PLC0415
+
+    params = SegmentationParams(on=borders.on, off=borders.off, min_duration_s=max(borders.min_s, 0.05))
+    channels = tuple(str(number) for number in range(rows.samples.shape[1]))
+    samples = rows.samples.astype(np.float32)
+    batches = [
+        TactileSignal(
+            round(first / rows.rate_hz * NANOSECONDS), '', channels, (), rows.rate_hz, first,
+            samples[first : first + DETECTION_BATCH],
+        )
+        for first in range(0, len(samples), DETECTION_BATCH)
+    ]  # fmt: skip
+    states = segment_recording({'signal': batches}, params)
+    return [
+        slice(*(round(at * rows.rate_hz / NANOSECONDS) for at in (s.stamp_ns, s.stamp_ns + s.steady_s * NANOSECONDS)))
+        for s in states
+        if s.phase.value == 'slide'
+    ]
+
+
+RULES: Mapping[str, Callable[[SlideRows, SlideBorders], list[slice]]] = {
+    'file': _by_file,
+    'column': _by_column,
+    'pause': _by_pause,
+    'time': _by_time,
+    'detection': _by_detection,
+}
+
+
+START_NS = 1_000_000_000 * NANOSECONDS
+PAUSE_NS = NANOSECONDS
+DELAY_NS = 100_000  # a batch is logged this long after its last sample
+BATCH_S = 0.1
+MAX_BAGS = 500
+Message = tuple[int, str, TactileSignal | ExplorationState]  # log time, topic, value
+
+
+@dataclass(frozen=True, eq=False)
+class StreamSamples:
+    """The samples of one stream during a slide.
+
+    Parameters
+    ----------
+    sensor, channels, unit, rate_hz
+        As in a `TactileSignal`.
+    samples : (n, n_channels)
+        NaN for bad ones.
+    index : (n,)
+        Running index of each from 0; a jump is a loss.
+    """
+
+    sensor: str
+    channels: tuple[str, ...]
+    unit: str
+    rate_hz: float
+    samples: Array
+    index: NDArray[np.int64]
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first sample to the one after the last."""
+        return float(self.index[-1] + 1) / self.rate_hz if len(self.index) else 0.0
+
+
+@dataclass(frozen=True)
+class StateSpan:
+    """Speed, force and direction from a time of the slide on, in SI units; NaN if unknown."""
+
+    start_s: float
+    speed_m_s: float = math.nan
+    force_n: float = math.nan
+    direction_rad: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedSlide:
+    """One slide.
+
+    Parameters
+    ----------
+    surface, exploration_id, motion
+        Label, name and motion.
+    streams
+        By topic.
+    spans
+        Conditions in the order of time; the first begins at 0.
+    """
+
+    surface: str
+    exploration_id: str
+    motion: str
+    streams: Mapping[str, StreamSamples]
+    spans: Sequence[StateSpan] = field(default=(StateSpan(0.0),))
+
+    @property
+    def duration_s(self) -> float:
+        """How long all streams last."""
+        return min(stream.duration_s for stream in self.streams.values())
+
+
+class SlideBags:
+    """Bags below a folder, written slide by slide; use it in a `with` block, where an error removes them again.
+
+    Stamps are made up: each slide begins a second after the one before, in whatever bag that is, so slides keep their
+    order over all bags.
+
+    Parameters
+    ----------
+    out
+        Folder for the bags; made if missing.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from texture_recordings.slides import find_slides
+    >>> stream = StreamSamples('finger', ('x',), 'g', 100.0, np.zeros((200, 1)), np.arange(200))
+    >>> slide = ImportedSlide('cork', 'run1', 'linear_slide', {'signal': stream}, (StateSpan(0.0, speed_m_s=0.05),))
+    >>> with TemporaryDirectory() as folder:
+    ...     with SlideBags(folder) as bags:
+    ...         bags.write('monday', slide)
+    ...     print([(found.name, found.speed_m_s) for found in find_slides(bags.paths)])
+    [('cork/1', 0.05)]
+    """
+
+    def __init__(self, out: str | Path) -> None:
+        self._out = Path(out)
+        self._open = ExitStack()
+        self._bags: dict[str, BagWriter] = {}
+        self._next: dict[tuple[str, str], int] = {}
+        self._now_ns = START_NS
+
+    @property
+    def paths(self) -> list[Path]:
+        """Paths of the bags in the order in which they were begun."""
+        return [bag.path for bag in self._bags.values()]
+
+    def write(self, session: str, slide: ImportedSlide) -> None:
+        """Write a slide into the bag of a session.
+
+        Raises
+        ------
+        InvalidData
+            If the bag exists already, cannot be made, or is one too many.
+        """
+        bag = self._bag(session)
+        end_ns = self._now_ns + round(slide.duration_s * NANOSECONDS)
+        messages: list[Message] = [*self._states(slide, end_ns)]
+        for topic, stream in slide.streams.items():
+            messages += self._batches(session, topic, stream)
+        for log_ns, topic, value in sorted(messages, key=lambda message: message[0]):
+            bag.write(topic, value, log_ns)
+        self._now_ns = max(end_ns, *(log_ns for log_ns, _, _ in messages)) + PAUSE_NS
+
+    def _bag(self, session: str) -> BagWriter:
+        if session not in self._bags:
+            name = checked_label(session)
+            if not name or name.startswith('.') or len(self._bags) >= MAX_BAGS:
+                raise InvalidData(
+                    f"no bag can be named '{name}' as the {len(self._bags) + 1}th; at most {MAX_BAGS} bags with plain "
+                    'names are made, choose another `session`'
+                )
+            self._out.mkdir(parents=True, exist_ok=True)
+            self._bags[session] = self._open.enter_context(BagWriter(self._out / name))
+        return self._bags[session]
+
+    def _states(self, slide: ImportedSlide, end_ns: int) -> list[Message]:
+        edges_s = [*(span.start_s for span in slide.spans), slide.duration_s]
+        states: list[Message] = []
+        for span, (begin_s, until_s) in zip(slide.spans, pairwise(edges_s), strict=True):
+            stamp_ns = self._now_ns + round(begin_s * NANOSECONDS)
+            stop_ns = self._now_ns + round(until_s * NANOSECONDS)
+            state = ExplorationState(
+                stamp_ns, slide.exploration_id, slide.motion, Phase.SLIDE, max(0, stop_ns - stamp_ns) / NANOSECONDS,
+                span.speed_m_s, span.force_n, span.direction_rad, begin_s / max(slide.duration_s, 1e-9), slide.surface,
+            )  # fmt: skip
+            states.append((stamp_ns, 'exploration', state))
+        for count, phase in enumerate((Phase.LIFT, Phase.DONE), 1):
+            state = ExplorationState(
+                end_ns, slide.exploration_id, slide.motion, phase, progress=1.0, surface=slide.surface
+            )
+            states.append((end_ns + (2 + count) * DELAY_NS, 'exploration', state))
+        return states
+
+    def _batches(self, session: str, topic: str, stream: StreamSamples) -> list[Message]:
+        first = self._next.get((session, topic), 0)
+        step = max(1, round(BATCH_S * stream.rate_hz))
+        jumps = np.flatnonzero(np.diff(stream.index) != 1) + 1
+        bounds = [0, *jumps.tolist(), len(stream.index)]
+        samples = stream.samples.astype(np.float32)
+        batches: list[Message] = []
+        for begin, end in pairwise(bounds):
+            for row in range(begin, end, step):
+                part = samples[row : min(row + step, end)]
+                place = int(stream.index[row])
+                stamp_ns = self._now_ns + round(place / stream.rate_hz * NANOSECONDS)
+                batch = TactileSignal(
+                    stamp_ns, stream.sensor, stream.channels, (stream.unit,) * len(stream.channels), stream.rate_hz,
+                    first + place, part, stream.sensor,
+                )  # fmt: skip
+                batches.append((batch.end_ns + DELAY_NS, topic, batch))
+        if len(stream.index):
+            self._next[session, topic] = first + int(stream.index[-1]) + 1
+        return batches
+
+    def __enter__(self) -> SlideBags:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._open.__exit__(kind, error, trace)
+        if kind:
+            for path in self.paths:
+                shutil.rmtree(path, ignore_errors=True)
+
 
 MAX_FILES = 100_000
 STATE_S = 0.1  # a state so often where a condition changes along a slide
@@ -35,7 +585,7 @@ SAME_TIME_S = 1e-9
 
 
 def import_tables(
-    mapping: TableMapping, source: str | Path, out: str | Path, readers: Mapping[str, TableReader] = READERS
+    mapping: TableMapping, source: str | Path, out: str | Path, kinds: Sequence[str] = MAPPED['table']
 ) -> ImportReport:
     """Write bags of the slides in the tables below a folder, and return what was found.
 
@@ -47,8 +597,8 @@ def import_tables(
         Folder of the files, or one file.
     out
         Folder for the bags; made if missing.
-    readers
-        Reader by the ending of a file's name.
+    kinds
+        Endings of the files that are read, of `MAPPED`.
 
     Returns
     -------
@@ -61,9 +611,9 @@ def import_tables(
         If no file matches, a file lacks a column or has too many malformed rows, or a bag exists already.
     """
     report = ImportReport()
-    with SlideBags(out) as bags:
-        for path, place, fields in _files(mapping, Path(source), readers, report):
-            for table in readers[_kind(path)](path, place, mapping):
+    with SlideBags(out) as bags, TableFiles() as files:
+        for path, place, fields in _files(mapping, Path(source), kinds, report):
+            for table in files.tables(_kind(path), path, place, mapping):
                 for session, slide in _TableSlides(mapping, table, fields, report).slides():
                     bags.write(session, slide)
                     report.slides[slide.surface] += 1
@@ -77,7 +627,7 @@ def import_tables(
 
 
 def _files(
-    mapping: TableMapping, source: Path, readers: Mapping[str, TableReader], report: ImportReport
+    mapping: TableMapping, source: Path, kinds: Sequence[str], report: ImportReport
 ) -> Iterator[tuple[Path, str, dict[str, str]]]:
     """Yield the files that the mapping means, with their names for sentences and what these hold."""
     template = NameTemplate(mapping.files)
@@ -85,7 +635,7 @@ def _files(
     for path in _paths(source, template.depth):
         place = path.name if path == source else path.relative_to(source).as_posix()
         fields = template.match(place)
-        if fields is None or _kind(path) not in readers:
+        if fields is None or _kind(path) not in kinds:
             report.ignored_files += 1
             continue
         found = True
@@ -93,7 +643,7 @@ def _files(
         yield path, place, fields
     if not found:
         raise InvalidData(
-            f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(readers)}; "
+            f"no file in '{source}' has the form '{mapping.files}' and one of the endings {', '.join(kinds)}; "
             'give the folder that holds them, or correct `files` in the mapping'
         )
 
@@ -230,7 +780,8 @@ class _TableSlides:
                 f"'{self._table.place}': the stream '{name}' has {len(names)} columns and {len(params.channels)} names "
                 'of channels; give one for each'
             )
-        samples = np.stack(columns, axis=1) * params.scale
+        samples = np.stack(columns, axis=1)
+        samples *= params.scale
         time_column = self._time_column(name)
         rate_hz = self._rate_hz(name, params, time_column)
         if time_column:
@@ -253,10 +804,10 @@ class _TableSlides:
         if time_column:
             own = estimated_rate_hz(self._columns.numbers[time_column] * TIME_UNITS[self._time_unit(name)])
         counts.rate_hz = counts.rate_hz or own
-        if not 0.0 < counts.rate_hz <= MAX_HZ:
+        if not MIN_HZ <= counts.rate_hz <= MAX_HZ:
             raise InvalidData(
                 f"'{self._table.place}': the rate of '{name}' is {counts.rate_hz:g} Hz by its times; give a column of "
-                f'time that grows and its unit, or `rate_hz`, above 0 and at most {MAX_HZ:g}'
+                f'time that grows and its unit, or `rate_hz`, from {MIN_HZ:g} to {MAX_HZ:g}'
             )
         if own and not 1 / SAME_RATE <= own / counts.rate_hz <= SAME_RATE:
             raise InvalidData(

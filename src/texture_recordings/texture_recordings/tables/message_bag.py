@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import fnmatch
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Connection
@@ -20,9 +22,69 @@ from texture_core.signal import NANOSECONDS
 from texture_recordings.bags import RawMessage, read_foreign
 from texture_recordings.cdr import typestore
 from texture_recordings.tables.mapping import CONDITION_UNITS, TableMapping
-from texture_recordings.tables.readers.arrays import table_columns
-from texture_recordings.tables.readers.message_columns import RULES, Rows, one_row
-from texture_recordings.tables.table import Table, check_size
+from texture_recordings.tables.tables import Table, table_columns
+
+MAX_FIELDS = 2000  # of one message
+Rows = Mapping[str, AnyArray]  # name → values of one message, (n,) each; n > 1 where it holds consecutive samples
+
+
+def one_row(value: Any) -> Rows:
+    """Return every number and text of a message by its path, such as 'wrench.force.x' or 'data.3'."""
+    found: dict[str, AnyArray] = {}
+    _collect(value, '', found)
+    return found
+
+
+def _collect(value: Any, path: str, found: dict[str, AnyArray]) -> None:
+    if len(found) > MAX_FIELDS:
+        raise ValueError(f'it has more than {MAX_FIELDS} numbers')
+    if dataclasses.is_dataclass(value):
+        for field in dataclasses.fields(value):
+            if field.name not in ('header', '__msgtype__'):
+                _collect(getattr(value, field.name), f'{path}.{field.name}' if path else field.name, found)
+    elif isinstance(value, (np.ndarray, Sequence)) and not isinstance(value, str):
+        if len(value) > MAX_FIELDS:
+            raise ValueError(f"'{path}' has {len(value)} numbers; {MAX_FIELDS} are allowed")
+        for number, part in enumerate(value):
+            _collect(part, f'{path}.{number}', found)
+    else:
+        found[path] = np.array([value])
+
+
+def _joints(value: Any) -> Rows:
+    """Return position, velocity and effort by the names of the joints."""
+    kinds = ('position', 'velocity', 'effort')
+    return {
+        f'{kind}.{joint}': np.array([number])
+        for kind in kinds
+        for joint, number in zip(value.name, getattr(value, kind), strict=False)
+    }
+
+
+def _multi_array(value: Any) -> Rows:
+    """Return a row of numbers; consecutive rows if the layout has two dimensions, (n_samples, n_channels)."""
+    shape = [dim.size for dim in value.layout.dim]
+    data = value.data[value.layout.data_offset :]
+    table = data.reshape(shape) if len(shape) == 2 else data[None]
+    if table.shape[1] > MAX_FIELDS:
+        raise ValueError(f'it has {table.shape[1]} channels; {MAX_FIELDS} are allowed')
+    return {f'data.{number}': table[:, number] for number in range(table.shape[1])}
+
+
+def _audio(value: Any) -> Rows:
+    """Return the samples of sound of one channel, 16 bits little endian; full scale is 1."""
+    data = getattr(value, 'audio', value).data
+    return {'data': np.frombuffer(data.tobytes(), '<i2') / 32768.0}
+
+
+RULES: Mapping[str, Callable[[Any], Rows]] = {
+    'sensor_msgs/msg/JointState': _joints,
+    'std_msgs/msg/Float32MultiArray': _multi_array,
+    'std_msgs/msg/Float64MultiArray': _multi_array,
+    'audio_common_msgs/msg/AudioData': _audio,
+    'audio_common_msgs/msg/AudioDataStamped': _audio,
+}
+
 
 TIME = 'time'
 BROKEN = (SerdeError, struct.error, UnicodeDecodeError, ValueError, IndexError, AssertionError, KeyError)
@@ -40,13 +102,11 @@ def read_message_bag(path: Path, place: str, mapping: TableMapping) -> Iterator[
     """
     wanted = wanted_columns(mapping)
     topics: dict[str, _Topic] = {}
-    first_ns, values = -1, 0
+    first_ns = -1
     for message in read_foreign(path, partial(_is_wanted, wanted)):
         topic = topics.setdefault(message.topic, _Topic(message.topic, message.msgtype, place))
         stamp_ns = topic.add(message)
         first_ns = stamp_ns if first_ns < 0 else first_ns
-        values += topic.width
-        check_size(values, place)
     columns: dict[str, AnyArray] = {}
     clocks: dict[str, str] = {}
     for name, topic in topics.items():
@@ -98,7 +158,6 @@ class _Topic:
         self._rows: list[Rows] = []
         self._stamps_ns: list[int] = []
         self._counts: list[int] = []
-        self.width = 0
 
     def add(self, message: RawMessage) -> int:
         """Add a message, and return its time."""
@@ -116,7 +175,6 @@ class _Topic:
             )
         self._rows.append(rows)
         self._counts.append(max((len(array) for array in rows.values()), default=0))
-        self.width = sum(len(array) for array in rows.values())
         stamp = getattr(getattr(value, 'header', None), 'stamp', None)
         stamped_ns = stamp.sec * NANOSECONDS + stamp.nanosec if stamp else 0
         self._stamps_ns.append(stamped_ns or message.log_ns)

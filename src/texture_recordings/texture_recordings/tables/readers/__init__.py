@@ -1,1 +1,0 @@
-"""Readers of tables, one module a kind of file."""
