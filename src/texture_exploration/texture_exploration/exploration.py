@@ -173,7 +173,9 @@ class Exploration:
         workspace_violation = self._limits.workspace_violation(arm)
         self._entered |= not workspace_violation
         frozen = self._force_watch.frozen(arm, self._commanded)
-        return self._limits.force_violation(arm) or frozen or (workspace_violation if self._entered else '')
+        return (
+            arm.unsafe or self._limits.force_violation(arm) or frozen or (workspace_violation if self._entered else '')
+        )
 
     def _overdue(self, now_ns: int) -> str:
         """Return in a sentence that the exploration takes longer than its caller allows, '' if it does not."""
