@@ -237,7 +237,10 @@ class Explorer:
                 raise MotionRefused(f'the finger was not lifted: {trouble}') from trouble
             finally:
                 self.arm.stop()
-            return self.arm.state().position[2] - begin_m
+            height_m = self.arm.state().position[2]
+            x_m, y_m, z_m = self._home
+            self._home = (x_m, y_m, max(z_m, height_m))  # a finger found pressed is no place to begin at
+            return height_m - begin_m
 
     def _rise(self) -> None:
         rise, pace = Rise(self.touch, self.limits), Pacer(PERIOD_S, self._clock)

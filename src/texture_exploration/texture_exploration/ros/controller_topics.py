@@ -35,6 +35,8 @@ MOST = 10  # messages that are taken at once: only the newest counts
 ARRIVAL_S = 0.2
 DISCOVERY_S = 0.5  # before this node is seen to publish, it looks who else does
 LOOKING_S = 0.05
+UNNAMED = '_NODE_NAME_UNKNOWN_'  # of rmw, until the name of a publisher's node has come, too
+UNNAMED_S = 1.0
 
 
 class RosTopics:
@@ -71,6 +73,7 @@ class RosTopics:
         node = self._node
         wrench_topic = params.target_wrench_topic
         self._commanded_topics = [node.resolve_topic_name(name) for name in (params.twist_topic, wrench_topic) if name]
+        self._unnamed_s = 0.0  # since when there has been such a publisher
         self._wait_for_the_command()
         self._twists = node.create_publisher(TwistStamped, params.twist_topic, COMMAND_QOS)
         self._wrenches = node.create_publisher(WrenchStamped, wrench_topic, COMMAND_QOS) if wrench_topic else None
@@ -194,8 +197,12 @@ class RosTopics:
         for topic in self._commanded_topics:
             if self._node.count_publishers(topic) <= (len(own) if topic is self._commanded_topics[0] else len(own[:1])):
                 continue
-            left = list(own)
-            for info in self._node.get_publishers_info_by_topic(topic):
+            left, infos = list(own), self._node.get_publishers_info_by_topic(topic)
+            unnamed = any(info.node_name == UNNAMED for info in infos)
+            self._unnamed_s = (self._unnamed_s or time.monotonic()) if unnamed else 0.0
+            if unnamed and time.monotonic() - self._unnamed_s < UNNAMED_S:
+                continue
+            for info in infos:
                 name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
                 if name not in left:
                     return f"'{name}' commands the arm, too: it publishes on '{topic}'"
