@@ -481,6 +481,20 @@ def test_a_touch_without_force_is_taken_with_a_doubt(robot):
     assert 'less than' not in explorer.touch_surface()
 
 
+def test_a_finger_that_is_found_pressed_is_lifted_until_nothing_touches_it(robot, monkeypatch):
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    put_on_surface(robot, 0.0, 0.0)
+    robot.arm.position = robot.arm._origin - [0.0, 0.0, 0.002]
+    robot.pass_time(0.05)
+    assert robot.arm.finger().force_n == pytest.approx(4.0)
+    monkeypatch.setattr('texture_exploration.explorer.Pacer', lambda *_: lambda: robot.pass_time(0.01))
+    assert explorer.connect()[2] == pytest.approx(-0.002)
+    assert explorer.lift() > 0.002
+    assert robot.arm.finger().force_n == 0.0
+    robot.pass_time(0.1)
+    assert robot.is_commanded_to_rest
+
+
 def test_a_check_commands_nothing_and_leaves_the_topics():
     robot = Robot(connect_timeout_s=0.1)
     explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
