@@ -50,6 +50,7 @@ SERVICE_COMMANDS: Mapping[str, ServiceCommand] = {
         'stop', 'no explorer runs there; if the robot moves, use its own stop, and look whether the finger touches'
     ),
     'recover': ServiceCommand('recover'),
+    'lift': ServiceCommand('lift'),
     'reboot': ServiceCommand('reboot', "only the launch file 'hand' offers it; start that, or give its --namespace"),
     'touch-surface': ServiceCommand('touch_surface', TOUCHES_MISSING),
     'forget-touches': ServiceCommand('forget_touches', TOUCHES_MISSING),

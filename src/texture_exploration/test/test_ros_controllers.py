@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from texture_core.errors import CommandRefused, DeviceError, InvalidParameter, MotionRefused
-from texture_core.exploration import ExplorationRequest
+from texture_core.exploration import ExplorationRequest, Phase
 from texture_core.rotation import quaternion_matrix, rotation_matrix
 from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.ros_controllers import RosControllersArm
@@ -38,6 +38,7 @@ class Robot:
         self.frames = ('base', 'tool0_controller')
         self.pose_comes = self.force_comes = True
         self.heard_by = 1
+        self.unsafe_because = ''
         self.sent = []  # velocities with their times
         self.forces = []
         self.pressed_n = []  # the true force, in any direction
@@ -57,6 +58,12 @@ class Robot:
 
     def listeners(self):
         return self.heard_by
+
+    def unsafe(self):
+        return self.unsafe_because
+
+    def beat(self, *, moving):
+        pass
 
     def send_velocity(self, velocity_m_s):
         self.sent.append((self.now_ns, velocity_m_s))
@@ -94,13 +101,15 @@ class Robot:
         self.pass_time(0.4, ArmCommand())
         assert self.driven.zeroed
 
-    def explore(self, request, touch, home=None):
+    def explore(self, request, touch, home=None, on_slide=lambda: None):
         home = home or self.driven.state().position
         motion = MOTIONS[request.motion](request, home, touch, LIMITS)
         forces = {}
 
         def note(state):
             forces.setdefault(state.phase.value, []).append(self.arm.finger().force_n)
+            if state.phase is Phase.SLIDE:
+                on_slide()
 
         exploration = Exploration(
             'one',
@@ -271,11 +280,60 @@ def test_a_controller_that_ends_is_named(robot):
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
     robot.heard_by = 0
     robot.pass_time(0.01, ArmCommand(tangential_m_s=(0.02, 0.0)))
+    assert "nobody listened on 'twist_controller/twist'" in robot.driven.state().unsafe
+    assert robot.is_commanded_to_rest
+    robot.pass_time(0.3, ArmCommand(tangential_m_s=(0.02, 0.0)))
     assert "nobody listens on 'twist_controller/twist' any more" in robot.driven.state().fault
     robot.heard_by = 1
     robot.driven.recover()
     robot.pass_time(0.1, ArmCommand(tangential_m_s=(0.02, 0.0)))
     assert robot.driven.state().fault == ''
+
+
+SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=1.0, distance_m=0.05)
+
+
+def test_a_controller_that_is_gone_for_6_ms_in_the_slide_ends_it_with_the_finger_lifted():
+    robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002))
+    robot.driven.connect()
+    gone_ns = []
+
+    def listeners():
+        return 0 if gone_ns and robot.now_ns - gone_ns[0] <= 6_000_000 else 1
+
+    robot.listeners = listeners
+    outcome, _ = robot.explore(SLIDE, TouchParams(), lambda: gone_ns.append(robot.now_ns))
+    assert gone_ns
+    assert not outcome.success
+    assert 'listened on' in outcome.message
+    assert outcome.lifted
+    assert robot.arm.finger().force_n == 0.0
+    assert robot.arm.finger().z_m > 0.001
+
+
+@pytest.mark.parametrize('why', ["'/other' commands the arm, too", 'the guard process has ended'])
+def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger_lifted(why):
+    robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002))
+    robot.driven.connect()
+    outcome, _ = robot.explore(SLIDE, TouchParams(), lambda: setattr(robot, 'unsafe_because', why))
+    assert not outcome.success
+    assert why in outcome.message
+    assert outcome.lifted
+    assert robot.arm.finger().z_m > 0.001
+    robot.pass_time(0.3, ArmCommand(normal_m_s=-0.01))
+    assert robot.is_commanded_to_rest
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    assert why in explorer.fault()
+    with pytest.raises(DeviceError, match=why):
+        robot.driven.recover()
+
+
+def test_nothing_is_commanded_by_an_arm_that_is_unsafe_when_it_is_connected():
+    robot = Robot(connect_timeout_s=0.1)
+    robot.unsafe_because = "'/other' commands the arm, too"
+    with pytest.raises(DeviceError, match='commands the arm, too'):
+        robot.driven.connect()
+    assert not any(any(velocity) for _, velocity in robot.sent)
 
 
 def test_a_controller_that_listens_without_moving_the_arm_is_named_and_recovers():
@@ -423,6 +481,20 @@ def test_a_touch_without_force_is_taken_with_a_doubt(robot):
     robot.arm.position = robot.arm._origin + robot.arm._axes @ [0.0, 0.0, -depth_m]
     robot.pass_time(0.05)
     assert 'less than' not in explorer.touch_surface()
+
+
+def test_a_finger_that_is_found_pressed_is_lifted_until_nothing_touches_it(robot, monkeypatch):
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+    put_on_surface(robot, 0.0, 0.0)
+    robot.arm.position = robot.arm._origin - [0.0, 0.0, 0.002]
+    robot.pass_time(0.05)
+    assert robot.arm.finger().force_n == pytest.approx(4.0)
+    monkeypatch.setattr('texture_exploration.explorer.Pacer', lambda *_: lambda: robot.pass_time(0.01))
+    assert explorer.connect()[2] == pytest.approx(-0.002)
+    assert explorer.lift() > 0.002
+    assert robot.arm.finger().force_n == 0.0
+    robot.pass_time(0.1)
+    assert robot.is_commanded_to_rest
 
 
 def test_a_check_commands_nothing_and_leaves_the_topics():

@@ -8,16 +8,19 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from texture_msgs import msg, srv
 
-from texture_core.errors import DeviceError
+from texture_core.errors import DeviceError, MotionRefused
 from texture_core.exploration import ExplorationRequest, Phase
 from texture_core.node_process import NodeProcess, killed_on_error
 from texture_core.ros.local_graph import LocalGraph
@@ -32,7 +35,7 @@ from texture_exploration.safety import SafetyLimits
 pytestmark = [pytest.mark.realtime, pytest.mark.ros]
 
 # Patient with a busy machine where that is not what is tried.
-PATIENT = RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, max_impact_n=0.5)
+PATIENT = RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, max_impact_n=0.5, accept_no_timeout=True)
 LIMITS = SafetyLimits(state_timeout_s=2.0, approach_timeout_s=60.0)
 SLIDE = ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.05)
 HELD = {'start_height_m': 0.003, 'command_timeout_s': 0.0}  # as a controller that holds the last velocity for ever
@@ -52,7 +55,7 @@ from texture_exploration.arms.protocol import ArmCommand
 from texture_exploration.arms.ros_controllers import RosControllersArm
 from texture_exploration.arms.ros_controllers_params import RosControllersParams
 
-arm = RosControllersArm(RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0))
+arm = RosControllersArm(RosControllersParams(connect_timeout_s=30.0, deadman_s=1.0, accept_no_timeout=True))
 arm.connect()
 print('moving', flush=True)
 while True:
@@ -82,7 +85,7 @@ def test_a_controller_that_dies_in_the_slide_is_named_and_the_next_request_conne
     with NodeProcess('texture_simulation', 'twist_controller', HELD) as controller:
         explorer.connect()
         exploration, since_ns = explored(explorer, lambda: controller.process.send_signal(signal.SIGKILL))
-    assert since_ns
+    assert since_ns, exploration.outcome
     assert not exploration.outcome.success
     # It shows by what comes first: no pose, no listener, or no motion.
     assert re.search('no pose has come|nobody listens|the controller on .* is not active', exploration.outcome.message)
@@ -106,7 +109,7 @@ def test_an_emulated_controller_that_is_interrupted_with_the_explorer_lets_it_li
             explorer.stop('interrupted')
 
         exploration, since_ns = explored(explorer, interrupt)
-        assert since_ns
+        assert since_ns, exploration.outcome
         assert exploration.outcome.message == 'interrupted'  # anything else ends without a lift
         explorer.close()
         assert controller.process.wait(DEADLINE_S) == 0
@@ -135,9 +138,12 @@ def test_when_the_process_that_commands_is_killed_the_arm_comes_to_rest(graph, r
         assert moved[1] - killed_s < 1.5
 
 
-def end_by_ctrl_c(graph, explorer):
-    explorer.process.send_signal(signal.SIGINT)
-    assert explorer.wait(DEADLINE_S) == 0
+def end_by(number):
+    def end(_graph, explorer):
+        explorer.process.send_signal(number)
+        assert explorer.wait(DEADLINE_S) == 0
+
+    return end
 
 
 def end_by_deactivation(graph, _explorer):
@@ -150,7 +156,11 @@ def end_by_deactivation(graph, _explorer):
     assert answer.result().success
 
 
-@pytest.mark.parametrize('end', [end_by_ctrl_c, end_by_deactivation])
+@pytest.mark.parametrize(
+    'end',
+    [end_by(signal.SIGINT), end_by(signal.SIGHUP), end_by(signal.SIGQUIT), end_by_deactivation],
+    ids=['Ctrl-C', 'hang-up', 'quit', 'deactivation'],
+)
 def test_controllers_are_handed_back_with_the_finger_lifted_and_at_rest(graph, monkeypatch, tmp_path, end):
     log = tmp_path / 'switches'
     monkeypatch.setenv('MANAGED_LOG', str(log))
@@ -169,12 +179,127 @@ def test_controllers_are_handed_back_with_the_finger_lifted_and_at_rest(graph, m
     assert given_back['height_m'] > 0.0  # in the slide it was pressed into the surface
 
 
+@pytest.mark.parametrize('transition', [Transition(id=Transition.TRANSITION_CONFIGURE), Transition(id=99)])
+def test_an_invalid_lifecycle_request_is_refused_and_the_explorer_lives(graph, transition):
+    with NodeProcess('texture_exploration', 'explorer', {'watch_signal': False}) as explorer:
+        client = graph.peer.create_client(ChangeState, 'explorer/change_state')
+        graph.until(client.service_is_ready)
+        answers = [client.call_async(ChangeState.Request(transition=transition)) for _ in range(2)]
+        graph.until(lambda: explorer.process.poll() is not None or all(answer.done() for answer in answers))
+        assert explorer.process.poll() is None, explorer.output
+        assert not any(answer.result().success for answer in answers)
+        assert 'Traceback' not in explorer.output
+
+
+def x_of(places):
+    return places[-1].pose.position.x
+
+
+def test_when_the_process_that_commands_is_stopped_the_guard_brings_the_arm_to_rest(graph, record_property):
+    """As by SIGSTOP, a debugger or a frozen cgroup: nothing ends, so that no pipe is closed."""
+    places = graph.listen(PoseStamped, 'tcp_pose_broadcaster/pose')
+    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+        graph.until(lambda: places)
+        command = [sys.executable, '-c', MOVING]
+        with subprocess.Popen(command, stdout=subprocess.PIPE) as process, killed_on_error(process):
+            graph.until(lambda: x_of(places) > places[0].pose.position.x + 0.002)
+            process.send_signal(signal.SIGSTOP)
+            stopped_s, stopped_x = time.monotonic(), x_of(places)
+            graph.until(lambda: time.monotonic() - stopped_s > 2.0)
+            gone_m, way_m = x_of(places) - stopped_x, []
+            graph.until(lambda: way_m.append(x_of(places)) or len(way_m) > 50)
+            process.kill()
+    record_property('gone_m', gone_m)
+    print(f'{1e3 * gone_m:.2f} mm after the stop of who commanded')
+    assert gone_m < 0.005  # 20 mm without a guard
+    assert way_m[0] == pytest.approx(way_m[-1], abs=1e-6)
+
+
+def test_a_guard_that_is_killed_ends_the_slide_with_the_finger_lifted(graph):
+    explorer = Explorer(RosControllersArm(PATIENT), TouchParams(), LIMITS, lambda state: None)
+    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+        explorer.connect()
+        exploration, since_ns = explored(explorer, lambda: os.kill(guard_of(explorer), signal.SIGKILL))
+        assert since_ns, exploration.outcome
+        assert 'guard' in exploration.outcome.message
+        assert exploration.outcome.lifted
+        assert explored(explorer)[0].outcome.success  # the next request starts another
+        explorer.close()
+
+
+def guard_of(explorer):
+    return explorer.arm._topics._guard.pid
+
+
+def test_another_commander_ends_the_slide_with_the_finger_lifted_and_then_keeps_the_arm_from_being_taken(graph):
+    explorer = Explorer(
+        RosControllersArm(replace(PATIENT, connect_timeout_s=10.0)), TouchParams(), LIMITS, lambda state: None
+    )
+    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+        explorer.connect()
+        others = []
+        exploration, since_ns = explored(
+            explorer, lambda: others.append(graph.peer.create_publisher(TwistStamped, 'twist_controller/twist', 1))
+        )
+        assert since_ns, exploration.outcome
+        assert exploration.outcome.lifted
+        assert "'/peer' commands" in exploration.outcome.message
+        with pytest.raises(MotionRefused, match="'/peer' commands"):
+            explorer.begin('two', SLIDE)
+        graph.peer.destroy_publisher(others[0])
+        assert explored(explorer)[0].outcome.success
+        explorer.close()
+
+
+def test_a_second_explorer_is_refused_and_does_not_disturb_the_first(graph):
+    first = Explorer(RosControllersArm(PATIENT), TouchParams(), LIMITS, lambda state: None)
+    second = RosControllersArm(replace(PATIENT, connect_timeout_s=2.0))
+    with NodeProcess('texture_simulation', 'twist_controller', HELD), ThreadPoolExecutor() as pool:
+        first.connect()
+        refused = []
+        exploration, _ = explored(first, lambda: refused.append(pool.submit(second.connect)))
+        with pytest.raises(DeviceError, match='commands'):
+            refused[0].result()
+        assert exploration.outcome.success, exploration.outcome.message
+        first.close()
+
+
+def test_a_controller_that_declares_no_timeout_is_refused_unless_that_is_accepted(graph):
+    with pytest.raises(DeviceError, match=r"'controller_timeout_s'.*'accept_no_timeout: true'"):
+        RosControllersArm(RosControllersParams()).connect()
+
+
+def test_a_blink_of_the_subscription_in_the_slide_lifts_the_finger(graph):
+    explorer = Explorer(RosControllersArm(PATIENT), TouchParams(), LIMITS, lambda state: None)
+    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+        explorer.connect()
+        client = graph.peer.create_client(SetParameters, 'twist_controller/set_parameters')
+        graph.until(client.service_is_ready)
+        blink = SetParameters.Request(parameters=[Parameter('blink_s', value=0.006).to_parameter_msg()])
+        exploration, since_ns = explored(explorer, lambda: client.call_async(blink))
+        assert since_ns, exploration.outcome
+        assert not exploration.outcome.success
+        assert exploration.outcome.lifted, exploration.outcome.message
+        explorer.close()
+
+
+def test_a_finger_that_a_killed_explorer_left_pressed_is_lifted_on_request_before_anything_else(graph):
+    with NodeProcess('texture_simulation', 'twist_controller', HELD):
+        killed = Explorer(RosControllersArm(PATIENT), TouchParams(), LIMITS, lambda state: None)
+        killed.connect()
+        explored(killed, killed.arm.close)  # stands still and presses, as after SIGKILL
+        assert killed.connect()[2] < 0.0
+        height_m = killed.lift()
+        killed.close()
+    assert height_m > 0.001
+
+
 def test_a_hand_over_without_the_messages_of_the_controller_manager_is_refused(graph, monkeypatch):
     def missing(name):
         raise ImportError(name)
 
     monkeypatch.setattr(controller_topics.importlib, 'import_module', missing)
-    topics = controller_topics.RosTopics(RosControllersParams(controller_manager='controller_manager'))
+    topics = controller_topics.RosTopics(replace(PATIENT, controller_manager='controller_manager'))
     try:
         with pytest.raises(DeviceError, match='which needs controller_manager_msgs; install it'):
             topics.switch_controllers(('twist_controller',), ())
@@ -192,8 +317,8 @@ def test_the_controller_manager_is_asked_over_ros_and_one_that_is_not_there_is_w
         return response
 
     graph.peer.create_service(Trigger, 'manager/switch_controller', answer)
-    topics = controller_topics.RosTopics(RosControllersParams(connect_timeout_s=DEADLINE_S))
-    silent = controller_topics.RosTopics(RosControllersParams(connect_timeout_s=0.2))
+    topics = controller_topics.RosTopics(replace(PATIENT, connect_timeout_s=DEADLINE_S))
+    silent = controller_topics.RosTopics(replace(PATIENT, connect_timeout_s=0.2))
     try:
         with ThreadPoolExecutor() as pool:
             answered = pool.submit(topics._ask, Trigger, 'manager/switch_controller', Trigger.Request())

@@ -191,7 +191,8 @@ class Exploration:
         self._entered |= not workspace_violation
         frozen = self._force_watch.frozen(arm, self._commanded)
         return (
-            self._guard.violation(relative, self.state.phase)
+            arm.unsafe
+            or self._guard.violation(relative, self.state.phase)
             or frozen
             or (workspace_violation if self._entered else '')
         )

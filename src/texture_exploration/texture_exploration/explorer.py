@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 
 from texture_core.catalogue import find
-from texture_core.errors import DeviceError, InvalidData, MotionRefused, TextureError
+from texture_core.errors import DeviceError, InvalidData, MotionAborted, MotionRefused, TextureError
 from texture_core.exploration import ExplorationRequest, ExplorationState
 from texture_exploration.arms.protocol import (
     Arm,
@@ -27,7 +27,7 @@ from texture_exploration.arms.surface_frame import SurfaceFrame
 from texture_exploration.exploration import Exploration, arm_fault, no_signal_watch
 from texture_exploration.listening import Listening
 from texture_exploration.motions.catalogue import MOTIONS
-from texture_exploration.motions.lift_first import LiftFirst
+from texture_exploration.motions.lift_first import LiftFirst, Rise
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 from texture_exploration.surface_fit import TOUCHES, SurfaceTouches
@@ -75,6 +75,7 @@ class Explorer:
         self._current: Exploration | None = None
         self._thread: threading.Thread | None = None
         self._closed = self._released = False
+        self._lift_ends = threading.Event()
         self._touches = SurfaceTouches()
 
     def connect(self) -> Vector:
@@ -118,6 +119,7 @@ class Explorer:
         Explorations begin where the finger is at that `connect`: whoever had the arm meanwhile may have moved it, and
         the way back to the old place may be blocked.
         """
+        self._lift_ends.set()
         with self._lock:
             self._released = True
         self._end_motion('the explorer let go of the arm')
@@ -148,7 +150,7 @@ class Explorer:
             state = self.arm.state()
         except DeviceError as error:
             return str(error)
-        return arm_fault(state, self._clock(), self.limits)
+        return arm_fault(state, self._clock(), self.limits) or state.unsafe
 
     def warning(self) -> str:
         """Return in a sentence what is not as it should be although the arm moves, '' if nothing."""
@@ -181,6 +183,7 @@ class Explorer:
 
     def stop(self, reason: str) -> bool:
         """Abort the running exploration; return whether there was one. Without one, the arm stands still anyway."""
+        self._lift_ends.set()
         current = self.current
         if current is None:
             with contextlib.suppress(DeviceError):
@@ -209,6 +212,52 @@ class Explorer:
                     self.arm.recover()
             if self.fault():
                 self.connect()
+
+    def lift(self) -> float:
+        """Lift a finger that a killed explorer may have left pressed, until nothing touches it; return the rise, m.
+
+        Whoever asks sees that the finger may rise; `stop` ends it.
+
+        Raises
+        ------
+        MotionRefused
+            If an exploration is running, or the finger does not come free.
+        DeviceError
+            If the arm cannot be reached, or reports a fault.
+        """
+        with self._lock:
+            self._check_idle()
+            self._lift_ends.clear()
+            if self._home is None or self.fault():
+                self._home = self.connect()
+            begin_m = self.arm.state().position[2]
+            try:
+                self._rise()
+            except MotionAborted as trouble:
+                raise MotionRefused(f'the finger was not lifted: {trouble}') from trouble
+            finally:
+                self.arm.stop()
+            height_m = self.arm.state().position[2]
+            x_m, y_m, z_m = self._home
+            self._home = (x_m, y_m, max(z_m, height_m))  # a finger found pressed is no place to begin at
+            return height_m - begin_m
+
+    def _rise(self) -> None:
+        rise, pace = Rise(self.touch, self.limits), Pacer(PERIOD_S, self._clock)
+        rise.begin(self._clock(), self.arm.state())
+        while True:
+            if fault := self.fault():
+                raise DeviceError(f'the finger was not lifted: {fault}')
+            if self._lift_ends.is_set():
+                raise MotionAborted('it was stopped')
+            now_ns, state = self._clock(), self.arm.state()
+            command = rise.step(now_ns, state)
+            if command is None:
+                return
+            if rise.elapsed_s(now_ns) > rise.timeout_s:
+                raise MotionAborted(f'waited {rise.timeout_s:.1f} s for {rise.goal}')
+            self.arm.command(command)
+            pace()
 
     def reboot(self) -> str:
         """Reboot the motors that report an error; return what was done. The arm lets go, the next request connects.
@@ -287,6 +336,7 @@ class Explorer:
 
     def close(self) -> None:
         """Abort, wait until the finger is lifted, let the arm go."""
+        self._lift_ends.set()
         with self._lock:
             self._closed = True
         self._end_motion('the explorer was shut down')

@@ -21,14 +21,14 @@ try:  # from rclpy 7.1.4 on; half the computing time per message
 except ImportError:
     OneThread = SingleThreadedExecutor
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 ANSWERING_S = 2.0  # the longest that callbacks may take to answer once the node is shut down
 
 
 def run(
     make_node: Callable[[], Any], args: Sequence[str] | None = None, make_executor: Callable[[], Executor] = OneThread
 ) -> None:
-    """Make the node, spin it until SIGINT or SIGTERM, destroy it; exit with 2 and one sentence on a user's error.
+    """Make the node, spin it until a signal ends it, destroy it; exit with 2 and one sentence on a user's error.
 
     The node's `shutdown` method, if it has one, is called before it is destroyed, while it can still publish: it joins
     threads and closes devices.
@@ -45,7 +45,8 @@ def run(
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     stopped = threading.Event()
     for number in STOP_SIGNALS:
-        signal.signal(number, lambda _number, _frame: stopped.set())
+        if signal.getsignal(number) is not signal.SIG_IGN or number != signal.SIGHUP:  # as nohup wants it
+            signal.signal(number, lambda _number, _frame: stopped.set())
     node = executor = None
     try:
         node = make_node()

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 from texture_msgs import msg
 
@@ -17,6 +17,7 @@ from texture_core.protocols import Sensor
 from texture_core.ros.conversions import to_msg
 from texture_core.ros.diagnostics import Diagnostics
 from texture_core.ros.frames import frame_name
+from texture_core.ros.lifecycle import PatientLifecycleNode
 from texture_core.ros.parameters import declare, read
 from texture_core.ros.qos import SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
@@ -45,7 +46,7 @@ class SensorNodeParams(TareParams, SensorParams):
     )
 
 
-class SensorNode(LifecycleNode):
+class SensorNode(PatientLifecycleNode):
     """Publish the batches of one tactile sensor, and survive its being unplugged."""
 
     def __init__(self, **kwargs: Any) -> None:

@@ -25,6 +25,7 @@ from texture_exploration.arms.velocity_only import CommandedVelocity
 STANDSTILL = ArmCommand()
 REST: Vector = (0.0, 0.0, 0.0)
 HALTING_NS = 500_000_000  # so long zero velocity is repeated; afterwards others may command the controller
+GONE_NS = 300_000_000  # a controller that nobody hears of for so long is lost; a shorter time may be one of discovery
 RISE_M_S = 0.02
 MAX_RISES = 5.0  # a finger that is lifted to zero its sensor rises at most by so many times what proves free air
 POLL_S = 0.005
@@ -103,6 +104,7 @@ class RosControllersArm:
         self._pressing = False  # a compliance controller was commanded a force
         self._switched = False  # controllers were switched for this connection
         self._hand_over_fault = ''
+        self._unsafe = ''  # why it may only be lifted, likewise
         self._lost = ''  # a fault that stays until the arm is recovered or connected again
         self._restart()
 
@@ -201,10 +203,10 @@ class RosControllersArm:
         """
         self._connected()
         self.stop()
-        self._lost = self._tool.misplaced = ''
+        self._lost = self._unsafe = self._tool.misplaced = ''
         self._tool.zero.forget()
         self._follow.restart()
-        if fault := self._fault(self._clock()):
+        if fault := self._fault(self._clock()) or self._connected().unsafe():
             raise DeviceError(f'the arm did not recover: {fault}')
 
     @property
@@ -248,15 +250,17 @@ class RosControllersArm:
         self._take(topics, now_ns)
         if not self._lost:
             self._lost = self._lost_controller(topics, now_ns, held_s)
+        self._unsafe = self._unsafe or topics.unsafe()
         fault = self._fault(now_ns)
         if fault:
             self._command = None
             self._tool.zero.forget()
-        self._state = self._tool.state(fault)
+        self._state = replace(self._tool.state(fault), unsafe=self._unsafe)
         if fault:
             self._halt(topics, now_ns)
         else:
             self._carry_out(topics, self._due(now_ns), now_ns, held_s)
+        topics.beat(moving=self._commanded != REST or self._pressing)
 
     def _begin(self) -> ControllerTopics:
         """Let go of an earlier connection, and open the topics of a new one."""
@@ -273,9 +277,9 @@ class RosControllersArm:
         self._state = self._tool.state('')
         self._place = self._command = self._rise_from_m = None
         self._commanded = REST
-        self._moved_ns = self._sent_ns = 0
+        self._moved_ns = self._sent_ns = self._gone_ns = 0
         self._pressing = False
-        self._lost = ''
+        self._lost = self._unsafe = ''
 
     def _take_over(self, topics: ControllerTopics) -> None:
         if self._params.controller_manager:
@@ -312,6 +316,8 @@ class RosControllersArm:
                 f"nobody listens on '{params.twist_topic}'": topics.listeners() == 0,
             }
             faults = [what for what, is_missing in missing.items() if is_missing]
+            if unsafe := topics.unsafe():
+                faults.append(unsafe)
             if not faults:
                 self._state = tool.state('')
                 return
@@ -335,7 +341,13 @@ class RosControllersArm:
         """Return in a sentence that the controller is lost, '' if it is not."""
         topic = self._params.twist_topic
         if topics.listeners() == 0:
-            return f"nobody listens on '{topic}' any more: the controller has ended"
+            self._gone_ns = self._gone_ns or now_ns
+            if now_ns - self._gone_ns > GONE_NS:
+                return f"nobody listens on '{topic}' any more: the controller has ended"
+            self._unsafe = self._unsafe or f"for a moment nobody listened on '{topic}'; see why its controller left"
+            self._follow.restart()
+            return ''
+        self._gone_ns = 0
         if self._commanded == REST:
             self._follow.restart()
             return ''
@@ -351,6 +363,9 @@ class RosControllersArm:
         command = self._command
         if command is None or (now_ns - command[1]) * 1e-9 > self._params.command_timeout_s:
             return None
+        if self._unsafe:  # the way out alone is open
+            up_m_s = 0.0 if command[0].force_n is not None else max(0.0, command[0].normal_m_s)
+            return ArmCommand(normal_m_s=up_m_s)
         return self._lifted_first(command[0])
 
     def _lifted_first(self, command: ArmCommand) -> ArmCommand | None:

@@ -77,6 +77,27 @@ class RosControllersParams(ForceLoopParams, SurfacePoseParams, CommandLimits):
         low=0.02,
         high=2.0,
     )
+    controller_timeout_s: float = param(
+        0.0,
+        'Declares after which time without a command the controller itself stops the arm; 0 declares that it never '
+        "does, which is refused unless 'accept_no_timeout' is set.",
+        unit='s',
+        low=0.0,
+        high=0.5,
+    )
+    accept_no_timeout: bool = param(
+        False,
+        'Accepts a controller that holds the last velocity for ever: then nothing stops the arm when this machine or '
+        'its network fails, but the limits of the robot.',
+    )
+    heartbeat_s: float = param(
+        0.05,
+        'Sets the longest silence of the commanding process after which its guard commands zero velocity; a larger '
+        'value bears a busier machine.',
+        unit='s',
+        low=0.02,
+        high=1.0,
+    )
     deadman_s: float = param(
         0.08,
         'Sets the age of the newest pose or force above which zero velocity is commanded and a fault is reported; a '

@@ -43,6 +43,12 @@ class ControllerTopics(Protocol):
     def listeners(self) -> int:
         """Return how many nodes listen to the commanded velocities."""
 
+    def unsafe(self) -> str:
+        """Return why the arm must not go on although it obeys: another commands it, or no guard would stop it."""
+
+    def beat(self, *, moving: bool) -> None:
+        """Tell the guard that the commanding process lives, in each period, and whether the arm would go on alone."""
+
     def send_velocity(self, velocity_m_s: Vector) -> None:
         """Command a velocity in the frame `twist_frame_id`."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from std_srvs.srv import Trigger
 from texture_msgs import action, msg, srv
 
@@ -24,6 +24,7 @@ from texture_core.exploration import ExplorationState, Phase
 from texture_core.parameters import param
 from texture_core.ros.conversions import from_msg, request_from_msg, to_msg
 from texture_core.ros.diagnostics import DiagnosticReport, Diagnostics
+from texture_core.ros.lifecycle import PatientLifecycleNode
 from texture_core.ros.parameters import declare, on_change
 from texture_core.ros.qos import ESTIMATE_QOS, SENSOR_QOS, STATE_QOS
 from texture_core.ros.run import run
@@ -49,6 +50,10 @@ LOGGED: dict[str, Callable[[Any, str], Any]] = {
     'warning': lambda logger, text: logger.warning(text),
     'error': lambda logger, text: logger.error(text),
 }
+NOT_KNOWN = (
+    'whether the finger presses is not known, as after an explorer that was killed: the service lift lifts it now, and '
+    "the first exploration does so; 'lift_at_start: true' does so at every start"
+)
 RESULT_KEPT_S = 60  # for a client that asks late; rclpy's 15 min are hundreds of results
 
 
@@ -70,9 +75,14 @@ class StartParams:
         'Configures and activates the node at start-up, which takes control of the arm; false leaves that to a '
         'lifecycle manager.',
     )
+    lift_at_start: bool = param(
+        False,
+        'Lifts the finger until nothing touches it whenever the node takes control of the arm, as an explorer that was '
+        'killed leaves it pressed.',
+    )
 
 
-class ExplorerNode(LifecycleNode):
+class ExplorerNode(PatientLifecycleNode):
     """Explore on request, as a service or as an action; publish what the finger is doing.
 
     Configuring checks that the arm answers, activating takes control of it, deactivating lifts the finger and lets go.
@@ -97,6 +107,7 @@ class ExplorerNode(LifecycleNode):
         self.create_service(srv.Explore, 'explore', self._on_service, callback_group=group)
         self.create_service(Trigger, 'stop', self._on_stop, callback_group=group)
         self.create_service(Trigger, 'recover', self._on_recover, callback_group=group)
+        self.create_service(Trigger, 'lift', self._on_lift, callback_group=group)
         if isinstance(self._explorer.arm, Rebootable):
             self.create_service(Trigger, 'reboot', self._on_reboot, callback_group=group)
         if isinstance(self._explorer.arm, SurfaceBound):
@@ -114,7 +125,8 @@ class ExplorerNode(LifecycleNode):
         self.create_timer(IDLE_PERIOD_S, self._publish_idle)
         Diagnostics(self, self._report)
         self._publish_idle()
-        self._active, self._autostart = False, declare(self, StartParams).autostart
+        start = declare(self, StartParams)
+        self._active, self._autostart, self._lift_at_start = False, start.autostart, start.lift_at_start
         if self._autostart:
             self.trigger_configure()
             self.trigger_activate()
@@ -131,7 +143,12 @@ class ExplorerNode(LifecycleNode):
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Take control of the arm; at the start of the node an arm that is not there yet is waited for."""
-        if not self._tried(self._explorer.connect) and not self._autostart:
+        if self._tried(self._explorer.connect):
+            if not self._lift_at_start:
+                self.get_logger().info(NOT_KNOWN)
+            else:
+                self._tried(self._explorer.lift)
+        elif not self._autostart:
             self._explorer.release()
             return TransitionCallbackReturn.FAILURE
         self._active = True
@@ -166,7 +183,7 @@ class ExplorerNode(LifecycleNode):
         """Return whether the arm allowed it; if not, log why."""
         try:
             step()
-        except DeviceError as error:
+        except (DeviceError, MotionRefused) as error:
             more = '; the next request tries again' if self._autostart else ''
             self.get_logger().error(f'{error}{more}')
             return False
@@ -279,6 +296,17 @@ class ExplorerNode(LifecycleNode):
         else:
             response.success, response.message = True, 'the arm can move'
         self.get_logger().info(f'recover: {response.message}')
+        return response
+
+    def _on_lift(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        try:
+            risen_m = self._explorer.lift()
+        except (DeviceError, MotionRefused) as error:
+            response.message = str(error)
+        else:
+            response.success = True
+            response.message = f'the finger rose by {1e3 * risen_m:.1f} mm, and nothing touches it'
+        self.get_logger().info(f'lift: {response.message}')
         return response
 
     def _on_reboot(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -7,6 +7,7 @@ is shut down. Names follow the namespace and the remappings of the process.
 from __future__ import annotations
 
 import importlib
+import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,6 +25,7 @@ from texture_core.ros.time import to_ns
 from texture_exploration.arms.protocol import Vector
 from texture_exploration.arms.ros_controllers_params import RosControllersParams
 from texture_exploration.arms.ros_controllers_topics import ForceSample, PoseSample
+from texture_exploration.ros import twist_guard
 from texture_exploration.ros.twist_guard import TwistGuard
 
 NODE = 'arm_topics'
@@ -31,6 +33,10 @@ COMMAND_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)  # fit
 MEASURED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)  # fits every publisher
 MOST = 10  # messages that are taken at once: only the newest counts
 ARRIVAL_S = 0.2
+DISCOVERY_S = 0.5  # before this node is seen to publish, it looks who else does
+LOOKING_S = 0.05
+UNNAMED = '_NODE_NAME_UNKNOWN_'  # of rmw, until the name of a publisher's node has come, too
+UNNAMED_S = 1.0
 
 
 class RosTopics:
@@ -40,9 +46,20 @@ class RosTopics:
     ----------
     params
         Names of topics and frames.
+
+    Raises
+    ------
+    DeviceError
+        If the controller would hold the last velocity for ever, or somebody else commands it.
     """
 
     def __init__(self, params: RosControllersParams) -> None:
+        if not (params.controller_timeout_s or params.accept_no_timeout):
+            raise DeviceError(
+                f"the controller on '{params.twist_topic}' declares no timeout ('controller_timeout_s' is 0): it may "
+                'hold the last velocity for ever if this machine or its network fails. Set its timeout, or set '
+                "'accept_no_timeout: true' once the safety limits of the robot bound speed and force (docs/safety.md)"
+            )
         self._params = params
         self._context = Context()
         rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
@@ -54,13 +71,18 @@ class RosTopics:
             start_parameter_services=False,
         )
         node = self._node
-        self._twists = node.create_publisher(TwistStamped, params.twist_topic, COMMAND_QOS)
         wrench_topic = params.target_wrench_topic
+        self._commanded_topics = [node.resolve_topic_name(name) for name in (params.twist_topic, wrench_topic) if name]
+        self._unnamed_s = 0.0  # since when there has been such a publisher
+        self._wait_for_the_command()
+        self._twists = node.create_publisher(TwistStamped, params.twist_topic, COMMAND_QOS)
         self._wrenches = node.create_publisher(WrenchStamped, wrench_topic, COMMAND_QOS) if wrench_topic else None
         self._poses = node.create_subscription(PoseStamped, params.pose_topic, _ignore, MEASURED_QOS)
         self._forces = node.create_subscription(WrenchStamped, params.wrench_topic, _ignore, MEASURED_QOS)
         self._frame_id = params.twist_frame_id or params.base_frame_id
-        self._guard = TwistGuard(self._twists.topic_name, self._frame_id)
+        self._guard = TwistGuard(self._twists.topic_name, self._frame_id, params.heartbeat_s)
+        if not twist_guard.scope():
+            node.get_logger().warning(twist_guard.NO_SCOPE)
 
     def newest_pose(self) -> PoseSample | None:
         """Return the newest pose that came since the last call, None if none did."""
@@ -86,6 +108,16 @@ class RosTopics:
     def listeners(self) -> int:
         """Return how many nodes listen to the commanded velocities, and can also be reached by the guard."""
         return min(self._twists.get_subscription_count(), self._guard.reached)
+
+    def unsafe(self) -> str:
+        """Return why the arm must not go on although it obeys: another commands it, or no guard would stop it."""
+        return self._guard.fault() or self._other_commander(
+            (self._node.get_fully_qualified_name(), f'/{twist_guard.NODE}')
+        )
+
+    def beat(self, *, moving: bool) -> None:
+        """Tell the guard that the commanding process lives."""
+        self._guard.beat(moving=moving)
 
     def send_velocity(self, velocity_m_s: Vector) -> None:
         """Command a velocity."""
@@ -151,10 +183,39 @@ class RosTopics:
             executor.shutdown()
             self._node.destroy_client(client)
 
+    def _wait_for_the_command(self) -> None:
+        """Take the topics only once nobody else is there; who commands must not be disturbed by being looked at."""
+        begin_s = time.monotonic()
+        while (other := self._other_commander()) or time.monotonic() - begin_s < DISCOVERY_S:
+            if other and time.monotonic() - begin_s > self._params.connect_timeout_s:
+                self._leave()
+                raise DeviceError(f'{other}; end it first. One that was killed is forgotten after about 20 s')
+            time.sleep(LOOKING_S)
+
+    def _other_commander(self, own: tuple[str, ...] = ()) -> str:
+        """Return in a sentence who else commands, '' if nobody does; each name of ours may publish once."""
+        for topic in self._commanded_topics:
+            if self._node.count_publishers(topic) <= (len(own) if topic is self._commanded_topics[0] else len(own[:1])):
+                continue
+            left, infos = list(own), self._node.get_publishers_info_by_topic(topic)
+            unnamed = any(info.node_name == UNNAMED for info in infos)
+            self._unnamed_s = (self._unnamed_s or time.monotonic()) if unnamed else 0.0
+            if unnamed and time.monotonic() - self._unnamed_s < UNNAMED_S:
+                continue
+            for info in infos:
+                name = f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+                if name not in left:
+                    return f"'{name}' commands the arm, too: it publishes on '{topic}'"
+                left.remove(name)
+        return ''
+
     def close(self) -> None:
         """Wait until what was sent has arrived, and leave."""
         self._twists.wait_for_all_acked(Duration(seconds=ARRIVAL_S))
         self._guard.dismiss()
+        self._leave()
+
+    def _leave(self) -> None:
         self._node.destroy_node()
         rclpy.try_shutdown(context=self._context)
 

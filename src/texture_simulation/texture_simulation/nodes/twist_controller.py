@@ -44,6 +44,13 @@ class ControllerTopicParams:
     )
     publish_pose: bool = param(True, 'Publishes the pose; false emulates a pose broadcaster that has ended.')
     publish_wrench: bool = param(True, 'Publishes the force; false emulates a force broadcaster that has ended.')
+    blink_s: float = param(
+        0.0,
+        'Leaves the topic of the velocities for so long when it is set, as a controller that is switched; 0 does not.',
+        unit='s',
+        low=0.0,
+        high=1.0,
+    )
     finger_port: int = param(
         0,
         'Sets the UDP port on loopback at which the emulator receives the finger state; 0 sends none.',
@@ -60,14 +67,14 @@ class TwistControllerNode(Node):
         self._topics = declare(self, ControllerTopicParams, changeable=True)
         self._arm = EmulatedTwistArm(declare(self, TwistControllerParams, changeable=True), time.monotonic_ns())
         on_change(self, TwistControllerParams, partial(setattr, self._arm, 'params'))
-        on_change(self, ControllerTopicParams, partial(setattr, self, '_topics'))
+        on_change(self, ControllerTopicParams, self._on_topics)
         self._lock = threading.Lock()  # of the arm
         self._ignored = 0
         self._commanded_s = -math.inf
         topics = self._topics
         self._poses = self.create_publisher(PoseStamped, topics.pose_topic, 1)
         self._wrenches = self.create_publisher(WrenchStamped, topics.wrench_topic, 1)
-        self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
+        self._twists = self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
         self.create_subscription(WrenchStamped, topics.target_wrench_topic, self._on_wrench, 1)
         self._emulator = FingerSender(topics.finger_port)
         self._closing = threading.Event()
@@ -87,6 +94,13 @@ class TwistControllerNode(Node):
         self._closing.set()
         self._thread.join()
         self._emulator.close()
+
+    def _on_topics(self, topics: ControllerTopicParams) -> None:
+        self._topics = topics
+        if topics.blink_s:
+            self.destroy_subscription(self._twists)
+            time.sleep(topics.blink_s)
+            self._twists = self.create_subscription(TwistStamped, topics.twist_topic, self._on_twist, 1)
 
     def _on_twist(self, message: TwistStamped) -> None:
         # As the twist controller of ur_robot_driver: a velocity in another frame is ignored.
