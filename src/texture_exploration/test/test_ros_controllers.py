@@ -372,55 +372,64 @@ def test_every_motion_succeeds_behind_a_late_controller(motion):
     assert outcome.success, outcome.message
 
 
-def put_on_surface(robot, x_m, y_m):
-    """Bring the finger to a place of the surface as an operator would, and let the arm see it."""
-    robot.arm.position = robot.arm._origin + robot.arm._axes @ [x_m, y_m, 0.0]
-    robot.pass_time(0.02)
-
-
-def test_a_tilted_surface_is_found_by_three_touches():
-    tilted = TwistControllerParams(jitter_s=0.0, force_noise_n=0.0, surface_rx_rad=0.1, surface_ry_rad=-0.2)
-    robot = Robot(tilted)
+def explorer_over(robot):
     explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
     explorer.connect()
-    for x_m, y_m in ((0.0, 0.0), (0.05, 0.0)):
-        put_on_surface(robot, x_m, y_m)
-        assert 'touch the surface at' in explorer.touch_surface()
-    put_on_surface(robot, 0.02, 0.0)
-    with pytest.raises(MotionRefused, match='nearly in a line'):
-        explorer.touch_surface()
-    put_on_surface(robot, 0.02, 0.04)
-    assert 'residual 0.00 mm' in explorer.touch_surface()
+    robot.zero_force()
+    return explorer
+
+
+def press_at(robot, x_m, y_m, z_m=0.0, share=2.0):
+    """Press a place as an operator would, `z_m` above the surface, with so many times the least force of a touch."""
+    depth_m = share * TouchParams().contact_force_n / robot.arm.params.stiffness_n_m
+    robot.arm.position = robot.arm._origin + robot.arm._axes @ [x_m, y_m, z_m - depth_m]
+    robot.pass_time(0.02)
+    return depth_m
+
+
+def test_a_tilted_surface_is_found_by_four_touches_and_the_last_shows_the_residual():
+    tilted = TwistControllerParams(jitter_s=0.0, force_noise_n=0.0, surface_rx_rad=0.1, surface_ry_rad=-0.2)
+    robot = Robot(tilted)
+    explorer = explorer_over(robot)
+    for count, place in enumerate(((0.0, 0.0), (0.05, 0.0), (0.02, 0.04)), start=1):
+        press_at(robot, *place)
+        assert f'touch the surface at {4 - count} more place' in explorer.touch_surface()
+    assert robot.driven.surface_pose[3:] == (0.0, 0.0, 0.0)
+    depth_m = press_at(robot, 0.04, 0.03)
+    assert 'residual 0.00 mm rms, largest 0.00 mm' in explorer.touch_surface()
     explorer.connect()
     for place in ((0.01, -0.03), (-0.04, 0.02)):
-        put_on_surface(robot, *place)
-        assert robot.driven.state().position[2] == pytest.approx(0.0, abs=1e-9)
+        press_at(robot, *place, share=0.0)
+        assert robot.driven.state().position[2] == pytest.approx(depth_m, abs=1e-6)
     normal = rotation_matrix(robot.driven.surface_pose[3:])[:, 2]
     assert normal == pytest.approx(robot.arm._axes[:, 2])
 
 
 def test_touches_that_are_forgotten_are_made_again(robot):
-    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
-    explorer.connect()
+    explorer = explorer_over(robot)
     for _ in range(2):
-        put_on_surface(robot, 0.0, 0.0)
+        press_at(robot, 0.0, 0.0)
         explorer.touch_surface()
         assert explorer.forget_touches() == 1
     assert explorer.forget_touches() == 0
     assert 'touch 1 taken' in explorer.touch_surface()
 
 
-def test_a_touch_without_force_is_taken_with_a_doubt(robot):
-    touch = TouchParams()
-    explorer = Explorer(robot.driven, touch, LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+def test_a_touch_below_the_contact_force_is_refused_with_both_forces(robot):
+    explorer = explorer_over(robot)
+    for share, said in ((0.0, '0.00'), (0.5, '0.10')):
+        press_at(robot, 0.0, 0.0, share=share)
+        with pytest.raises(MotionRefused, match=rf'the force is {said} N, and 0\.2 N are needed'):
+            explorer.touch_surface()
+    assert explorer.forget_touches() == 0
+
+
+def test_a_touch_with_a_sensor_that_was_never_zeroed_is_refused(robot):
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
     explorer.connect()
-    robot.zero_force()
-    assert f'(less than {touch.contact_force_n:g} N: see that the finger touches)' in explorer.touch_surface()
-    explorer.forget_touches()
-    depth_m = 2 * touch.contact_force_n / robot.arm.params.stiffness_n_m
-    robot.arm.position = robot.arm._origin + robot.arm._axes @ [0.0, 0.0, -depth_m]
-    robot.pass_time(0.05)
-    assert 'less than' not in explorer.touch_surface()
+    press_at(robot, 0.0, 0.0)
+    with pytest.raises(MotionRefused, match='the force sensor is not zeroed'):
+        explorer.touch_surface()
 
 
 def test_a_check_commands_nothing_and_leaves_the_topics():
