@@ -166,10 +166,21 @@ class ForceController:
     """
 
     def __init__(self, gain_m_s_n: float, integral_s: float, max_speed_m_s: float = math.inf) -> None:
-        self.gain_m_s_n = gain_m_s_n
+        self._gain_m_s_n = gain_m_s_n
         self._integral_s = integral_s
         self._max_m_s = max_speed_m_s
         self._sum_ns = 0.0
+
+    @property
+    def gain_m_s_n(self) -> float:
+        """Normal speed per force error, m/s/N."""
+        return self._gain_m_s_n
+
+    @gain_m_s_n.setter
+    def gain_m_s_n(self, gain_m_s_n: float) -> None:
+        # The integral part goes on at the speed that it has: what a hundredth of the gain added up is no error now.
+        self._sum_ns *= self._gain_m_s_n / gain_m_s_n
+        self._gain_m_s_n = gain_m_s_n
 
     def restart(self) -> None:
         """Forget the past errors."""
@@ -197,7 +208,7 @@ class ForceController:
             Normal velocity, m/s, positive away from the surface.
         """
         added = self._sum_ns + error_n * dt_s
-        wanted = feed_forward_m_s - self.gain_m_s_n * (error_n + added / self._integral_s)
+        wanted = feed_forward_m_s - self._gain_m_s_n * (error_n + added / self._integral_s)
         limited = min(self._max_m_s, max(-min(self._max_m_s, down_m_s), wanted))
         # Anti-windup: an error that only pushes further against the limit is not added up.
         if limited == wanted or (wanted > 0) == (error_n > 0):

@@ -65,6 +65,8 @@ class SlopeObserver:
         travelled = (travelled - travelled_m) / unit
         shapes = np.stack([travelled, travelled**2], axis=1)
         shapes = shapes - shapes.mean(axis=0)
+        # An arm that is late has gone less than it goes until the answer: the noise of the slope acts for so much longer.
+        noise_m *= max(1.0, speed_m_s * self._ahead_s / unit)
         # Likely slopes and bends, as if they had been seen once beside the heights.
         likely = np.diag([noise_m / (LIKELY_SLOPE * unit), noise_m / (LIKELY_BEND_1_M * unit**2)]) ** 2
         slope, curvature = np.linalg.solve(shapes.T @ shapes + likely, shapes.T @ (height - height.mean()))
