@@ -14,6 +14,7 @@ delay is measured while it comes down; if it is longer than declared, gain and s
 from __future__ import annotations
 
 import math
+import statistics
 from dataclasses import dataclass, replace
 
 from texture_core.errors import InvalidParameter
@@ -23,7 +24,10 @@ from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import LoopModel, stability_limit_gain
 from texture_exploration.stiffness import TOUCHING_N, StiffnessEstimate
 
-NOISE_SHARE = 1.0 / 6.0  # of the force that counts as touching: the noise of the force
+NOISE_SHARE = 1.0 / 6.0  # of the force that counts as touching: the least noise of the force that is supposed
+LEAST_NOISE = 0.1  # of that; a reading may also stand still
+BEARABLE = 0.2  # of the wanted force, that noise may cost by what looks like a slope
+NOISE_SAMPLES = 50  # a finger that is pressed or lifted changes its force more: the calmest so many tell the noise
 SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
 SETTLED = 0.3  # from an error of this share of the wanted force on, the slope is observed
 REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
@@ -178,8 +182,9 @@ class ForceController:
 
     @gain_m_s_n.setter
     def gain_m_s_n(self, gain_m_s_n: float) -> None:
-        # The integral part goes on at the speed that it has: what a hundredth of the gain added up is no error now.
-        self._sum_ns *= self._gain_m_s_n / gain_m_s_n
+        # The integral part goes on at most at the speed that it has: what a hundredth of the gain added up is no error
+        # now, and on a harder base less speed is wanted.
+        self._sum_ns *= min(1.0, self._gain_m_s_n / gain_m_s_n)
         self._gain_m_s_n = gain_m_s_n
 
     def restart(self) -> None:
@@ -251,6 +256,8 @@ class ForceLoop:
         self._observer = self._new_observer()
         self._surface_m: float | None = None  # where the finger met it last
         self._chosen_for = math.nan
+        self._forces: list[float] = []
+        self._noise_n = math.inf
         self.controller = self._new_controller()
 
     def restart(self) -> None:
@@ -260,6 +267,7 @@ class ForceLoop:
 
     def observe(self, contact: ContactState, speed_m_s: float = 0.0) -> None:
         """Take note of a contact, whatever is commanded; call it once a period. Sliding tells nothing of stiffness."""
+        self._note_noise(contact.force_n)
         if contact.force_n < self._params.touching_n:
             self.stiffness.restart()
             return
@@ -269,6 +277,12 @@ class ForceLoop:
             self.stiffness.fixed = True
         self.stiffness.update(contact.height_m, contact.force_n)
         self._choose_gain()
+
+    @property
+    def noise_n(self) -> float:
+        """Standard deviation of the force, N, as measured above the surface; what `touching_n` supposes until then."""
+        supposed_n = NOISE_SHARE * self._params.touching_n
+        return max(LEAST_NOISE * supposed_n, self._noise_n) if math.isfinite(self._noise_n) else supposed_n
 
     def asked(self, height_m: float, asked_m_s: float, dt_s: float) -> None:
         """Take note of the velocity that was asked for in the end: it tells how late the arm follows.
@@ -312,13 +326,22 @@ class ForceLoop:
         estimated_n_m = self.stiffness.value_n_m
         settled = abs(wanted_n - force_n) < SETTLED * wanted_n
         feed_forward_m_s = 0.0
-        noise_n = NOISE_SHARE * self._params.touching_n
         if not math.isnan(estimated_n_m) and (settled or self._observer.running):
             feed_forward_m_s = self._observer.update(
-                contact.travelled_m, height_m + force_n / estimated_n_m, speed_m_s, noise_n / estimated_n_m
+                contact.travelled_m,
+                height_m + force_n / estimated_n_m,
+                speed_m_s,
+                max(self.noise_n, NOISE_SHARE * self._params.touching_n) / estimated_n_m,
+                self.noise_n / (BEARABLE * wanted_n),
             )
         down_m_s = math.inf if speed_m_s > SLOWEST_M_S else self._pressing_m_s(wanted_n)
         return self.controller.update(wanted_n - force_n, dt_s, feed_forward_m_s, down_m_s)
+
+    def _note_noise(self, force_n: float) -> None:
+        self._forces.append(force_n)
+        if len(self._forces) == NOISE_SAMPLES:
+            self._noise_n = min(self._noise_n, statistics.pstdev(self._forces))
+            self._forces = []
 
     def _pressing_m_s(self, wanted_n: float) -> float:
         """Return how fast the finger may be pressed on: what is soft now may have a hard base."""

@@ -55,7 +55,9 @@ class StiffnessEstimate:
         """Return whether the finger is deeper or presses harder than before; by the force alone noise would choose."""
         if not self._points:
             return True
-        return force_n > self._points[-1][1] or height_m < self._points[-1][0]
+        before_m, before_n = self._points[-1]
+        # A force that stays the same to the last bit may be frozen: no contact is that soft.
+        return force_n > before_n or (height_m < before_m and force_n != before_n)
 
     def _slope(self) -> float:
         count = len(self._points)
