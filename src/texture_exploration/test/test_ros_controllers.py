@@ -1,6 +1,7 @@
 """The arm behind ROS controllers without ROS: an emulated arm at the other end of its topics, in simulated time."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +38,8 @@ class Robot:
         self.arm = EmulatedTwistArm(emulated, self.now_ns)
         self.frames = ('base', 'tool0_controller')
         self.pose_comes = self.force_comes = True
+        self.late_s, self.clock_ahead_s, self.stamps_are_honest = 0.0, 0.0, True  # of the force; of this machine
+        self.readings = []
         self.heard_by = 1
         self.sent = []  # velocities with their times
         self.forces = []
@@ -51,8 +54,20 @@ class Robot:
         return PoseSample(self.now_ns, self.frames[0], (x, y, z), TOOL_DOWN) if self.pose_comes else None
 
     def newest_force(self):
-        x, y, z = self.arm.reading_n().tolist()
-        return ForceSample(self.now_ns, self.frames[1], (x, y, z)) if self.force_comes else None
+        self.readings.append((self.now_ns, self.arm.reading_n().tolist()))
+        due_ns = self.now_ns - round(self.late_s * 1e9)
+        while len(self.readings) > 1 and self.readings[1][0] <= due_ns:
+            self.readings.pop(0)
+        measured_ns, (x, y, z) = self.readings[0]
+        stamp_ns = measured_ns if self.stamps_are_honest else self.now_ns
+        age_ns = self.now_ns - stamp_ns + round(self.clock_ahead_s * 1e9)
+        return ForceSample(stamp_ns, self.frames[1], (x, y, z), age_ns) if self.force_comes else None
+
+    def hold_up_force(self, late_s):
+        """Let the force come late by so much, as if it always had."""
+        self.late_s, count = late_s, round(late_s * 1e9 / PERIOD_NS)
+        past = [(self.now_ns - n * PERIOD_NS, self.arm.reading_n().tolist()) for n in range(count, 0, -1)]
+        self.readings = past
 
     def listeners(self):
         return self.heard_by
@@ -92,13 +107,14 @@ class Robot:
         self.pass_time(0.4, ArmCommand())
         assert self.driven.zeroed
 
-    def explore(self, request, touch):
+    def explore(self, request, touch, meanwhile=lambda phase: None):
         home = self.driven.state().position
         motion = MOTIONS[request.motion](request, home, touch, LIMITS)
         forces = {}
 
         def note(state):
             forces.setdefault(state.phase.value, []).append(self.arm.finger().force_n)
+            meanwhile(state.phase.value)
 
         exploration = Exploration(
             'one',
@@ -430,6 +446,41 @@ def test_a_touch_with_a_sensor_that_was_never_zeroed_is_refused(robot):
     press_at(robot, 0.0, 0.0)
     with pytest.raises(MotionRefused, match='the force sensor is not zeroed'):
         explorer.touch_surface()
+
+
+PRESS = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=3.0, distance_m=0.02)
+
+
+@pytest.fixture
+def noisy():
+    robot = Robot(TwistControllerParams(jitter_s=0.0, force_noise_n=0.02), touching_n=0.12)
+    robot.driven.connect()
+    return robot
+
+
+def test_a_force_that_always_comes_half_a_second_late_by_its_stamp_is_refused_before_it_moves(noisy):
+    noisy.hold_up_force(0.5)
+    outcome, _ = noisy.explore(PRESS, TouchParams())
+    assert re.search(r'comes 50\d ms after its stamp, and 80 ms are allowed', outcome.message)
+    assert not any(any(velocity) for _, velocity in noisy.sent)
+
+
+def test_a_force_that_becomes_late_while_the_finger_slides_stops_the_arm(noisy):
+    def hold_up(phase):
+        if phase == 'slide' and not noisy.late_s:
+            noisy.hold_up_force(0.5)
+
+    outcome, forces = noisy.explore(PRESS, TouchParams(), hold_up)
+    assert 'ms after its stamp' in outcome.message
+    assert noisy.is_commanded_to_rest
+    assert max(map(max, forces.values())) < 3.6
+
+
+@pytest.mark.parametrize('clock_ahead_s', [-3600.0, -0.05, 3.0, 3600.0])
+def test_clocks_that_do_not_agree_say_nothing_about_age(noisy, clock_ahead_s):
+    noisy.clock_ahead_s = clock_ahead_s
+    outcome, _ = noisy.explore(PRESS, TouchParams())
+    assert outcome.success, outcome.message
 
 
 def test_a_check_commands_nothing_and_leaves_the_topics():

@@ -311,7 +311,7 @@ class RosControllersArm:
                 f"no force comes on '{params.wrench_topic}'": tool.force_ns == 0,
                 f"nobody listens on '{params.twist_topic}'": topics.listeners() == 0,
             }
-            faults = [what for what, is_missing in missing.items() if is_missing]
+            faults = [what for what, is_missing in missing.items() if is_missing] + [tool.late] * bool(tool.late)
             if not faults:
                 self._state = tool.state('')
                 return
@@ -344,7 +344,7 @@ class RosControllersArm:
 
     def _fault(self, now_ns: int) -> str:
         tool = self._tool
-        return self._lost or tool.misplaced or stale(self._params, now_ns, tool.pose_ns, tool.force_ns)
+        return self._lost or tool.misplaced or tool.late or stale(self._params, now_ns, tool.pose_ns, tool.force_ns)
 
     def _due(self, now_ns: int) -> ArmCommand | None:
         """Return the command that holds now, None if none does."""
