@@ -476,6 +476,20 @@ def test_a_force_that_becomes_late_while_the_finger_slides_stops_the_arm(noisy):
     assert max(map(max, forces.values())) < 3.6
 
 
+@pytest.mark.parametrize('stiffness_n_m', [2000.0, 5000.0])
+@pytest.mark.parametrize('late_s', [0.1, 0.2, 0.5])
+def test_a_late_force_whose_stamps_are_new_is_told_by_the_first_touch(late_s, stiffness_n_m):
+    emulated = TwistControllerParams(jitter_s=0.0, force_noise_n=0.02, stiffness_n_m=stiffness_n_m)
+    robot = Robot(emulated, touching_n=0.12)
+    robot.stamps_are_honest = False
+    robot.driven.connect()
+    robot.hold_up_force(late_s)
+    outcome, forces = robot.explore(replace(PRESS, force_n=5.0), TouchParams())
+    assert re.search(r'the force rose for \d+ ms or more after the finger stood still', outcome.message)
+    assert outcome.lifted
+    assert max(map(max, forces.values())) < 5.0
+
+
 @pytest.mark.parametrize('clock_ahead_s', [-3600.0, -0.05, 3.0, 3600.0])
 def test_clocks_that_do_not_agree_say_nothing_about_age(noisy, clock_ahead_s):
     noisy.clock_ahead_s = clock_ahead_s

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ENDED, ExplorationRequest, ExplorationState, Phase
-from texture_exploration.arms.protocol import Arm, ArmCommand, ArmState, ForceReading
+from texture_exploration.arms.protocol import Arm, ArmCommand, ArmState, Doubting, ForceReading
 from texture_exploration.force_watch import ForceWatch
 from texture_exploration.listening import WITHOUT_GAPS, Listening
 from texture_exploration.motions.protocol import Motion, MotionStep
@@ -145,8 +145,13 @@ class Exploration:
         if fault:
             self._give_up(f'{fault}; the finger was not lifted')
             return True
+        doubt = self._arm.doubt() if isinstance(self._arm, Doubting) else ''
         reason = (
-            self._stop_reason or self._violation(arm) or self._signal_fault(self._listening) or self._overdue(now_ns)
+            self._stop_reason
+            or self._violation(arm)
+            or doubt
+            or self._signal_fault(self._listening)
+            or self._overdue(now_ns)
         )
         if reason:
             self._abort_reason = self._abort_reason or reason

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
-from texture_exploration.lag import LagEstimate
+from texture_exploration.lag import ForceLag, LagEstimate
 from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import LoopModel, stability_limit_gain
 from texture_exploration.stiffness import TOUCHING_N, StiffnessEstimate
@@ -37,6 +37,7 @@ LATE_IMPACT = (
     3.0  # so many times 'max_impact_n' may be met by an arm that is later than declared: coming down takes long
 )
 INTEGRAL_LAGS = 20.0  # the integral part takes at least so many lags: a faster one adds to the overshoot
+FORCE_LAG_S = 0.03  # a force that is later than 'loop_delay_s' by more than this is not pressed by
 NEAR_M = 0.001  # above a surface whose height is known, the finger slows down to closing speed
 
 
@@ -258,6 +259,9 @@ class ForceLoop:
         self._chosen_for = math.nan
         self._forces: list[float] = []
         self._noise_n = math.inf
+        self._touch: ForceLag | None = None  # while the finger stands after the first touch, to hear the force
+        self._heard = False
+        self.force_lag_s = 0.0
         self.controller = self._new_controller()
 
     def restart(self) -> None:
@@ -270,6 +274,7 @@ class ForceLoop:
         self._note_noise(contact.force_n)
         if contact.force_n < self._params.touching_n:
             self.stiffness.restart()
+            self._touch, self._heard = None, False
             return
         if self.stiffness.empty:
             self._surface_m = contact.height_m
@@ -323,6 +328,9 @@ class ForceLoop:
         if force_n < self._params.touching_n:
             self.restart()
             return -self.approach_m_s(height_m)
+        if speed_m_s <= SLOWEST_M_S and not self._heard:
+            self._listen(contact, dt_s)
+            return 0.0
         estimated_n_m = self.stiffness.value_n_m
         settled = abs(wanted_n - force_n) < SETTLED * wanted_n
         feed_forward_m_s = 0.0
@@ -336,6 +344,28 @@ class ForceLoop:
             )
         down_m_s = math.inf if speed_m_s > SLOWEST_M_S else self._pressing_m_s(wanted_n)
         return self.controller.update(wanted_n - force_n, dt_s, feed_forward_m_s, down_m_s)
+
+    def doubt(self) -> str:
+        """Return in a sentence why nobody should press by this force, '' if one may."""
+        allowed_s = FORCE_LAG_S + self._declared.loop_delay_s
+        if self.force_lag_s <= allowed_s:
+            return ''
+        declared_ms = 1e3 * self._declared.loop_delay_s
+        return (
+            f'the force rose for {1e3 * self.force_lag_s:.0f} ms or more after the finger stood still on the surface, '
+            f"and {1e3 * allowed_s:.0f} ms are allowed with a 'loop_delay_s' of {declared_ms:.0f} ms; find what makes "
+            'the force late, such as a filter, or declare it'
+        )
+
+    def _listen(self, contact: ContactState, dt_s: float) -> None:
+        """Stand until the force does, and take over how late it is, before anything is pressed."""
+        self._touch = self._touch or ForceLag(self.noise_n)
+        if not self._touch.update(contact.height_m, contact.force_n, dt_s):
+            return
+        self._heard = True
+        self.force_lag_s = 0.0 if math.isnan(self._touch.value_s) else self._touch.value_s
+        self._adapt_to_lag()
+        self._choose_gain()
 
     def _note_noise(self, force_n: float) -> None:
         self._forces.append(force_n)
@@ -381,7 +411,7 @@ class ForceLoop:
 
     def _adapt_to_lag(self) -> None:
         """Take over the measured lag if it is longer than declared."""
-        lag_s = self.lag.value_s
+        lag_s = self.lag.value_s + self.force_lag_s
         declared = self._declared
         late = lag_s > declared.loop_delay_s + UNDECLARED_PERIODS * self._period_s  # not if it is NaN
         delay_s = math.ceil(lag_s * 1e3) * 1e-3 if late else declared.loop_delay_s

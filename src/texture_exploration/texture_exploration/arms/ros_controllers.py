@@ -292,6 +292,10 @@ class RosControllersArm:
         except DeviceError as error:
             self._hand_over_fault = f'the controllers were not switched back: {error}'
 
+    def doubt(self) -> str:
+        """Return in a sentence that the force comes too late to press by it, '' if not."""
+        return '' if self._params.target_wrench_topic else self._velocity.doubt()
+
     def warning(self) -> str:
         """Return in a sentence that the controllers were not switched back when the arm was let go, '' if they were."""
         return self._hand_over_fault
