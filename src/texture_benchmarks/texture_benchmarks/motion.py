@@ -346,7 +346,11 @@ def ros_controllers(stiffness_n_m: float, finger_port: int) -> Iterator[Arm]:
         # A busy machine is not what is tried here.
         yield RosControllersArm(
             RosControllersParams(
-                connect_timeout_s=DEADLINE_S, deadman_s=1.0, max_stiffness_n_m=20000.0, max_impact_n=0.5
+                accept_no_timeout=True,
+                connect_timeout_s=DEADLINE_S,
+                deadman_s=1.0,
+                max_stiffness_n_m=20000.0,
+                max_impact_n=0.5,
             )
         )
 

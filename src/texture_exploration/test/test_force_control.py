@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from texture_core.errors import InvalidParameter
+from texture_core.exploration import ExplorationRequest
 from texture_exploration.arms.simulated import SimulatedArm, SimulatedArmParams
 from texture_exploration.force_control import ContactState, ForceController, ForceLoop, ForceLoopParams
 from texture_exploration.lag import LagEstimate
+from texture_exploration.motions.touch import TouchParams
 from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import spectral_radius
 from texture_exploration.stiffness import StiffnessEstimate
@@ -96,3 +98,66 @@ def test_a_finger_at_rest_is_pressed_on_no_faster_than_the_stiffest_base_allows(
         height_m, force_n = height_m + speed_m_s * PERIOD_S, force_n - 200.0 * speed_m_s * PERIOD_S
         # 1 N on 20 kN/m within 8 ms and two periods of 4 ms.
         assert speed_m_s >= -1.0 / 20000.0 / 0.016 - 1e-12
+
+
+def test_a_new_gain_goes_on_at_the_speed_that_the_integral_part_has():
+    controller = ForceController(3e-4, integral_s=0.5)
+    for _ in range(500):
+        controller.update(0.8, PERIOD_S)
+    before_m_s = controller.update(0.0, PERIOD_S)
+    controller.gain_m_s_n = 3e-2
+    assert controller.update(0.0, PERIOD_S) == pytest.approx(before_m_s)
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_a_noisy_force_does_not_choose_the_stiffness(seed):
+    """A slow rise to 0.3 N with 20 mN of noise."""
+    rng, estimate = np.random.default_rng(seed), StiffnessEstimate(touching_n=0.12)
+    for depth in np.linspace(0.0, 1.5e-3, 200):
+        estimate.update(0.003 - depth, 200.0 * depth + 0.02 * rng.standard_normal())
+    assert estimate.value_n_m == pytest.approx(200.0, rel=0.15)
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_noise_is_no_slope_when_a_late_arm_sets_off(seed):
+    """Commanded to 30 mm/s, it has gone a few micrometres: 1 um of noise is no wall and no abyss."""
+    rng, observer = np.random.default_rng(seed), SlopeObserver(ahead_s=0.06)
+    heights = 1e-6 * rng.standard_normal(8)
+    rises = [observer.update(1e-6 * step, height, 0.03, noise_m=1e-6, doubt=0.1) for step, height in enumerate(heights)]
+    assert max(map(abs, rises)) < 3e-4  # in 60 ms 18 um, 0.36 N at 20 kN/m
+
+
+# Declared and true stiffness in N/m, undeclared lag in ms, noise in mN, force that counts as touching in N.
+HARD_LOOPS = [
+    (20000.0, 20000.0, 50, 20, 0.03),
+    (20000.0, 5000.0, 50, 20, 0.03),
+    (20000.0, 20000.0, 50, 10, 0.06),
+    (20000.0, 600.0, 50, 20, 0.12),
+    (20000.0, 200.0, 20, 20, 0.12),
+    (5000.0, 2000.0, 50, 20, 0.03),
+    (5000.0, 200.0, 50, 20, 0.12),
+]
+
+
+@pytest.mark.parametrize('loop', HARD_LOOPS)
+def test_a_late_arm_with_a_noisy_force_overshoots_by_a_fifth_at_most(make_table, loop):
+    declared, true, lag_ms, noise_mn, touching_n = loop
+    arm = SimulatedArmParams(
+        force_mode=False,
+        start_height_m=0.002,
+        max_stiffness_n_m=declared,
+        stiffness_n_m=true,
+        undeclared_lag_s=1e-3 * lag_ms,
+        force_noise_n=1e-3 * noise_mn,
+        touching_n=touching_n,
+    )
+    table, forces = make_table(arm, TouchParams(approach_stiffness_n_m=declared)), []
+    go_on = table.pace
+
+    def pace():
+        go_on()
+        forces.append(table.arm.true_force_n)
+
+    table.pace = pace
+    table.explore(ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.01))
+    assert 0.9 < max(forces) < 1.2

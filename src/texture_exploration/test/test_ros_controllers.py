@@ -1,6 +1,7 @@
 """The arm behind ROS controllers without ROS: an emulated arm at the other end of its topics, in simulated time."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +38,8 @@ class Robot:
         self.arm = EmulatedTwistArm(emulated, self.now_ns)
         self.frames = ('base', 'tool0_controller')
         self.pose_comes = self.force_comes = True
+        self.late_s, self.clock_ahead_s, self.stamps_are_honest = 0.0, 0.0, True  # of the force; of this machine
+        self.readings = []
         self.heard_by = 1
         self.unsafe_because = ''
         self.sent = []  # velocities with their times
@@ -53,8 +56,20 @@ class Robot:
         return PoseSample(self.now_ns, self.frames[0], (x, y, z), TOOL_DOWN) if self.pose_comes else None
 
     def newest_force(self):
-        x, y, z = self.arm.reading_n().tolist()
-        return ForceSample(self.now_ns, self.frames[1], (x, y, z)) if self.force_comes else None
+        self.readings.append((self.now_ns, self.arm.reading_n().tolist()))
+        due_ns = self.now_ns - round(self.late_s * 1e9)
+        while len(self.readings) > 1 and self.readings[1][0] <= due_ns:
+            self.readings.pop(0)
+        measured_ns, (x, y, z) = self.readings[0]
+        stamp_ns = measured_ns if self.stamps_are_honest else self.now_ns
+        age_ns = self.now_ns - stamp_ns + round(self.clock_ahead_s * 1e9)
+        return ForceSample(stamp_ns, self.frames[1], (x, y, z), age_ns) if self.force_comes else None
+
+    def hold_up_force(self, late_s):
+        """Let the force come late by so much, as if it always had."""
+        self.late_s, count = late_s, round(late_s * 1e9 / PERIOD_NS)
+        past = [(self.now_ns - n * PERIOD_NS, self.arm.reading_n().tolist()) for n in range(count, 0, -1)]
+        self.readings = past
 
     def listeners(self):
         return self.heard_by
@@ -101,7 +116,7 @@ class Robot:
         self.pass_time(0.4, ArmCommand())
         assert self.driven.zeroed
 
-    def explore(self, request, touch, home=None, on_slide=lambda: None):
+    def explore(self, request, touch, meanwhile=lambda phase: None, home=None, on_slide=lambda: None):
         home = home or self.driven.state().position
         motion = MOTIONS[request.motion](request, home, touch, LIMITS)
         forces = {}
@@ -110,6 +125,7 @@ class Robot:
             forces.setdefault(state.phase.value, []).append(self.arm.finger().force_n)
             if state.phase is Phase.SLIDE:
                 on_slide()
+            meanwhile(state.phase.value)
 
         exploration = Exploration(
             'one',
@@ -302,7 +318,7 @@ def test_a_controller_that_is_gone_for_6_ms_in_the_slide_ends_it_with_the_finger
         return 0 if gone_ns and robot.now_ns - gone_ns[0] <= 6_000_000 else 1
 
     robot.listeners = listeners
-    outcome, _ = robot.explore(SLIDE, TouchParams(), lambda: gone_ns.append(robot.now_ns))
+    outcome, _ = robot.explore(SLIDE, TouchParams(), on_slide=lambda: gone_ns.append(robot.now_ns))
     assert gone_ns
     assert not outcome.success
     assert 'listened on' in outcome.message
@@ -315,7 +331,7 @@ def test_a_controller_that_is_gone_for_6_ms_in_the_slide_ends_it_with_the_finger
 def test_what_makes_the_arm_unsafe_while_it_obeys_ends_the_slide_with_the_finger_lifted(why):
     robot = Robot(replace(NO_NOISE, start_height_m=0.003, force_noise_n=0.002))
     robot.driven.connect()
-    outcome, _ = robot.explore(SLIDE, TouchParams(), lambda: setattr(robot, 'unsafe_because', why))
+    outcome, _ = robot.explore(SLIDE, TouchParams(), on_slide=lambda: setattr(robot, 'unsafe_because', why))
     assert not outcome.success
     assert why in outcome.message
     assert outcome.lifted
@@ -432,60 +448,118 @@ def test_every_motion_succeeds_behind_a_late_controller(motion):
     assert outcome.success, outcome.message
 
 
-def put_on_surface(robot, x_m, y_m):
-    """Bring the finger to a place of the surface as an operator would, and let the arm see it."""
-    robot.arm.position = robot.arm._origin + robot.arm._axes @ [x_m, y_m, 0.0]
-    robot.pass_time(0.02)
-
-
-def test_a_tilted_surface_is_found_by_three_touches():
-    tilted = TwistControllerParams(jitter_s=0.0, force_noise_n=0.0, surface_rx_rad=0.1, surface_ry_rad=-0.2)
-    robot = Robot(tilted)
+def explorer_over(robot):
     explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
     explorer.connect()
-    for x_m, y_m in ((0.0, 0.0), (0.05, 0.0)):
-        put_on_surface(robot, x_m, y_m)
-        assert 'touch the surface at' in explorer.touch_surface()
-    put_on_surface(robot, 0.02, 0.0)
-    with pytest.raises(MotionRefused, match='nearly in a line'):
-        explorer.touch_surface()
-    put_on_surface(robot, 0.02, 0.04)
-    assert 'residual 0.00 mm' in explorer.touch_surface()
+    robot.zero_force()
+    return explorer
+
+
+def press_at(robot, x_m, y_m, z_m=0.0, share=2.0):
+    """Press a place as an operator would, `z_m` above the surface, with so many times the least force of a touch."""
+    depth_m = share * TouchParams().contact_force_n / robot.arm.params.stiffness_n_m
+    robot.arm.position = robot.arm._origin + robot.arm._axes @ [x_m, y_m, z_m - depth_m]
+    robot.pass_time(0.02)
+    return depth_m
+
+
+def test_a_tilted_surface_is_found_by_four_touches_and_the_last_shows_the_residual():
+    tilted = TwistControllerParams(jitter_s=0.0, force_noise_n=0.0, surface_rx_rad=0.1, surface_ry_rad=-0.2)
+    robot = Robot(tilted)
+    explorer = explorer_over(robot)
+    for count, place in enumerate(((0.0, 0.0), (0.05, 0.0), (0.02, 0.04)), start=1):
+        press_at(robot, *place)
+        assert f'touch the surface at {4 - count} more place' in explorer.touch_surface()
+    assert robot.driven.surface_pose[3:] == (0.0, 0.0, 0.0)
+    depth_m = press_at(robot, 0.04, 0.03)
+    assert 'residual 0.00 mm rms, largest 0.00 mm' in explorer.touch_surface()
     explorer.connect()
     for place in ((0.01, -0.03), (-0.04, 0.02)):
-        put_on_surface(robot, *place)
-        assert robot.driven.state().position[2] == pytest.approx(0.0, abs=1e-9)
+        press_at(robot, *place, share=0.0)
+        assert robot.driven.state().position[2] == pytest.approx(depth_m, abs=1e-6)
     normal = rotation_matrix(robot.driven.surface_pose[3:])[:, 2]
     assert normal == pytest.approx(robot.arm._axes[:, 2])
 
 
 def test_touches_that_are_forgotten_are_made_again(robot):
-    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
-    explorer.connect()
+    explorer = explorer_over(robot)
     for _ in range(2):
-        put_on_surface(robot, 0.0, 0.0)
+        press_at(robot, 0.0, 0.0)
         explorer.touch_surface()
         assert explorer.forget_touches() == 1
     assert explorer.forget_touches() == 0
     assert 'touch 1 taken' in explorer.touch_surface()
 
 
-def test_a_touch_without_force_is_taken_with_a_doubt(robot):
-    touch = TouchParams()
-    explorer = Explorer(robot.driven, touch, LIMITS, lambda state: None, clock=lambda: robot.now_ns)
+def test_a_touch_below_the_contact_force_is_refused_with_both_forces(robot):
+    explorer = explorer_over(robot)
+    for share, said in ((0.0, '0.00'), (0.5, '0.10')):
+        press_at(robot, 0.0, 0.0, share=share)
+        with pytest.raises(MotionRefused, match=rf'the force is {said} N, and 0\.2 N are needed'):
+            explorer.touch_surface()
+    assert explorer.forget_touches() == 0
+
+
+def test_a_touch_with_a_sensor_that_was_never_zeroed_is_refused(robot):
+    explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
     explorer.connect()
-    robot.zero_force()
-    assert f'(less than {touch.contact_force_n:g} N: see that the finger touches)' in explorer.touch_surface()
-    explorer.forget_touches()
-    depth_m = 2 * touch.contact_force_n / robot.arm.params.stiffness_n_m
-    robot.arm.position = robot.arm._origin + robot.arm._axes @ [0.0, 0.0, -depth_m]
-    robot.pass_time(0.05)
-    assert 'less than' not in explorer.touch_surface()
+    press_at(robot, 0.0, 0.0)
+    with pytest.raises(MotionRefused, match='the force sensor is not zeroed'):
+        explorer.touch_surface()
+
+
+PRESS = ExplorationRequest('linear_slide', speed_m_s=0.02, force_n=3.0, distance_m=0.02)
+
+
+@pytest.fixture
+def noisy():
+    robot = Robot(TwistControllerParams(jitter_s=0.0, force_noise_n=0.02), touching_n=0.12)
+    robot.driven.connect()
+    return robot
+
+
+def test_a_force_that_always_comes_half_a_second_late_by_its_stamp_is_refused_before_it_moves(noisy):
+    noisy.hold_up_force(0.5)
+    outcome, _ = noisy.explore(PRESS, TouchParams())
+    assert re.search(r'comes 50\d ms after its stamp, and 80 ms are allowed', outcome.message)
+    assert not any(any(velocity) for _, velocity in noisy.sent)
+
+
+def test_a_force_that_becomes_late_while_the_finger_slides_stops_the_arm(noisy):
+    def hold_up(phase):
+        if phase == 'slide' and not noisy.late_s:
+            noisy.hold_up_force(0.5)
+
+    outcome, forces = noisy.explore(PRESS, TouchParams(), hold_up)
+    assert 'ms after its stamp' in outcome.message
+    assert noisy.is_commanded_to_rest
+    assert max(map(max, forces.values())) < 3.6
+
+
+@pytest.mark.parametrize('stiffness_n_m', [2000.0, 5000.0])
+@pytest.mark.parametrize('late_s', [0.1, 0.2, 0.5])
+def test_a_late_force_whose_stamps_are_new_is_told_by_the_first_touch(late_s, stiffness_n_m):
+    emulated = TwistControllerParams(jitter_s=0.0, force_noise_n=0.02, stiffness_n_m=stiffness_n_m)
+    robot = Robot(emulated, touching_n=0.12)
+    robot.stamps_are_honest = False
+    robot.driven.connect()
+    robot.hold_up_force(late_s)
+    outcome, forces = robot.explore(replace(PRESS, force_n=5.0), TouchParams())
+    assert re.search(r'the force rose for \d+ ms or more after the finger stood still', outcome.message)
+    assert outcome.lifted
+    assert max(map(max, forces.values())) < 5.0
+
+
+@pytest.mark.parametrize('clock_ahead_s', [-3600.0, -0.05, 3.0, 3600.0])
+def test_clocks_that_do_not_agree_say_nothing_about_age(noisy, clock_ahead_s):
+    noisy.clock_ahead_s = clock_ahead_s
+    outcome, _ = noisy.explore(PRESS, TouchParams())
+    assert outcome.success, outcome.message
 
 
 def test_a_finger_that_is_found_pressed_is_lifted_until_nothing_touches_it(robot, monkeypatch):
     explorer = Explorer(robot.driven, TouchParams(), LIMITS, lambda state: None, clock=lambda: robot.now_ns)
-    put_on_surface(robot, 0.0, 0.0)
+    press_at(robot, 0.0, 0.0, share=0.0)
     robot.arm.position = robot.arm._origin - [0.0, 0.0, 0.002]
     robot.pass_time(0.05)
     assert robot.arm.finger().force_n == pytest.approx(4.0)
@@ -621,7 +695,7 @@ def test_no_hidden_force_follows_from_what_is_not_as_the_arm_is_told(lie, stiffn
         home = (WALL['wall_m'] + 0.02, 0.0, home[2])
     request = replace(SLIDE, speed_m_s=given.get('speed_m_s', SLIDE.speed_m_s))
     touch = TouchParams(approach_stiffness_n_m=stiffness_n_m)
-    outcome, _ = robot.explore(request, touch, home)
+    outcome, _ = robot.explore(request, touch, home=home)
     peak_n, end_n = max(robot.pressed_n), robot.pressed_n[-1]
     above_s = longest_above(robot.pressed_n, LIMITS.force_limit_n) * PERIOD_NS * 1e-9
     record_property('peak_n', peak_n)

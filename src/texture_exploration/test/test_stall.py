@@ -1,14 +1,18 @@
-"""A finger that does not move along the surface although it is commanded to."""
+"""A finger that does not move along the surface as commanded, and slides that are not what was asked for."""
 
 import math
 
+import numpy as np
 import pytest
 
 from texture_core.errors import MotionAborted
 from texture_core.exploration import ExplorationRequest, Phase
+from texture_core.signal import TactileSignal
 from texture_exploration.arms.protocol import ArmState
-from texture_exploration.motions.stall import StallWatch
+from texture_exploration.arms.simulated import SimulatedArmParams
+from texture_exploration.motions.stall import SlideWatch, StallWatch
 from texture_exploration.motions.touch import TouchParams
+from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
 
 SPEED_M_S = 0.02
 STEP_S = 0.01
@@ -62,3 +66,98 @@ def test_a_stall_in_mid_slide_aborts_and_lifts(table):
     assert table.phases[-2:] == [Phase.LIFT, Phase.ABORTED]
     lifted, jammed = (table.first(phase)[0].stamp_ns for phase in (Phase.LIFT, Phase.SLIDE))
     assert (lifted - jammed) * 1e-9 < 0.5
+
+
+def slid(seconds=1.0, force_n=lambda s: 1.0, speed=lambda s: 1.0, tangential_n=lambda s: math.nan, **given):
+    """Return which states of a slide at 20 mm/s and 1 N count as steady, and what is said at its end."""
+    watch, x_m, steady = SlideWatch(SPEED_M_S, 1.0, TouchParams(**given)), 0.0, []
+    for number in range(round(seconds / STEP_S)):
+        now_s = number * STEP_S
+        x_m += speed(now_s) * SPEED_M_S * STEP_S
+        velocity = (speed(now_s) * SPEED_M_S, 0.0, 0.0)
+        state = ArmState(
+            round(now_s * 1e9), (x_m, 0.0, 0.0), velocity, force_n(now_s), tangential_force_n=tangential_n(now_s)
+        )
+        steady.append(watch.update(state, constant=True))
+    return steady, watch.flaw()
+
+
+def test_a_slide_as_asked_is_steady_and_without_flaw():
+    steady, flaw = slid(force_n=lambda s: 1.0 + 0.2 * math.sin(50 * s), tangential_n=lambda s: 1.5)
+    assert all(steady)
+    assert flaw == ''
+
+
+def test_three_times_the_speed_is_not_steady_and_named_with_what_was_asked():
+    steady, flaw = slid(speed=lambda s: 3.0)
+    assert not any(steady[5:])
+    assert 'the mean speed of the slide was 0.0600 m/s, more than 20% off the 0.02 m/s that were asked for' in flaw
+    assert 'the speed of the slide reached 0.06 m/s, and 0.03 m/s are allowed with 0.02 m/s asked for' in flaw
+
+
+def test_half_the_speed_is_no_success():
+    assert slid(speed=lambda s: 0.5)[1].startswith('the mean speed of the slide was 0.0100 m/s')
+
+
+def test_a_short_peak_of_the_force_is_not_steady_and_named_although_the_mean_is_right():
+    steady, flaw = slid(force_n=lambda s: 1.86 if 0.5 <= s < 0.56 else 1.0)
+    assert [number for number, good in enumerate(steady) if not good] == [51, 52, 53, 54, 55, 56]
+    assert flaw == (
+        "the force of the slide reached 1.86 N, and 1.5 N are allowed with 1 N asked for ('peak_force_share')"
+    )
+
+
+def test_one_wrong_reading_of_the_force_is_none():
+    assert slid(force_n=lambda s: 5.0 if abs(s - 0.5) < 0.004 else 1.0)[1] == ''
+
+
+def test_a_force_along_the_surface_beyond_friction_is_no_success():
+    assert 'the mean force along the surface was 2.50 N, and 2.00 N' in slid(tangential_n=lambda s: -2.5)[1]
+    steady, flaw = slid(tangential_n=lambda s: 3.5 if s >= 0.9 else 0.5)
+    assert not steady[-1]
+    assert flaw.startswith('the force along the surface of the slide reached 3.5 N, and 3 N are allowed')
+
+
+def test_turns_are_no_part_of_the_speed_that_was_asked_for():
+    watch, x_m = SlideWatch(SPEED_M_S, 1.0, TouchParams()), 0.0
+    for number in range(200):
+        turning = number % 50 >= 40
+        x_m += (0.0 if turning else SPEED_M_S) * STEP_S
+        watch.update(ArmState(round(number * STEP_S * 1e9), (x_m, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0), not turning)
+    assert watch.flaw() == ''
+
+
+@pytest.mark.parametrize('share', [1.86, 3.0])
+def test_a_force_that_departs_in_the_slide_is_no_success_and_no_window_is_cut_from_it(make_table, share):
+    table = make_table(SimulatedArmParams(admittance_m_s_n=7e-4))  # it gives way slowly
+    table.when[Phase.SLIDE] = lambda: setattr(table, 'pressed_ns', table.now_ns)
+    table.pressed_ns, go_on = None, table.pace
+
+    def pace():
+        go_on()
+        pressed_s = (table.now_ns - table.pressed_ns) * 1e-9 if table.pressed_ns else 0.0
+        wanted_n = share + 0.01 * math.sin(1e3 * pressed_s)  # a frozen force would be named instead
+        table.arm.push(wanted_n - table.arm.true_force_n + table.arm._push_n if 0.5 < pressed_s < 0.65 else 0.0)
+
+    table.pace = pace
+    outcome = table.explore(ExplorationRequest('linear_slide', speed_m_s=0.05, force_n=1.0, distance_m=0.1))
+    assert (outcome.success, outcome.slid) == (False, True)
+    assert "1 N asked for ('peak_force_share')" in outcome.message
+    sliding = [state for state in table.states if state.phase is Phase.SLIDE]
+    pressed = [state for state in sliding if state.force_n > 1.5]
+    assert len(pressed) > 5
+    assert not any(state.steady_s for state in pressed[2:])
+    begin_ns, end_ns = sliding[0].stamp_ns, sliding[-1].stamp_ns
+    rows = np.array([[0.0]] * round((end_ns - begin_ns) * 1e-6), dtype=np.float32)
+    batches = [
+        TactileSignal(begin_ns + round(first * 1e6), 's', ('force',), (), 1000.0, first, rows[first : first + 5])
+        for first in range(0, len(rows), 5)
+    ]
+    windows = [
+        piece
+        for piece in cut_recording({'signal': batches}, table.states, WindowParams(length_s=0.1, hop_s=0.02))
+        if isinstance(piece, CutWindow)
+    ]
+    assert len(windows) > 20
+    spans = [(window.start_ns, window.start_ns + 100_000_000) for window in windows]
+    assert not any(begin <= state.stamp_ns < end for begin, end in spans for state in pressed[2:])

@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ def test_a_level_surface_is_found_with_its_height_and_without_a_turn():
 
 
 def test_touches_of_a_tilted_surface_have_the_height_zero_in_its_frame_and_z_points_away():
-    axes = rotation_matrix((0.2, -0.3, 0.0))
+    axes = rotation_matrix((0.1, -0.2, 0.0))
     touches = [axes @ np.array([x, y, 0.0]) + [0.4, -0.1, 0.05] for x, y in ((0.0, 0.0), (0.1, 0.0), (0.02, 0.07))]
     frame = SurfaceFrame(fit_surface(touches, UP, AHEAD).pose)
     assert [frame.place(touch)[2] for touch in touches] == pytest.approx([0.0] * 3, abs=1e-12)
@@ -44,19 +46,46 @@ def test_a_bent_surface_is_refused():
         fit_surface([*CORNERS, (0.35, 0.02, 0.12)], UP, AHEAD)
 
 
-def test_a_wall_needs_its_pose_first():
-    wall = [(0.0, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)]
-    with pytest.raises(InvalidData, match='stands across the present surface'):
-        fit_surface(wall, UP, AHEAD)
+def tilted(angle_rad):
+    axes = rotation_matrix((angle_rad, 0.0, 0.0))
+    return [axes @ np.array([x, y, 0.0]) for x, y in ((0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.1))]
+
+
+@pytest.mark.parametrize('degrees', [16.0, 60.0, 90.0])
+def test_a_plane_that_is_turned_by_more_than_15_degrees_is_refused_with_its_angle(degrees):
+    with pytest.raises(InvalidData, match=f'turned by {degrees:.0f} degrees against the pose'):
+        fit_surface(tilted(math.radians(degrees)), UP, AHEAD)
+    assert fit_surface(tilted(math.radians(14.0)), UP, AHEAD).pose[3] == pytest.approx(math.radians(14.0))
 
 
 def test_touches_count_up_and_a_refused_one_is_not_kept():
     touches = SurfaceTouches()
     assert touches.add(CORNERS[0], UP, AHEAD) is None
     assert touches.add(CORNERS[1], UP, AHEAD) is None
-    with pytest.raises(InvalidData):
+    with pytest.raises(InvalidData, match='nearly in a line'):
         touches.add((0.35, 0.001, 0.1), UP, AHEAD)
     assert len(touches) == 2
-    assert touches.add(CORNERS[2], UP, AHEAD) is not None
+    assert touches.add(CORNERS[2], UP, AHEAD) is None  # three always lie in a plane
+    with pytest.raises(InvalidData, match=r'it is 1\.0 mm from touch 3'):
+        touches.add((0.351, 0.08, 0.1), UP, AHEAD)
+    assert touches.add((0.4, 0.08, 0.101), UP, AHEAD).residual_m > 1e-4
     touches.forget()
     assert len(touches) == 0
+
+
+def test_a_fourth_touch_off_the_plane_of_the_first_three_is_refused():
+    touches = SurfaceTouches()
+    for corner in CORNERS:
+        touches.add(corner, UP, AHEAD)
+    with pytest.raises(InvalidData, match='do not lie in a plane'):
+        touches.add((0.35, 0.03, 0.12), UP, AHEAD)
+    assert len(touches) == 3
+
+
+def test_the_pose_before_the_first_touch_counts_however_often_it_is_refined():
+    touches = SurfaceTouches()
+    first, *others = tilted(math.radians(20.0))
+    touches.add(first, UP, AHEAD)
+    touches.add(others[0], UP, AHEAD)
+    with pytest.raises(InvalidData, match='turned by 20 degrees'):
+        touches.add(others[1], rotation_matrix((math.radians(10.0), 0.0, 0.0))[:, 2], AHEAD)

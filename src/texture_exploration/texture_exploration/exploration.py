@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from texture_core.errors import DeviceError
 from texture_core.exploration import ENDED, ExplorationRequest, ExplorationState, Phase
-from texture_exploration.arms.protocol import Arm, ArmCommand, ArmState, ForceReading, Zeroing
+from texture_exploration.arms.protocol import Arm, ArmCommand, ArmState, Doubting, ForceReading, Zeroing
 from texture_exploration.force_watch import ForceGuard, ForceWatch
 from texture_exploration.listening import WITHOUT_GAPS, Listening
 from texture_exploration.motions.protocol import Motion, MotionStep
@@ -148,9 +148,11 @@ class Exploration:
             self._give_up(f'{fault}; the finger was not lifted')
             return True
         relative = self._guard.relative(arm, self._zeroed, self._commanded)
+        doubt = self._arm.doubt() if isinstance(self._arm, Doubting) else ''
         reason = (
             self._stop_reason
             or self._violation(arm, relative)
+            or doubt
             or self._signal_fault(self._listening)
             or self._overdue(now_ns)
         )

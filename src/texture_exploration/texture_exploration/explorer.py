@@ -278,13 +278,14 @@ class Explorer:
     def touch_surface(self) -> str:
         """Take the place of the finger, which touches the surface, for the surface frame; return what came of it.
 
-        From the third touch on the plane through all touches is the surface. The next exploration connects again and
+        From the fourth touch on the plane through all touches is the surface. The next exploration connects again and
         begins where the finger is then: lift it before.
 
         Raises
         ------
         MotionRefused
-            If an exploration is running, the arm has no base frame, or the touches make no plane.
+            If an exploration is running, the arm has no base frame, the finger does not press with
+            `contact_force_n`, or the touches make no plane.
         DeviceError
             If the arm cannot be reached.
         """
@@ -294,6 +295,7 @@ class Explorer:
             if self.fault():
                 self.connect()
             state, frame = self.arm.state(), SurfaceFrame(arm.surface_pose)
+            self._check_touch(state.force_n)
             self._home = None
             try:
                 fit = self._touches.add(
@@ -301,9 +303,11 @@ class Explorer:
                 )
             except InvalidData as error:
                 raise MotionRefused(f'the touch was not taken: {error}') from error
-            count = f'touch {len(self._touches)} taken with {state.force_n:.2f} N{self._doubt(state.force_n)}'
+            count = f'touch {len(self._touches)} taken with {state.force_n:.2f} N'
+            missing = TOUCHES - len(self._touches)
             if fit is None:
-                return f'{count}; touch the surface at {TOUCHES - len(self._touches)} more places'
+                last = ', away from the others: it shows whether the first three are right' if missing == 1 else 's'
+                return f'{count}; touch the surface at {missing} more place{last}'
             arm.move_surface(fit.pose)
             names = ('x_m', 'y_m', 'z_m', 'rx_rad', 'ry_rad', 'rz_rad')
             values = ', '.join(f'surface_{name}: {value:.5f}' for name, value in zip(names, fit.pose, strict=True))
@@ -312,10 +316,19 @@ class Explorer:
                 f'{1e3 * fit.largest_m:.2f} mm. Write these into your parameter file, and lift the finger by 10 mm'
             )
 
-    def _doubt(self, force_n: float) -> str:
-        """Return what speaks against a touch; it is no reason to refuse one, as the force sensor may not be zeroed."""
+    def _check_touch(self, force_n: float) -> None:
+        """Refuse a touch that the force does not prove."""
         least_n = self.touch.contact_force_n
-        return '' if force_n >= least_n else f' (less than {least_n:g} N: see that the finger touches)'
+        if not self._believes_its_force():
+            raise MotionRefused(
+                'the touch was not taken: the force sensor is not zeroed, so it proves no contact; lift the finger by '
+                '10 mm, let it rest in the air for a second, and touch again'
+            )
+        if not force_n >= least_n:  # so NaN is no touch either
+            raise MotionRefused(
+                f'the touch was not taken: the force is {force_n:.2f} N, and {least_n:g} N are needed '
+                "('contact_force_n'); press the finger on the surface"
+            )
 
     def forget_touches(self) -> int:
         """Begin the touches of the surface again; return how many are forgotten. The surface stays as it is.

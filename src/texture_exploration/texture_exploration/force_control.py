@@ -14,16 +14,20 @@ delay is measured while it comes down; if it is longer than declared, gain and s
 from __future__ import annotations
 
 import math
+import statistics
 from dataclasses import dataclass, replace
 
 from texture_core.errors import InvalidParameter
 from texture_core.parameters import param
-from texture_exploration.lag import LagEstimate
+from texture_exploration.lag import ForceLag, LagEstimate
 from texture_exploration.slope_observer import SlopeObserver
 from texture_exploration.stability import LoopModel, stability_limit_gain
 from texture_exploration.stiffness import TOUCHING_N, StiffnessEstimate
 
-NOISE_SHARE = 1.0 / 6.0  # of the force that counts as touching: the noise of the force
+NOISE_SHARE = 1.0 / 6.0  # of the force that counts as touching: the least noise of the force that is supposed
+LEAST_NOISE = 0.1  # of that; a reading may also stand still
+BEARABLE = 0.2  # of the wanted force, that noise may cost by what looks like a slope
+NOISE_SAMPLES = 50  # a finger that is pressed or lifted changes its force more: the calmest so many tell the noise
 SLOWEST_M_S = 0.001  # below, the finger is at rest along the surface
 SETTLED = 0.3  # from an error of this share of the wanted force on, the slope is observed
 REACTION_PERIODS = 2.0  # from contact to the first answer, beside the delay
@@ -33,6 +37,7 @@ LATE_IMPACT = (
     3.0  # so many times 'max_impact_n' may be met by an arm that is later than declared: coming down takes long
 )
 INTEGRAL_LAGS = 20.0  # the integral part takes at least so many lags: a faster one adds to the overshoot
+FORCE_LAG_S = 0.03  # a force that is later than 'loop_delay_s' by more than this is not pressed by
 NEAR_M = 0.001  # above a surface whose height is known, the finger slows down to closing speed
 
 
@@ -166,10 +171,22 @@ class ForceController:
     """
 
     def __init__(self, gain_m_s_n: float, integral_s: float, max_speed_m_s: float = math.inf) -> None:
-        self.gain_m_s_n = gain_m_s_n
+        self._gain_m_s_n = gain_m_s_n
         self._integral_s = integral_s
         self._max_m_s = max_speed_m_s
         self._sum_ns = 0.0
+
+    @property
+    def gain_m_s_n(self) -> float:
+        """Normal speed per force error, m/s/N."""
+        return self._gain_m_s_n
+
+    @gain_m_s_n.setter
+    def gain_m_s_n(self, gain_m_s_n: float) -> None:
+        # The integral part goes on at most at the speed that it has: what a hundredth of the gain added up is no error
+        # now, and on a harder base less speed is wanted.
+        self._sum_ns *= min(1.0, self._gain_m_s_n / gain_m_s_n)
+        self._gain_m_s_n = gain_m_s_n
 
     def restart(self) -> None:
         """Forget the past errors."""
@@ -197,7 +214,7 @@ class ForceController:
             Normal velocity, m/s, positive away from the surface.
         """
         added = self._sum_ns + error_n * dt_s
-        wanted = feed_forward_m_s - self.gain_m_s_n * (error_n + added / self._integral_s)
+        wanted = feed_forward_m_s - self._gain_m_s_n * (error_n + added / self._integral_s)
         limited = min(self._max_m_s, max(-min(self._max_m_s, down_m_s), wanted))
         # Anti-windup: an error that only pushes further against the limit is not added up.
         if limited == wanted or (wanted > 0) == (error_n > 0):
@@ -240,6 +257,11 @@ class ForceLoop:
         self._observer = self._new_observer()
         self._surface_m: float | None = None  # where the finger met it last
         self._chosen_for = math.nan
+        self._forces: list[float] = []
+        self._noise_n = math.inf
+        self._touch: ForceLag | None = None  # while the finger stands after the first touch, to hear the force
+        self._heard = False
+        self.force_lag_s = 0.0
         self.controller = self._new_controller()
 
     def restart(self) -> None:
@@ -249,8 +271,10 @@ class ForceLoop:
 
     def observe(self, contact: ContactState, speed_m_s: float = 0.0) -> None:
         """Take note of a contact, whatever is commanded; call it once a period. Sliding tells nothing of stiffness."""
+        self._note_noise(contact.force_n)
         if contact.force_n < self._params.touching_n:
             self.stiffness.restart()
+            self._touch, self._heard = None, False
             return
         if self.stiffness.empty:
             self._surface_m = contact.height_m
@@ -258,6 +282,12 @@ class ForceLoop:
             self.stiffness.fixed = True
         self.stiffness.update(contact.height_m, contact.force_n)
         self._choose_gain()
+
+    @property
+    def noise_n(self) -> float:
+        """Standard deviation of the force, N, as measured above the surface; what `touching_n` supposes until then."""
+        supposed_n = NOISE_SHARE * self._params.touching_n
+        return max(LEAST_NOISE * supposed_n, self._noise_n) if math.isfinite(self._noise_n) else supposed_n
 
     def asked(self, height_m: float, asked_m_s: float, dt_s: float) -> None:
         """Take note of the velocity that was asked for in the end: it tells how late the arm follows.
@@ -298,16 +328,50 @@ class ForceLoop:
         if force_n < self._params.touching_n:
             self.restart()
             return -self.approach_m_s(height_m)
+        if speed_m_s <= SLOWEST_M_S and not self._heard:
+            self._listen(contact, dt_s)
+            return 0.0
         estimated_n_m = self.stiffness.value_n_m
         settled = abs(wanted_n - force_n) < SETTLED * wanted_n
         feed_forward_m_s = 0.0
-        noise_n = NOISE_SHARE * self._params.touching_n
         if not math.isnan(estimated_n_m) and (settled or self._observer.running):
             feed_forward_m_s = self._observer.update(
-                contact.travelled_m, height_m + force_n / estimated_n_m, speed_m_s, noise_n / estimated_n_m
+                contact.travelled_m,
+                height_m + force_n / estimated_n_m,
+                speed_m_s,
+                max(self.noise_n, NOISE_SHARE * self._params.touching_n) / estimated_n_m,
+                self.noise_n / (BEARABLE * wanted_n),
             )
         down_m_s = math.inf if speed_m_s > SLOWEST_M_S else self._pressing_m_s(wanted_n)
         return self.controller.update(wanted_n - force_n, dt_s, feed_forward_m_s, down_m_s)
+
+    def doubt(self) -> str:
+        """Return in a sentence why nobody should press by this force, '' if one may."""
+        allowed_s = FORCE_LAG_S + self._declared.loop_delay_s
+        if self.force_lag_s <= allowed_s:
+            return ''
+        declared_ms = 1e3 * self._declared.loop_delay_s
+        return (
+            f'the force rose for {1e3 * self.force_lag_s:.0f} ms or more after the finger stood still on the surface, '
+            f"and {1e3 * allowed_s:.0f} ms are allowed with a 'loop_delay_s' of {declared_ms:.0f} ms; find what makes "
+            'the force late, such as a filter, or declare it'
+        )
+
+    def _listen(self, contact: ContactState, dt_s: float) -> None:
+        """Stand until the force does, and take over how late it is, before anything is pressed."""
+        self._touch = self._touch or ForceLag(self.noise_n)
+        if not self._touch.update(contact.height_m, contact.force_n, dt_s):
+            return
+        self._heard = True
+        self.force_lag_s = 0.0 if math.isnan(self._touch.value_s) else self._touch.value_s
+        self._adapt_to_lag()
+        self._choose_gain()
+
+    def _note_noise(self, force_n: float) -> None:
+        self._forces.append(force_n)
+        if len(self._forces) == NOISE_SAMPLES:
+            self._noise_n = min(self._noise_n, statistics.pstdev(self._forces))
+            self._forces = []
 
     def _pressing_m_s(self, wanted_n: float) -> float:
         """Return how fast the finger may be pressed on: what is soft now may have a hard base."""
@@ -347,7 +411,7 @@ class ForceLoop:
 
     def _adapt_to_lag(self) -> None:
         """Take over the measured lag if it is longer than declared."""
-        lag_s = self.lag.value_s
+        lag_s = self.lag.value_s + self.force_lag_s
         declared = self._declared
         late = lag_s > declared.loop_delay_s + UNDECLARED_PERIODS * self._period_s  # not if it is NaN
         delay_s = math.ceil(lag_s * 1e3) * 1e-3 if late else declared.loop_delay_s

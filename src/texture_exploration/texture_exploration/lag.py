@@ -1,13 +1,17 @@
-"""How late an arm follows a normal velocity, measured while it comes down above the surface."""
+"""How late an arm follows a normal velocity, measured above the surface, and how late its force, at the first touch."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
 LONGEST_S = 0.15  # a longer lag is not told apart from an arm that does not move
 SAMPLES = 10  # of which the mean counts
 CHANGED = 0.02  # share by which a velocity differs from the one before
 SLOWEST_M_S = 1e-5
+BLOCK = 5  # samples of which the mean is compared with that of the ones before
+STOPPED = 0.03  # share of the first speed below which a finger stands
+RISING = 4.0  # times its noise that a mean must rise to count
 
 
 class LagEstimate:
@@ -69,3 +73,58 @@ class LagEstimate:
         self._asked_m_s = asked_m_s if abs(asked_m_s) >= SLOWEST_M_S else 0.0
         self._constant_s = 0.0
         self._lags_s = []
+
+
+class ForceLag:
+    """Measure how late the force follows the finger: it is told to stop, and the force goes on rising for the lag.
+
+    Attributes
+    ----------
+    value_s : float
+        How long the force rose after the finger stood, s; NaN until that is known.
+    """
+
+    def __init__(self, noise_n: float) -> None:
+        self.value_s = math.nan
+        self._noise_n = noise_n
+        self._samples: deque[tuple[float, float]] = deque(maxlen=2 * BLOCK)  # height and force
+        self._first_m = math.nan  # way of a block as it began to stop
+        self._stood_s = self._rose_s = math.nan
+        self._time_s = 0.0
+
+    def update(self, height_m: float, force_n: float, dt_s: float) -> bool:
+        """Take a sample; return whether it is over: the force is constant, or it never stopped to rise.
+
+        Parameters
+        ----------
+        height_m, force_n
+            As measured, while zero velocity is asked for.
+        dt_s
+            Time since the last call.
+        """
+        self._time_s += dt_s
+        self._samples.append((height_m, force_n))
+        if self._time_s > 4 * LONGEST_S:
+            return True  # it does not stand still: nothing can be told
+        if len(self._samples) >= BLOCK and len({force_n for _, force_n in list(self._samples)[-BLOCK:]}) == 1:
+            return True  # without any noise: constant or frozen, which a movement shows
+        if len(self._samples) < 2 * BLOCK:
+            return False
+        went_m, rose_n = (
+            (sum(row[of] for row in list(self._samples)[BLOCK:]) - sum(row[of] for row in list(self._samples)[:BLOCK]))
+            / BLOCK
+            for of in (0, 1)
+        )
+        if math.isnan(self._first_m):
+            self._first_m = max(abs(went_m), SLOWEST_M_S * dt_s)
+        if rose_n > RISING * self._noise_n * math.sqrt(2.0 / BLOCK):
+            self._rose_s = self._time_s
+        if math.isnan(self._stood_s):
+            if abs(went_m) > STOPPED * self._first_m:
+                return False
+            self._stood_s = self._rose_s = self._time_s
+        lag_s = self._rose_s - self._stood_s
+        if lag_s > LONGEST_S or self._time_s - self._rose_s > 2 * BLOCK * dt_s:
+            self.value_s = lag_s
+            return True
+        return False

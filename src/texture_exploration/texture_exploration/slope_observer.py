@@ -38,7 +38,9 @@ class SlopeObserver:
         """The finger left the surface."""
         self._points.clear()
 
-    def update(self, travelled_m: float, surface_m: float, speed_m_s: float, noise_m: float) -> float:
+    def update(
+        self, travelled_m: float, surface_m: float, speed_m_s: float, noise_m: float, doubt: float = 0.0
+    ) -> float:
         """Return how fast the surface will rise, m/s.
 
         Parameters
@@ -51,6 +53,8 @@ class SlopeObserver:
             Along the surface, as commanded.
         noise_m
             Of the height.
+        doubt
+            Noise as a share of the error that may come of it until the answer is in effect: beyond, less is answered.
 
         Returns
         -------
@@ -69,4 +73,6 @@ class SlopeObserver:
         likely = np.diag([noise_m / (LIKELY_SLOPE * unit), noise_m / (LIKELY_BEND_1_M * unit**2)]) ** 2
         slope, curvature = np.linalg.solve(shapes.T @ shapes + likely, shapes.T @ (height - height.mean()))
         ahead = min(1.0, speed_m_s * self._ahead_s / unit)
-        return float((slope + 2 * curvature * ahead) / unit * speed_m_s)
+        # As it sets off, a late arm has gone much less than it goes until the answer: the noise counts so many times.
+        sure = 1.0 / (1.0 + (doubt * max(1.0, speed_m_s * self._ahead_s / unit)) ** 2)
+        return float(sure * (slope + 2 * curvature * ahead) / unit * speed_m_s)

@@ -6,6 +6,7 @@ import math
 
 SOFTEST_N_M = 50.0
 MIN_POINTS = 3
+MOST_POINTS = 25  # more make a short rise no surer: what is left is no noise
 RECENT_SHARE = 0.5  # of the force, from which on points count
 MIN_RISE_N = 0.1  # of the force at the default of `TOUCHING_N`, before a stiffness can be told from noise
 TOUCHING_N = 0.03
@@ -38,14 +39,25 @@ class StiffnessEstimate:
 
     def update(self, height_m: float, force_n: float) -> None:
         """Take a point; those before the contact are passed over."""
-        if self.fixed or force_n < self._touching_n or (self._points and force_n <= self._points[-1][1]):
+        if self.fixed or force_n < self._touching_n or not self._presses_on(height_m, force_n):
             return
         self._points.append((height_m, force_n))
         # A finger is the stiffer the harder it is pressed: what counts is how stiff it is now.
-        recent_n = min(RECENT_SHARE * force_n, force_n - 1.5 * self._min_rise_n)
+        highest_n = max(force_n for _, force_n in self._points)
+        recent_n = min(RECENT_SHARE * highest_n, highest_n - 1.5 * self._min_rise_n)
         self._points = [point for point in self._points if point[1] >= recent_n]
-        if len(self._points) >= MIN_POINTS and force_n - self._points[0][1] > self._min_rise_n:
+        # The slope of many points is as sure over a shorter rise: its error falls with their root.
+        rise_n = (highest_n - self._points[0][1]) * math.sqrt(min(MOST_POINTS, len(self._points)) / MIN_POINTS)
+        if len(self._points) >= MIN_POINTS and rise_n > self._min_rise_n:
             self.value_n_m = max(SOFTEST_N_M, self._slope())
+
+    def _presses_on(self, height_m: float, force_n: float) -> bool:
+        """Return whether the finger is deeper or presses harder than before; by the force alone noise would choose."""
+        if not self._points:
+            return True
+        before_m, before_n = self._points[-1]
+        # A force that stays the same to the last bit may be frozen: no contact is that soft.
+        return force_n > before_n or (height_m < before_m and force_n != before_n)
 
     def _slope(self) -> float:
         count = len(self._points)

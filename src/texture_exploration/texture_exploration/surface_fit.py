@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,9 +12,11 @@ from texture_core.arrays import Array
 from texture_core.errors import InvalidData
 from texture_core.rotation import rotation_vector
 
-TOUCHES = 3  # the fewest that make a plane
-NARROWEST_M = 0.01  # spread of the touches across their longest direction
+MAKE_A_PLANE = 3
+TOUCHES = 4  # three always lie in a plane: only a further one shows whether it is the surface
+NARROWEST_M = 0.01  # spread of the touches across their longest direction, and distance between any two
 LARGEST_RESIDUAL_M = 0.002  # a surface that is bent more than this is no plane
+LARGEST_TURN_RAD = math.radians(15.0)  # against the pose before: beyond, a touch is more likely wrong than the pose
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class SurfaceFit:
     """A plane through touches: `pose` as `SurfaceFrame` takes it, (6,); distances of the touches from the plane in m.
 
     `residual_m` is their root mean square and `largest_m` the largest; both are 0 for three touches, which always lie
-    in one plane.
+    in one plane and so prove nothing.
     """
 
     pose: tuple[float, ...]
@@ -42,7 +45,7 @@ def fit_surface(
     touches : (n, 3)
         Places in the base frame, m; at least three.
     normal : (3,)
-        Any direction that points away from the surface, in the base frame.
+        Normal of the surface as it was known before, in the base frame.
     along : (3,)
         Direction of the x axis in the base frame.
 
@@ -55,11 +58,11 @@ def fit_surface(
     ------
     InvalidData
         If there are fewer than three touches, if they lie nearly in a line, if they are far from a plane, or if the
-        plane stands across `normal`.
+        plane is turned by more than 15 degrees against `normal`.
     """
     points = np.array(touches, dtype=float)
-    if len(points) < TOUCHES:
-        raise InvalidData(f'there are {len(points)} touches; {TOUCHES} are needed')
+    if len(points) < MAKE_A_PLANE:
+        raise InvalidData(f'there are {len(points)} touches; {MAKE_A_PLANE} are needed')
     middle = points.mean(axis=0)
     _, _sizes, directions = np.linalg.svd(points - middle, full_matrices=False)
     spread_m = float(np.ptp((points - middle) @ directions[1]))
@@ -76,22 +79,29 @@ def fit_surface(
             f'the touches do not lie in a plane: one is {1e3 * largest_m:.1f} mm off, and {1e3 * LARGEST_RESIDUAL_M:g} '
             'mm are allowed; touch one flat part of the surface'
         )
-    up = axis * np.sign(axis @ np.array(normal, dtype=float))
+    before = np.array(normal, dtype=float) / np.linalg.norm(normal)
+    up = axis * (1.0 if axis @ before >= 0.0 else -1.0)
+    turn_rad = math.acos(min(1.0, float(up @ before)))
+    if turn_rad > LARGEST_TURN_RAD:
+        raise InvalidData(
+            f'the touched plane is turned by {math.degrees(turn_rad):.0f} degrees against the pose of the surface '
+            f'before, and {math.degrees(LARGEST_TURN_RAD):.0f} are allowed; see that every touch is on the surface, '
+            'or give its pose as parameters first'
+        )
     x_axis = np.array(along, dtype=float)
     x_axis = x_axis - (x_axis @ up) * up
     length = float(np.linalg.norm(x_axis))
-    if not up.any() or length < 1e-3:
-        raise InvalidData('the touched plane stands across the present surface; give its pose as parameters first')
     axes = np.column_stack([x_axis / length, np.cross(up, x_axis / length), up])
     pose = (*middle.tolist(), *rotation_vector(axes).tolist())
     return SurfaceFit(pose, float(np.sqrt(np.mean(distances**2))), largest_m)
 
 
 class SurfaceTouches:
-    """Collects touches until they make a plane; further ones refine it."""
+    """Collects touches until they make a plane that one more confirms; further ones refine it."""
 
     def __init__(self) -> None:
         self._places: list[Array] = []
+        self._normal: Sequence[float] = ()  # of the pose before the first touch, so that the plane cannot creep
 
     def __len__(self) -> int:
         return len(self._places)
@@ -107,7 +117,7 @@ class SurfaceTouches:
         Parameters
         ----------
         place, normal, along : (3,)
-            See `fit_surface`.
+            See `fit_surface`; the normal at the first touch counts for all.
 
         Returns
         -------
@@ -116,9 +126,18 @@ class SurfaceTouches:
         Raises
         ------
         InvalidData
-            If they make no plane; the newest touch is not kept.
+            If it is next to another, or they make no plane; the newest touch is not kept.
         """
-        places = [*self._places, np.array(place, dtype=float)]
-        fit = fit_surface(places, normal, along) if len(places) >= TOUCHES else None
+        newest = np.array(place, dtype=float)
+        for number, other in enumerate(self._places, start=1):
+            apart_m = float(np.linalg.norm(newest - other))
+            if apart_m < NARROWEST_M:
+                raise InvalidData(
+                    f'it is {1e3 * apart_m:.1f} mm from touch {number}, and {1e3 * NARROWEST_M:g} mm are needed; touch '
+                    'another place'
+                )
+        places = [*self._places, newest]
+        self._normal = self._normal if self._places else normal
+        fit = fit_surface(places, self._normal, along) if len(places) >= MAKE_A_PLANE else None
         self._places = places
-        return fit
+        return fit if len(places) >= TOUCHES else None

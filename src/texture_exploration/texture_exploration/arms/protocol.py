@@ -125,6 +125,14 @@ class Warns(Protocol):
 
 
 @runtime_checkable
+class Doubting(Protocol):
+    """An arm that tells why a motion must end although it obeys: then the finger can still be lifted."""
+
+    def doubt(self) -> str:
+        """Return it in a sentence, '' if there is no reason."""
+
+
+@runtime_checkable
 class Zeroing(Protocol):
     """An arm that zeroes its force sensor itself: at rest in free air, which a rise must have shown it."""
 

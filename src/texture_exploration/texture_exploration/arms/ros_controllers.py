@@ -296,6 +296,10 @@ class RosControllersArm:
         except DeviceError as error:
             self._hand_over_fault = f'the controllers were not switched back: {error}'
 
+    def doubt(self) -> str:
+        """Return in a sentence that the force comes too late to press by it, '' if not."""
+        return '' if self._params.target_wrench_topic else self._velocity.doubt()
+
     def warning(self) -> str:
         """Return in a sentence that the controllers were not switched back when the arm was let go, '' if they were."""
         return self._hand_over_fault
@@ -318,6 +322,8 @@ class RosControllersArm:
             faults = [what for what, is_missing in missing.items() if is_missing]
             if unsafe := topics.unsafe():
                 faults.append(unsafe)
+            if tool.late:
+                faults.append(tool.late)
             if not faults:
                 self._state = tool.state('')
                 return
@@ -356,7 +362,7 @@ class RosControllersArm:
 
     def _fault(self, now_ns: int) -> str:
         tool = self._tool
-        return self._lost or tool.misplaced or stale(self._params, now_ns, tool.pose_ns, tool.force_ns)
+        return self._lost or tool.misplaced or tool.late or stale(self._params, now_ns, tool.pose_ns, tool.force_ns)
 
     def _due(self, now_ns: int) -> ArmCommand | None:
         """Return the command that holds now, None if none does."""

@@ -13,22 +13,25 @@ from texture_exploration.arms.protocol import Vector
 class PoseSample:
     """A measured pose: `position_m` in the frame `frame_id`, `rotation` as the quaternion x, y, z, w.
 
-    `stamp_ns` is the time of its header, on the clock of the sender; 0 if there is none.
+    `stamp_ns` is the time of its header, on the clock of the sender; 0 if there is none. `age_ns` is its age by that
+    stamp and the clock of this machine, which may not agree; 0 if there is no stamp.
     """
 
     stamp_ns: int
     frame_id: str
     position_m: Vector
     rotation: tuple[float, float, float, float]
+    age_ns: int = 0
 
 
 @dataclass(frozen=True)
 class ForceSample:
-    """A measured force, N, in the frame `frame_id`; `stamp_ns` as of a pose."""
+    """A measured force, N, in the frame `frame_id`; `stamp_ns` and `age_ns` as of a pose."""
 
     stamp_ns: int
     frame_id: str
     force_n: Vector
+    age_ns: int = 0
 
 
 class ControllerTopics(Protocol):

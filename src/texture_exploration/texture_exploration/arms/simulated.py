@@ -177,6 +177,10 @@ class SimulatedArm:
         """Stand still."""
         self._last_command = (STANDSTILL, self._clock())
 
+    def doubt(self) -> str:
+        """Return in a sentence that the force comes too late to press by it, '' if not."""
+        return self._velocity_control.doubt() if self._velocity_control else ''
+
     def freeze(self) -> None:
         """Behave like a controller that hangs: the state grows old, commands do nothing, until connected again."""
         self._frozen = True

@@ -19,6 +19,7 @@ from texture_exploration.arms.tangential_force import tangential_force_n
 GRAVITY_M_S2 = 9.81
 VELOCITY_OVER_NS = 30_000_000
 STILL_M_S = 1e-4  # a slower finger is at rest: what remains is the noise of its place
+AGREE_NS = 1_000_000_000  # clocks by which a sample is older than this, or comes from the future, do not agree
 REST: Vector = (0.0, 0.0, 0.0)
 
 
@@ -35,7 +36,8 @@ class ToolState:
     zero : ForceZero
         Of the force sensor.
     pose_ns, force_ns : int
-        When the newest pose and force came that differ from the ones before by their stamps; 0 before the first.
+        When the newest pose and force were measured that differ from the ones before by their stamps: by the stamp
+        where the clocks agree, else when they came; 0 before the first.
     misplaced : str
         In a sentence, that a pose or a force came in an unknown frame; '' if none did.
     """
@@ -45,6 +47,8 @@ class ToolState:
         self._frame = SurfaceFrame(params.surface_pose)
         self.zero = ForceZero(params.zero_rise_m, params.zero_steady_n)
         self.pose_ns = self.force_ns = 0
+        self._force_came_ns = 0
+        self._late = {'pose': '', 'force': ''}
         self.misplaced = ''
         self.rotation: Array = np.eye(3)  # of the tool in the base frame
         self._position: Vector = (math.nan, math.nan, math.nan)
@@ -66,7 +70,7 @@ class ToolState:
             return
         if not self._is_new('pose', sample.stamp_ns):
             return
-        self.pose_ns = now_ns
+        self.pose_ns = now_ns - self._age_ns('pose', sample.age_ns)
         self.rotation = quaternion_matrix(sample.rotation)
         self._position = self._frame.place(sample.position_m)
         self._update_velocity(sample.stamp_ns or now_ns)
@@ -92,8 +96,9 @@ class ToolState:
             return
         if not self._is_new('force', sample.stamp_ns):
             return
-        passed_s = (now_ns - self.force_ns) * 1e-9 if self.force_ns else math.inf
-        self.force_ns = now_ns
+        passed_s = (now_ns - self._force_came_ns) * 1e-9 if self._force_came_ns else math.inf
+        self._force_came_ns = now_ns
+        self.force_ns = now_ns - self._age_ns('force', sample.age_ns)
         to_base = self.rotation if sample.frame_id == params.tool_frame_id else np.eye(3)
         reading = np.array(sample.force_n) * (-1.0 if params.invert_force else 1.0)
         repeated = self._reading_n is not None and bool((reading == self._reading_n).all())
@@ -127,6 +132,28 @@ class ToolState:
         new = stamp_ns == 0 or stamp_ns != self._stamps_ns[kind]
         self._stamps_ns[kind] = stamp_ns
         return new
+
+    def _age_ns(self, kind: str, age_ns: int) -> int:
+        """Return the age of a sample as far as clocks agree, and note whether that is too much."""
+        if not 0 <= age_ns <= AGREE_NS:
+            age_ns = 0
+        params = self._params
+        topic = params.pose_topic if kind == 'pose' else params.wrench_topic
+        self._late[kind] = (
+            ''
+            if age_ns * 1e-9 <= params.deadman_s
+            else (
+                f"the {kind} on '{topic}' comes {age_ns * 1e-6:.0f} ms after its stamp, and "
+                f"{1e3 * params.deadman_s:.0f} ms are allowed ('deadman_s'), so zero velocity was commanded; find what "
+                'holds it up, or set the clocks of both machines by each other (chrony)'
+            )
+        )
+        return age_ns
+
+    @property
+    def late(self) -> str:
+        """In a sentence, that the newest pose or force came too late after its stamp; '' if not."""
+        return self._late['pose'] or self._late['force']
 
     def _at_surface(self, to_base: Array, force_n: Array) -> Vector:
         return self._frame.direction((to_base @ force_n).tolist())

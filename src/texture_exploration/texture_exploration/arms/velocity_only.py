@@ -33,6 +33,10 @@ class CommandedVelocity:
         """How late the arm follows, as measured while it came down; NaN until it is measured."""
         return self._loop.lag.value_s
 
+    def doubt(self) -> str:
+        """Return in a sentence why nobody should press by the force of this arm, '' if one may."""
+        return self._loop.doubt()
+
     def travelled(self, distance_m: float) -> None:
         """Take note of how far the finger has gone along the surface since the last call."""
         self._travelled_m += distance_m
@@ -86,6 +90,10 @@ class VelocityForceControl:
     def __init__(self, params: ForceLoopParams, period_s: float, now_ns: int, delay_s: float) -> None:
         self._velocity = CommandedVelocity(params, period_s)
         self._delayed = DelayedVelocity(delay_s, now_ns)
+
+    def doubt(self) -> str:
+        """Return in a sentence why nobody should press by the force of this arm, '' if one may."""
+        return self._velocity.doubt()
 
     def moved_m(self, now_ns: int) -> Vector:
         """Return how far the finger has gone since this was asked last."""

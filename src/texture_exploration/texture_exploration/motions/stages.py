@@ -10,7 +10,7 @@ from texture_core.exploration import Phase
 from texture_exploration.arms.protocol import ArmCommand, ArmState, Vector
 from texture_exploration.motions.contact import ContactLost, ContactWatch
 from texture_exploration.motions.path import STEADY_S, Follower, smooth
-from texture_exploration.motions.stall import StallWatch
+from texture_exploration.motions.stall import SlideWatch, StallWatch
 from texture_exploration.motions.touch import TouchParams
 from texture_exploration.safety import SafetyLimits
 
@@ -250,13 +250,10 @@ class SlideStage(Stage):
         self.force_n = force_n
         self._contact = contact
         self._stall = StallWatch(touch)
-        # A slide begins within twice the tolerance, so a smaller share would refuse what was let in.
-        self._mean_share = max(touch.mean_force_share, 2 * touch.force_tolerance)
+        self._watch = SlideWatch(speed_m_s, force_n, touch)
         self._start_m: float | None = None
         self._steady_until_ns = 0
         self._finish = False
-        self._force_sum_n = 0.0
-        self._steps = 0
         self.progress = 0.0
 
     @property
@@ -268,6 +265,7 @@ class SlideStage(Stage):
         """The slide counts from here, also if it goes on later after the contact was lost."""
         super().begin(time_ns, arm)
         self._stall.restart()
+        self._watch.restart()
         if self._start_m is None:
             self._start_m = self._follower.travelled_m
             self._follower.begin_slide()
@@ -277,19 +275,26 @@ class SlideStage(Stage):
         self._finish = True
 
     def step(self, time_ns: int, arm: ArmState) -> ArmCommand | None:
-        """Keep on sliding, and update the guaranteed time: 0 while the finger does not touch."""
+        """Keep on sliding, and update the guaranteed time: 0 while the finger does not touch, or not as asked.
+
+        Raises
+        ------
+        MotionAborted
+            At the end, if the slide was not what was asked for.
+        """
         self._follower.update(time_ns, arm)
         self.steady_s = 0.0
         self._contact.update(arm)
-        self._force_sum_n += arm.force_n
-        self._steps += 1
+        steady_s = self._follower.steady_m / self._speed_m_s
+        as_asked = self._watch.update(arm, constant=steady_s > 0.0)
         left_s = self._left_s(time_ns, arm)
         # Anything shorter than a microsecond is rounding, not sliding.
         if left_s < 1e-6:
-            self._check_mean_force()
+            if flaw := self._watch.flaw():
+                raise MotionAborted(flaw)
             return None
-        if self._contact.touching:
-            self.steady_s = min(STEADY_HORIZON_S, left_s, self._follower.steady_m / self._speed_m_s)
+        if self._contact.touching and as_asked:
+            self.steady_s = min(STEADY_HORIZON_S, left_s, steady_s)
             self._steady_until_ns = max(self._steady_until_ns, time_ns + int(self.steady_s * 1e9))
         velocity = self._follower.velocity(self._speed_m_s)
         self._stall.update(arm, velocity)
@@ -303,14 +308,6 @@ class SlideStage(Stage):
         self.progress = min(1.0, slid_m / length_m)
         by_length = (length_m - slid_m) / self._speed_m_s
         return min(by_length, (self._steady_until_ns - time_ns) * 1e-9) if self._finish else by_length
-
-    def _check_mean_force(self) -> None:
-        mean_n = self._force_sum_n / self._steps
-        if not abs(mean_n - self.force_n) <= self._mean_share * self.force_n:
-            raise MotionAborted(
-                f'the mean force of the slide was {mean_n:.2f} N, more than {self._mean_share:.0%} off the '
-                f'{self.force_n:g} N that were asked for; slide more slowly, or check the force control of the arm'
-            )
 
 
 class BrakeStage(Stage):

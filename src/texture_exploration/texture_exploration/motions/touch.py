@@ -139,6 +139,40 @@ class TouchParams:
         low=0.05,
         high=1.0,
     )
+    peak_force_share: float = param(
+        0.5,
+        'Sets by which share of the wanted force a slide may be pressed harder for a moment and succeed; states beyond '
+        'it are not steady. A larger share bears a rougher surface.',
+        low=0.05,
+        high=20.0,
+    )
+    mean_speed_share: float = param(
+        0.2,
+        'Sets the largest relative error of the mean speed with which a slide succeeds.',
+        low=0.02,
+        high=5.0,
+    )
+    peak_speed_share: float = param(
+        0.5,
+        'Sets by which share of the wanted speed the finger may be faster for 50 ms in a slide that succeeds; states '
+        'beyond it are not steady.',
+        low=0.05,
+        high=20.0,
+    )
+    mean_friction: float = param(
+        2.0,
+        'Sets the largest mean force along the surface, as a multiple of the wanted force, with which a slide '
+        'succeeds; it counts where the arm measures that force.',
+        low=0.1,
+        high=50.0,
+    )
+    peak_friction: float = param(
+        3.0,
+        'Sets the largest force along the surface for 50 ms, as a multiple of the wanted force, with which a slide '
+        'succeeds; states beyond it are not steady.',
+        low=0.1,
+        high=50.0,
+    )
     lift_speed_m_s: float = param(
         0.05,
         'Sets the speed away from the surface; a higher speed leaves the surface sooner.',

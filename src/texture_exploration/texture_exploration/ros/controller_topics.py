@@ -95,6 +95,7 @@ class RosTopics:
             message.header.frame_id,
             (at.x, at.y, at.z),
             (turned.x, turned.y, turned.z, turned.w),
+            self._age_ns(message),
         )
 
     def newest_force(self) -> ForceSample | None:
@@ -103,7 +104,12 @@ class RosTopics:
         if message is None:
             return None
         force = message.wrench.force
-        return ForceSample(to_ns(message.header.stamp), message.header.frame_id, (force.x, force.y, force.z))
+        stamp_ns, age_ns = to_ns(message.header.stamp), self._age_ns(message)
+        return ForceSample(stamp_ns, message.header.frame_id, (force.x, force.y, force.z), age_ns)
+
+    def _age_ns(self, message: Any) -> int:
+        stamp_ns = to_ns(message.header.stamp)
+        return int(self._node.get_clock().now().nanoseconds) - stamp_ns if stamp_ns else 0
 
     def listeners(self) -> int:
         """Return how many nodes listen to the commanded velocities, and can also be reached by the guard."""

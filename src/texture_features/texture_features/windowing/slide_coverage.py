@@ -15,7 +15,9 @@ LINK_NS = NANOSECONDS // 2
 # No guarantee holds for longer: a wrong one must not make millions of windows.
 MAX_STEADY_S = 3600.0
 MAX_STATES = 20_000
-LOST_SHARE = 0.5  # of the mean force; below, a state without guarantee is one in the air
+# Of the mean of the guaranteed states. A state without guarantee beyond them shows a slide that is none: in the air,
+# pressed too hard, or far too fast.
+LEAST_FORCE, MOST_FORCE, MOST_SPEED = 0.5, 1.5, 2.0
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,8 @@ class SlideCoverage:
     """The covered time of consecutive `slide` states, handed out window by window.
 
     After a state without guarantee, though others had one, the time up to the next state is not covered: the finger has
-    lost the surface or turns. If its force is far below that of the slide so far, the finger is in the air, and what is
-    left of the guarantee is not covered either; windows that were already handed out on it are not taken back.
+    lost the surface, turns, or does not slide as asked. If its force or speed is far from that of the slide so far,
+    what is left of the guarantee is not covered either; windows that were already handed out are not taken back.
 
     All it says depends on the order of the states alone, never on when they arrived: the mean speed and force of a
     window are those of the shortest beginning of the states that covers it.
@@ -83,6 +85,7 @@ class SlideCoverage:
         self._promising = False
         self._withdrawn = False
         self._force = _WeightedMean()
+        self._speed = _WeightedMean()
         self.add(state)
 
     def add(self, state: ExplorationState) -> bool:
@@ -97,9 +100,10 @@ class SlideCoverage:
         self._promising |= state.steady_s > 0
         self._cover(start, stamp + _steady_ns(state.steady_s))
         self._withdrawn = self._promising and not state.steady_s > 0
-        if self._withdrawn and state.force_n < LOST_SHARE * self._force.value:
+        if self._withdrawn and self._is_far(state):
             self._intervals[-1][1] = min(self._intervals[-1][1], stamp)
         self._force.add(state.force_n, float(state.steady_s > 0))
+        self._speed.add(state.speed_m_s, float(state.steady_s > 0))
         self._states.append((self._intervals[-1][1], state))
         return True
 
@@ -126,6 +130,14 @@ class SlideCoverage:
         count = min(count, left)
         self._next_ns += count * self._hop_ns
         return count
+
+    def _is_far(self, state: ExplorationState) -> bool:
+        force_n, speed_m_s = self._force.value, self._speed.value
+        return (
+            state.force_n < LEAST_FORCE * force_n
+            or state.force_n > MOST_FORCE * force_n
+            or state.speed_m_s > MOST_SPEED * speed_m_s
+        )
 
     def _cover(self, start: int, end: int) -> None:
         if self._intervals and start <= self._intervals[-1][1]:
