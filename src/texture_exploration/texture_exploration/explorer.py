@@ -36,6 +36,9 @@ PERIOD_S = 0.01
 CLOSING_S = 10.0  # longer than any motion needs to lift
 
 
+GENTLE_N = 1.0  # nobody says how hard a finger found pressed presses: it rises as before a gentle slide
+
+
 class Explorer:
     """Own an arm and explore with it.
 
@@ -243,7 +246,7 @@ class Explorer:
             return height_m - begin_m
 
     def _rise(self) -> None:
-        rise, pace = Rise(self.touch, self.limits), Pacer(PERIOD_S, self._clock)
+        rise, pace = Rise(GENTLE_N, self.touch, self.limits), Pacer(PERIOD_S, self._clock)
         rise.begin(self._clock(), self.arm.state())
         while True:
             if fault := self.fault():
