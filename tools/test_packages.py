@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -106,10 +107,11 @@ LAYERS: Mapping[str, Layer] = {
             'evaluation',
         )
     ),
+    'texture_papers': Layer(of('msgs', 'core', 'features', 'estimation', 'recordings', 'simulation', 'evaluation')),
     'texture_benchmarks': Layer(
         of(
             'msgs', 'core', 'launch', 'drivers', 'features', 'estimation', 'recordings', 'simulation', 'exploration',
-            'evaluation', 'bringup',
+            'evaluation', 'bringup', 'papers',
         )
     ),
 }  # fmt: skip
@@ -222,11 +224,22 @@ def test_a_package_imports_only_what_stands_above_it(package: Path) -> None:
     assert outside(package.name, declared, layer.may) == set()
 
 
-def test_nothing_that_is_deployed_imports_the_benchmarks() -> None:
-    deployed = [package for package in PACKAGES if package.name != 'texture_benchmarks']
-    for package in deployed:
-        assert 'texture_benchmarks' not in imports(package, package.name) | imports(package, 'test')
-        assert 'texture_benchmarks' not in depends(package, 'exec_depend', 'depend', 'test_depend')
+def test_nothing_that_is_deployed_imports_the_benchmarks_or_needs_the_papers() -> None:
+    for package in PACKAGES:
+        needed = imports(package, package.name) | depends(package, 'exec_depend', 'depend')
+        tested = imports(package, 'test') | depends(package, 'test_depend')
+        if package.name != 'texture_benchmarks':
+            assert 'texture_benchmarks' not in needed | tested
+            assert package.name == 'texture_papers' or 'texture_papers' not in needed
+
+
+@pytest.mark.parametrize('paper', ['roberge', 'rispal', 'jamali', 'kaboli', 'hu'])
+def test_a_learner_of_a_paper_is_imported_without_simulation_evaluation_and_drawing(paper: str) -> None:
+    code = f'import sys, texture_papers.{paper}; print(*sys.modules)'
+    loaded = set(
+        subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True).stdout.split()
+    )
+    assert not loaded & {'texture_simulation', 'texture_evaluation', 'matplotlib', 'sklearn'}
 
 
 @each

@@ -19,15 +19,15 @@ def test_windows_of_any_length_leave_no_gap_and_long_ones_overlap(length_s: floa
 
 
 def test_a_training_takes_time_and_little_memory_where_only_means_are_kept() -> None:
-    [found] = costs('naive_bayes', [TrainingSize(200, 4)], limit_s=60.0, seed=0).values()
+    [found] = costs('texture_papers.jamali:NaiveBayes', [TrainingSize(200, 4)], limit_s=60.0, seed=0).values()
     assert 0 < found.seconds < 60
     assert 0 <= found.mebibytes < 100
 
 
 def test_what_takes_too_long_is_not_tried_in_a_larger_size() -> None:
     sizes = [TrainingSize(windows, 4) for windows in (40, 80, 160)]
-    assert list(costs('naive_bayes', sizes, limit_s=0.0, seed=0)) == sizes[:1]
-    assert list(costs('naive_bayes', sizes, limit_s=60.0, seed=0)) == sizes
+    assert list(costs('texture_papers.jamali:NaiveBayes', sizes, limit_s=0.0, seed=0)) == sizes[:1]
+    assert list(costs('texture_papers.jamali:NaiveBayes', sizes, limit_s=60.0, seed=0)) == sizes
 
 
 @pytest.mark.benchmark

@@ -196,7 +196,8 @@ def test_a_recipe_and_estimators_of_ones_own_stand_beside_ours(tmp_path: Path, m
     monkeypatch.setitem(sys.modules, 'my_estimators', module)
     recipe = tmp_path / 'default.yaml'
     recipe.write_text(
-        'windows: {length_s: 0.5, hop_s: 0.5}\ninputs: {signal: {features: [log_variance]}}\nlearner: naive_bayes\n'
+        'windows: {length_s: 0.5, hop_s: 0.5}\ninputs: {signal: {features: [log_variance]}}\n'
+        'learner: texture_papers.jamali:NaiveBayes\n'
     )
     methods = (str(recipe), 'sklearn.naive_bayes:GaussianNB', 'my_estimators:NearestMean')
     options = BenchmarkOptions(tmp_path / 'out', quick=True, own_methods=methods, own_bags=(loud_and_quiet(tmp_path),))
@@ -212,7 +213,7 @@ def test_a_recipe_and_estimators_of_ones_own_stand_beside_ours(tmp_path: Path, m
 
 def test_a_recipe_that_needs_what_the_slides_lack_is_refused(tmp_path: Path) -> None:
     recipe = tmp_path / 'slow.yaml'
-    recipe.write_text('inputs: {signal_static: {features: [mean]}}\nlearner: naive_bayes\n')
+    recipe.write_text('inputs: {signal_static: {features: [mean]}}\nlearner: texture_papers.jamali:NaiveBayes\n')
     options = BenchmarkOptions(
         tmp_path / 'out', quick=True, own_methods=(str(recipe),), own_bags=(loud_and_quiet(tmp_path),)
     )

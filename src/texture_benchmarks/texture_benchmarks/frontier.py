@@ -39,6 +39,7 @@ from texture_benchmarks.study import (
     map_forked,
 )
 from texture_core.arrays import Array
+from texture_core.catalogue import find
 from texture_estimation.channels import with_channels
 from texture_estimation.learners.catalogue import LEARNERS
 from texture_estimation.learners.learner import Learner
@@ -83,7 +84,7 @@ def costs(learner: str, sizes: Sequence[TrainingSize], limit_s: float, seed: int
             before, last = next(reversed(found.items()))
             if last.seconds * size.windows / before.windows > limit_s:
                 break
-        found[size] = in_own_process(partial(_cost, LEARNERS[learner](), size, seed))
+        found[size] = in_own_process(partial(_cost, find(LEARNERS, learner, 'learner')(), size, seed))
     return found
 
 
@@ -197,8 +198,8 @@ RECIPES: Mapping[str, Sequence[float]] = {
 }
 QUICK_RECIPES: Mapping[str, Sequence[float]] = {'fast': (0.1, 0.5)}
 OVERLAPPING = f'{LENGTH_S:g} s, every {OVERLAPPING_S:g} s'
-COMPARED_LEARNERS = ('mlp', 'svm_rbf', 'naive_bayes', 'passive_aggressive')
-QUICK_LEARNERS = ('mlp', 'naive_bayes')
+COMPARED_LEARNERS = ('mlp', 'svm_rbf', 'texture_papers.jamali:NaiveBayes', 'texture_papers.kaboli:PassiveAggressive')
+QUICK_LEARNERS = ('mlp', 'texture_papers.jamali:NaiveBayes')
 FEW_LABELS, WINDOWS_PER_LABEL = 10, 50
 BY_WINDOWS = [TrainingSize(windows, FEW_LABELS) for windows in (100, 300, 1_000, 3_000, 10_000, 30_000, 100_000)]
 BY_LABELS = [TrainingSize(WINDOWS_PER_LABEL * labels, labels) for labels in (2, 5, 10, 20, 50, 100, 200)]

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from scipy.signal import resample_poly
 from sklearn.model_selection import LeaveOneGroupOut, StratifiedGroupKFold, StratifiedKFold
 
-from texture_benchmarks.papers.recipe_digest import digest_of
 from texture_benchmarks.study import (
     BenchmarkOptions,
     BenchmarkResult,
@@ -32,7 +31,7 @@ from texture_benchmarks.study import (
 from texture_core.arrays import AnyArray, Array
 from texture_core.catalogue import find
 from texture_core.errors import InvalidData, InvalidParameter
-from texture_core.resources import folder
+from texture_core.resources import shipped
 from texture_core.signal import TactileSignal
 from texture_estimation.channels import with_channels
 from texture_estimation.model import TextureModel
@@ -48,11 +47,12 @@ from texture_features.augmentation.augmentation import Augmentation
 from texture_features.feature import Feature
 from texture_features.feature_set import InputFeatures
 from texture_features.features.force import Force
-from texture_features.features.spectrum import Spectrum
 from texture_features.features.speed import Speed
 from texture_features.recipe_file import read_recipe
 from texture_features.windowing.time_stretch import Stretched
 from texture_features.windowing.windows import CutWindow, WindowParams, cut_recording
+from texture_papers.hu import Spectrum
+from texture_papers.protocol import digest_of
 from texture_recordings.labelled_slide import LabelledSlide
 from texture_recordings.slide_dataset import SlideDataset, cut_slide
 
@@ -496,7 +496,7 @@ def run_later(options: BenchmarkOptions) -> BenchmarkResult:
 def _shipped(options: BenchmarkOptions) -> Sequence[str]:
     if options.quick:
         return QUICK_RECIPES
-    return of_one_finger(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+    return of_one_finger(path.stem for path in shipped('texture_estimation', 'config/recipes').values())
 
 
 def of_one_finger(recipes: Iterable[str]) -> list[str]:

@@ -31,7 +31,7 @@ from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult, imported
 from texture_core.arrays import Array
 from texture_core.catalogue import find
 from texture_core.exploration import ExplorationState, Phase
-from texture_core.resources import folder
+from texture_core.resources import shipped
 from texture_core.signal import TactileSignal
 from texture_estimation.channels import FAST_TOPIC, with_channels
 from texture_estimation.classification.training import train
@@ -361,7 +361,7 @@ LEFT_OUT = frozenset(
 LEFT_OUT_METHODS = ('-ann', '-pairs')
 RECIPES = of_one_finger(
     path.stem
-    for path in folder('texture_estimation', 'config/recipes').glob('*.yaml')
+    for path in shipped('texture_estimation', 'config/recipes').values()
     if path.stem not in NEEDS_ARRAY | LEFT_OUT
     and not any(method in path.stem for method in LEFT_OUT_METHODS)
     and FAST_TOPIC in load_recipe(path.stem).feature_set.topics

@@ -17,12 +17,11 @@ from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from texture_benchmarks.papers import ets_linear, jamali
-from texture_benchmarks.papers.protocol import PaperProtocol, folds, halves
-from texture_benchmarks.papers.trial import of_task
 from texture_benchmarks.study import BenchmarkOptions, BenchmarkResult
 from texture_core.arrays import Array, Samples
 from texture_evaluation.charts import COLOURS, chart
+from texture_papers import jamali_experiment, roberge_experiment
+from texture_papers.protocol import PaperProtocol, folds, halves, of_task
 from texture_simulation.contact import Contact
 from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.effects.contact_growth import ForceGain, PatchGrowth
@@ -384,8 +383,8 @@ class Paper:
 
 # Scenes in which the quick learner is too good, or too bad, to see all that the paper's method sees.
 PAPERS: Mapping[str, Paper] = {
-    'ets_linear': Paper(replace(ets_linear.PROTOCOL, divide=halves(4)), ets_linear.SVM),
-    'jamali': Paper(replace(jamali.PROTOCOL, divide=folds(5, 1)), jamali.FIVE),
+    'ets_linear': Paper(replace(roberge_experiment.LINEAR, divide=halves(4)), roberge_experiment.SVM),
+    'jamali': Paper(replace(jamali_experiment.PROTOCOL, divide=folds(5, 1)), jamali_experiment.FIVE),
 }
 
 

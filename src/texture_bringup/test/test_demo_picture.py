@@ -9,7 +9,10 @@ from texture_estimation.classification.training import train
 from texture_estimation.recipe import Recipe
 from texture_features.labelled_features import LabelledFeatures
 
-RECIPE = {'inputs': {'signal': {'features': ['mean']}}, 'learner': 'naive_bayes'}
+RECIPE = {
+    'inputs': {'signal': {'features': ['mean']}},
+    'learner': {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}},
+}
 
 
 def test_the_log_odds_of_one_window_are_those_of_the_model_and_further_windows_add_to_them() -> None:

@@ -14,7 +14,7 @@ os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 
 from texture_bringup.demo.isolation import free_port  # noqa: E402
 from texture_bringup.ros.operator import Operator  # noqa: E402
-from texture_core.resources import folder  # noqa: E402
+from texture_core.resources import find_file  # noqa: E402
 from texture_estimation.classification.training import train  # noqa: E402
 from texture_estimation.recipe import load_recipe  # noqa: E402
 from texture_exploration.presets import load_preset  # noqa: E402
@@ -71,7 +71,7 @@ def launch(out: Path) -> ChildLauncher:
         'sensor': 'tsf85',
         'device': out / 'sensor',
         'finger_port': free_port(),
-        'recipe': folder('texture_estimation', 'config/recipes') / f'{RECIPE}.yaml',
+        'recipe': find_file(RECIPE, 'texture_estimation', 'config/recipes', 'recipe'),
         'scene': SCENE,
         'surface': SHEETS[0],
         'watch_signal': False,

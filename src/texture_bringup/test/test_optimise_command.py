@@ -33,7 +33,7 @@ def test_a_recipe_is_tuned_from_the_command_line_and_the_search_is_reported_line
         '[####################] 2/2',
     ]
     assert said.out.startswith(f'{out}: fitness ')
-    assert load_recipe(str(out)).learner_name == 'svm_pairs'
+    assert load_recipe(str(out)).learner_name == 'texture_papers.roberge:SvmPairs'
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from texture_core.resources import folder
+from texture_core.resources import shipped as shipped_by_all
 from texture_core.signal import NANOSECONDS, TactileSignal
 from texture_estimation.recipe import load_recipe
 from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
@@ -35,6 +35,8 @@ PAIRS = {
     'ets-linear': (
         'ets-linear-svm',
         'ets-linear-ann',
+        'ets-linear-svm-recorded',
+        'ets-linear-ann-recorded',
         'ets-linear-svm-vote',
         'ets-linear-ann-vote',
         'ets-linear-svm-pairs',
@@ -53,6 +55,8 @@ PAIRS = {
     'jamali': (
         'jamali-naive-bayes-3',
         'jamali-naive-bayes-5',
+        'jamali-naive-bayes-3-heights',
+        'jamali-naive-bayes-5-heights',
         'jamali-amplitude',
         'jamali-amplitude-deviation',
         'jamali-stft',
@@ -119,9 +123,9 @@ def test_every_motion_of_a_preset_gives_the_recipes_of_its_paper_a_window(name, 
 
 
 def test_every_shipped_preset_and_every_recipe_of_a_paper_is_asserted_above():
-    shipped = folder('texture_exploration', 'config/presets').glob('*.yaml')
+    shipped = shipped_by_all('texture_exploration', 'config/presets').values()
     assert {path.stem for path in shipped} == set(PAIRS)
-    recipes = [*folder('texture_estimation', 'config/recipes').glob('*.yaml')]
-    recipes += folder('texture_estimation', 'config/roughness').glob('*.yaml')
+    recipes = [*shipped_by_all('texture_estimation', 'config/recipes').values()]
+    recipes += shipped_by_all('texture_estimation', 'config/roughness').values()
     of_papers = {path.stem for path in recipes if path.stem.startswith(('ets-', 'jamali-', 'kaboli-', 'hu-'))}
     assert of_papers == {recipe for names in PAIRS.values() for recipe in names}

@@ -21,8 +21,9 @@ from texture_msgs import msg  # noqa: E402
 
 from texture_bringup.demo.isolation import free_port  # noqa: E402
 from texture_bringup.ros.operator import Operator  # noqa: E402
+from texture_core import resources  # noqa: E402
 from texture_core.exploration import ExplorationRequest  # noqa: E402
-from texture_core.resources import folder  # noqa: E402
+from texture_core.resources import find_file  # noqa: E402
 from texture_core.ros.conversions import from_msg  # noqa: E402
 from texture_core.ros.local_graph import LocalGraph  # noqa: E402
 from texture_core.ros.qos import ESTIMATE_QOS, FEATURE_QOS  # noqa: E402
@@ -82,7 +83,13 @@ PAPERS = {
         'tsf85_3x4',
         'ets-linear',
         'ets-linear-svm',
-        ('ets-linear-ann', 'ets-linear-svm-vote', 'ets-linear-ann-vote'),
+        (
+            'ets-linear-ann',
+            'ets-linear-svm-vote',
+            'ets-linear-ann-vote',
+            'ets-linear-svm-recorded',
+            'ets-linear-ann-recorded',
+        ),
         # A peak that one slide shows and another hides shifts the list of peaks: of machines of two slides over each
         # surface, 37 % of the windows of the last one are wrong, of eight 6 %.
         slides=8,
@@ -136,7 +143,7 @@ ROUGHNESS = Paper(
 
 def recipe_file(name: str) -> Path:
     kind = 'roughness' if name.startswith('ets-roughness') else 'recipes'
-    return folder('texture_estimation', f'config/{kind}') / f'{name}.yaml'
+    return find_file(name, 'texture_estimation', f'config/{kind}', 'recipe')
 
 
 def described_alike(*recipes: str) -> bool:
@@ -326,6 +333,6 @@ def test_the_motion_of_kaboli_et_al_gives_two_fingers_on_an_emulated_robot_a_win
 
 def test_every_recipe_of_a_paper_is_tried_above() -> None:
     tried = {recipe for paper in (*PAPERS.values(), ROUGHNESS) for recipe in (paper.recipe, *paper.beside)}
-    files = [recipe_file('ets-linear-svm').parent, recipe_file('ets-roughness-ann1').parent]
-    shipped = {path.stem for one in files for path in one.glob('*.yaml')}
+    shipped = {*resources.shipped('texture_estimation', 'config/recipes')}
+    shipped |= {*resources.shipped('texture_estimation', 'config/roughness')}
     assert tried == {name for name in shipped if name.startswith(('ets-', 'jamali-', 'kaboli-', 'hu-'))}

@@ -331,9 +331,9 @@ READERS = {
     ),
     'scene': text_file('texture_simulation', 'config/scenes/twelve_textures.yaml', load_scene),
     'hand profile': text_file('texture_exploration', 'config/hands/leap.yaml', load_profile),
-    'preset': text_file('texture_exploration', 'config/presets/ets-linear.yaml', load_preset),
+    'preset': text_file('texture_papers', 'config/presets/ets-linear.yaml', load_preset),
     'settings': text_file('texture_drivers', 'config/sensors/daq.yaml', load_daq),
-    'grades': text_file('texture_simulation', 'config/grades/ets_roughness.csv', read_grades),
+    'grades': text_file('texture_papers', 'config/grades/ets_roughness.csv', read_grades),
     'ratings': Reader(make_ratings, lambda folder: read_ratings(folder / 'good.csv'), ('good.csv',)),
     'plain bag': Reader(make_plain_bag, read_slides, ('bag/bag.mcap',)),
     'launch file': text_file(

@@ -21,15 +21,35 @@ def folder(package: str, name: str) -> Path:
     return places[0] / name
 
 
+def shipped(package: str, subfolder: str, suffix: str = '.yaml') -> dict[str, Path]:
+    """Return what all packages of this machine ship in a folder of this name, by stem.
+
+    Any installed package may add recipes, scenes or presets by having such a folder in its share; where two have a file
+    of the same name, that of `package` counts.
+    """
+    prefixes = [
+        Path(prefix) / 'share' for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if prefix
+    ]
+    others = [manifest.parent.name for place in (SOURCE_TREE, *prefixes) for manifest in place.glob('*/package.xml')]
+    names = dict.fromkeys([*sorted(others, reverse=True), package])  # the last one counts
+    names[package] = names.pop(package)
+    return {
+        item.stem: item
+        for name in names
+        for item in sorted(folder(name, subfolder).glob(f'*{suffix}'))
+        if item.is_file()
+    }
+
+
 def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix: str = '.yaml') -> Path:
-    """Return the file a user means: a path, or the name of a file that the package ships in `subfolder`.
+    """Return the file a user means: a path, or the name of a file that a package ships in `subfolder`.
 
     Parameters
     ----------
     name_or_path
         Path of a file, or name of a shipped one without its suffix.
     package
-        Package that ships it.
+        Package whose files come first; any other that is installed may ship more (see `shipped`).
     subfolder
         Folder in the package, such as 'config/recipes'.
     kind
@@ -50,9 +70,9 @@ def find_file(name_or_path: str, package: str, subfolder: str, kind: str, suffix
     path = Path(name_or_path).expanduser()
     if path.is_file():
         return path
-    shipped = {item.stem: item for item in folder(package, subfolder).glob(f'*{suffix}')}
-    if name_or_path not in shipped and (path.suffix == suffix or len(path.parts) > 1):
+    known = shipped(package, subfolder, suffix)
+    if name_or_path not in known and (path.suffix == suffix or len(path.parts) > 1):
         raise UnknownName(f"there is no file '{name_or_path}' in '{Path.cwd()}'; give the path of a {kind} that exists")
-    if name_or_path not in shipped:
-        raise unknown_name(name_or_path, shipped, kind)
-    return shipped[name_or_path]
+    if name_or_path not in known:
+        raise unknown_name(name_or_path, known, kind)
+    return known[name_or_path]

@@ -27,7 +27,7 @@ from texture_features.labelled_features import LabelledFeatures
 
 pytestmark = pytest.mark.ros
 GRADE_NAMES = ('signal/signal_energy/f', 'signal/peak_to_median_power/f')
-GRADE_RECIPE = {'inputs': {'signal': {'features': ['signal_energy', 'peak_to_median_power']}}}
+GRADE_RECIPE = {'inputs': {'signal': {'features': ['log_variance', 'peak_to_median_power']}}}
 NODES = {
     'classifier': (Classifier, 'model', 'cloth_slide'),
     'classifier with trees': (Classifier, 'trees_model', 'cloth_slide'),
@@ -97,10 +97,17 @@ def trees_model(examples):
 def pairs_model(examples):
     """Return a model in which two pairs have features and learners of their own."""
     pairs = [
-        {'pair': ['cork', 'felt'], 'inputs': ['signal'], 'learner': {'svm_pairs': {'kernel_scale': 2.0}}},
-        {'pair': ['felt', 'wood'], 'learner': {'ann_pairs': {'hidden': 4}}},
+        {
+            'pair': ['cork', 'felt'],
+            'inputs': ['signal'],
+            'learner': {'texture_papers.roberge:SvmPairs': {'kernel_scale': 2.0}},
+        },
+        {'pair': ['felt', 'wood'], 'learner': {'texture_papers.roberge:AnnPairs': {'hidden': 4}}},
     ]
-    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': {'tuned_pairs': {'pairs': pairs}}}
+    recipe = {
+        'inputs': {'signal': {'features': ['hjorth']}},
+        'learner': {'texture_papers.roberge:TunedPairs': {'pairs': pairs}},
+    }
     return train(Recipe.from_mapping(recipe, 'pairs'), examples)
 
 

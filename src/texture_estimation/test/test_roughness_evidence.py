@@ -18,7 +18,7 @@ from texture_features.labelled_features import LabelledFeatures
 
 FINGERPRINT = 'abcd1234 signal=1000Hz*1'
 NAMES = ('signal/signal_energy/f', 'signal/arc_length/f', 'signal/peak_to_median_power/f', 'signal/log_variance/f')
-INPUTS = {'inputs': {'signal': {'features': ['signal_energy', 'arc_length', 'peak_to_median_power', 'log_variance']}}}
+INPUTS = {'inputs': {'signal': {'features': ['hjorth', 'peak_to_median_power', 'log_variance']}}}
 SPREAD = 0.4  # of people's opinions, in grades
 
 
@@ -128,7 +128,7 @@ def test_a_bad_window_among_good_ones_is_left_out(model) -> None:
 
 
 def test_where_no_head_fires_there_is_no_grade() -> None:
-    model = train_grades(recipe(regressor={'svm5': {'kernel_scale': 0.3}}), *graded())
+    model = train_grades(recipe(regressor={'texture_papers.rispal:Svm5': {'kernel_scale': 0.3}}), *graded())
     evidence = RoughnessAccumulator(model)
     evidence.update(vector((300.0, 0.0, 0.5, 8.0)))
     estimate = evidence.update(last())

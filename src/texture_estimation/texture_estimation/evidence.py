@@ -64,7 +64,8 @@ class EvidenceAccumulator:
     >>> from texture_estimation.classification.training import train
     >>> from texture_estimation.recipe import Recipe
     >>> from texture_features.labelled_features import LabelledFeatures
-    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': 'naive_bayes'}, 'tiny')
+    >>> learner = {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}}
+    >>> recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': learner}, 'tiny')
     >>> labels = np.repeat(['cork', 'felt'], 20)
     >>> slides = np.char.add(labels, np.tile(np.repeat(['/1', '/2', '/3', '/4'], 5), 2))
     >>> values = (labels == 'felt')[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 1))

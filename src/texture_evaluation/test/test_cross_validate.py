@@ -24,7 +24,7 @@ RECIPE = Recipe.from_mapping(
     {
         'windows': {'length_s': 0.25, 'hop_s': 0.25},
         'inputs': {'signal': {'features': ['log_bands']}},
-        'learner': 'naive_bayes',
+        'learner': {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}},
         'training': {'hop_s': 0.25},
     },
     'small',

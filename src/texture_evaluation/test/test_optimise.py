@@ -32,7 +32,7 @@ def test_what_is_written_is_a_recipe_that_train_uses(simulated: Path, tmp_path: 
     first, second, *_ = out.read_text().splitlines()
     assert 'texture optimise ets-linear-svm' in first
     assert re.fullmatch(r'# fitness \d+\.\d %: training .* over 3 halves\.', second)
-    assert load_recipe(str(out)).learner_name == 'svm_pairs'
+    assert load_recipe(str(out)).learner_name == 'texture_papers.roberge:SvmPairs'
     model = train_from_bags(str(out), [simulated])
     assert model.labels == ('glass', 'leather', 'ridge_2mm_deep')
 
@@ -58,7 +58,7 @@ def test_a_front_is_written_as_one_recipe_for_each_of_its_points(simulated: Path
     recipes = [path for path in written.files if path.suffix == '.yaml']
     assert recipes[0] == tmp_path / 'best.yaml'
     assert len(recipes) == len(written.lines) >= 1
-    assert all(load_recipe(str(path)).learner_name == 'svm_pairs' for path in recipes)
+    assert all(load_recipe(str(path)).learner_name == 'texture_papers.roberge:SvmPairs' for path in recipes)
 
 
 def test_each_pair_of_surfaces_gets_a_recipe(simulated: Path, tmp_path: Path) -> None:
@@ -73,7 +73,7 @@ def test_the_variables_of_all_pairs_are_trained_as_one_model(simulated: Path, tm
     wanted = Wanted('ets-linear-svm', (str(simulated),), per_pair=True)
     optimise_from_bags(wanted, SMALL, tmp_path / 'best.yaml')
     model = load_model(train_from_bags(str(tmp_path / 'best.yaml'), [simulated]).save(tmp_path / 'model'))
-    assert model.recipe.learner_name == 'tuned_pairs'
+    assert model.recipe.learner_name == 'texture_papers.roberge:TunedPairs'
     assert '3 of 3 pairs have variables of their own' in model.training['calibration']
     assert evaluate(model, [simulated]).as_json()['window_accuracy'] > 0.9
 
@@ -97,7 +97,7 @@ def test_grades_are_tuned_by_a_roughness_recipe(simulated: Path, tmp_path: Path)
     table.write_text('texture,grade\nglass,1\nleather,3\nridge_2mm_deep,5\n')
     wanted = Wanted('ets-roughness-svm5', (str(simulated),), grades=str(table))
     written = optimise_from_bags(wanted, SMALL, tmp_path / 'rough.yaml')
-    assert 'svm5' in written.files[0].read_text()
+    assert 'Svm5' in written.files[0].read_text()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texture_core.resources import folder
+from texture_core.resources import shipped
 from texture_estimation.classification.training import train
 from texture_estimation.recipe import load_recipe
 from texture_evaluation.cross_validation.cross_validate import predict_slides
@@ -16,7 +16,7 @@ from texture_evaluation.train import train_from_bags, training_examples
 from texture_recordings.slide_dataset import SlideDataset
 from texture_simulation.simulated_bags import SlidePlan, write_simulated
 
-SHIPPED = sorted(path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml'))
+SHIPPED = sorted(shipped('texture_estimation', 'config/recipes'))
 # How the load lies on the taxels: the simulated finger has it alike over all surfaces.
 OF_SHARES = {'taxels': 'signal_static', 'taxels-signal': 'signal'}
 # The friction of these surfaces is not simulated.
@@ -34,8 +34,10 @@ OF_ONE_FINGER = [
 def test_each_recipe_learns_distinct_simulated_surfaces_and_recognises_them(name: str, simulated: Path) -> None:
     recipe = load_recipe(name)
     # The slides are shorter than the windows of some papers.
-    windows = replace(recipe.feature_set.windows, length_s=min(0.5, recipe.feature_set.windows.length_s))
-    recipe = replace(recipe, feature_set=replace(recipe.feature_set, windows=windows))
+    length_s = min(0.5, recipe.feature_set.windows.length_s)
+    windows = replace(recipe.feature_set.windows, length_s=length_s, hop_s=0.1, skip_s=0.0)
+    training = replace(recipe.training, hop_s=min(0.25, recipe.training.hop_s))
+    recipe = replace(recipe, feature_set=replace(recipe.feature_set, windows=windows), training=training)
     examples = SlideDataset.from_bags([simulated], '1-4').features(
         replace(recipe.feature_set, windows=recipe.training_windows)
     )

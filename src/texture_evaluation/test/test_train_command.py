@@ -14,7 +14,13 @@ from texture_features.labelled_features import LabelledFeatures
 
 @pytest.fixture(scope='module')
 def model() -> TextureModel:
-    recipe = Recipe.from_mapping({'inputs': {'signal': {'features': ['mean']}}, 'learner': 'naive_bayes'}, 'tiny')
+    recipe = Recipe.from_mapping(
+        {
+            'inputs': {'signal': {'features': ['mean']}},
+            'learner': {'sklearn': {'estimator': 'sklearn.naive_bayes:GaussianNB'}},
+        },
+        'tiny',
+    )
     labels = np.repeat(['cork', 'felt'], 15)
     slides = np.char.add(labels, np.tile(np.repeat(['/1', '/2', '/3'], 5), 2))
     values = (labels == 'felt')[:, None] + 0.1 * np.random.default_rng(0).standard_normal((30, 1))

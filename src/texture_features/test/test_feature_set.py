@@ -128,8 +128,8 @@ def test_an_unknown_recipe_is_answered_with_the_nearest():
 def test_one_input_is_described_twice_with_features_of_their_own() -> None:
     recipe = {
         'inputs': {
-            'signal': {'features': [{'spectral_peaks': {'peaks': 1}}]},
-            'signal#2': {'stretch_to_m_s': 0.1, 'features': [{'spectral_peaks': {'peaks': 2}}, 'speed']},
+            'signal': {'features': ['mean_log_bands']},
+            'signal#2': {'stretch_to_m_s': 0.1, 'features': ['hjorth', 'speed']},
         }
     }
     features = FeatureSet.from_mapping(recipe)
@@ -138,10 +138,8 @@ def test_one_input_is_described_twice_with_features_of_their_own() -> None:
     tone = Window(np.sin(2 * np.pi * 100.0 * np.arange(1000) / 1000.0)[:, None], 1000.0, ('dynamic',))
     vector = features.extract(CutWindow(0, 'slide', 1.0, 1.0, {'signal': tone}, speed_m_s=0.2))
     found = dict(zip(vector.names, vector.values, strict=True))
-    assert found['signal/spectral_peaks/1/frequency_hz/dynamic'] == pytest.approx(100.0, abs=0.5)
-    assert found['signal#2/spectral_peaks/1/frequency_hz/dynamic'] == pytest.approx(50.0, abs=0.5)  # at half the speed
     assert found['signal#2/speed'] == 0.2
-    assert len(found) == 2 + 4 + 1
+    assert {name.split('/')[1] for name in found if name.startswith('signal#2')} == {'hjorth', 'speed'}
 
 
 def test_a_further_description_of_an_input_needs_a_name() -> None:

@@ -7,7 +7,6 @@ from texture_features.catalogue import FEATURES
 from texture_features.feature import WindowBatch
 from texture_features.features.hjorth import hjorth
 from texture_features.features.log_bands import LogBands
-from texture_features.features.spectral_peaks import SpectralPeaks, highest_peaks
 from texture_features.spectra.spectrum import hann, mean_over_segments, segment_densities
 
 RATE_HZ = 1000.0
@@ -53,18 +52,11 @@ SCALING = {
     'low_fft_bins': SHIFTED,
     'log_variance': SHIFTED,
     'log_difference_variance': SHIFTED,
-    'spectrum': SHIFTED,
     'short_time_fourier': SHIFTED,
-    'wavelet_energy': SHIFTED,
-    'mean_amplitude': TIMES,
     'mean': TIMES,
-    'signal_energy': SQUARED,
-    'region_peaks': SAME,
-    'correlation': SAME,
     'log_shares': SAME,
     'relative_changes': SAME,
     'power_autocorrelation': SAME,
-    'ordinal_patterns': SAME,
     'speed': SAME,
     'force': SAME,
     'friction': SAME,
@@ -120,7 +112,6 @@ def test_empty_windows_are_refused(shape):
         'hjorth',
         'log_variance',
         'log_difference_variance',
-        'signal_energy',
         'power_autocorrelation',
     ],
 )
@@ -173,47 +164,11 @@ def test_hjorth_of_a_tone_is_its_power_and_angular_frequency():
     assert complexity == pytest.approx(1.0, rel=1e-3)
 
 
-def test_peaks_are_the_tones_in_order_of_strength():
-    feature = SpectralPeaks(peaks=2)
-    values = feature(windows(tone(120.0) + tone(310.0, amplitude=0.5)))[0]
-    assert feature.names == ('1/frequency_hz', '1/amplitude', '2/frequency_hz', '2/amplitude')
-    np.testing.assert_allclose(values, [120.0, 1.0, 310.0, 0.5], rtol=0.05)
-
-
-def test_peaks_ranked_by_frequency_begin_with_the_lowest():
-    values = SpectralPeaks(peaks=2, order='frequency')(windows(tone(310.0) + tone(120.0, amplitude=0.5)))[0]
-    np.testing.assert_allclose(values[[0, 2]], [120.0, 310.0], rtol=0.02)
-
-
-def test_peaks_that_the_spectrum_lacks_are_zero():
-    bins, heights = highest_peaks(np.array([0.0, 1.0, 0.0, 3.0, 0.0]), 4, gap=1.0)
-    np.testing.assert_array_equal(bins, [3, 1, 0, 0])
-    np.testing.assert_array_equal(heights, [3.0, 1.0, 0.0, 0.0])
-
-
-def test_a_peak_close_to_a_higher_one_is_left_out():
-    bins, _ = highest_peaks(np.array([0.0, 1.0, 0.0, 3.0, 0.0, 0.0, 2.0, 0.0]), 2, gap=3.0)
-    np.testing.assert_array_equal(bins, [3, 6])
-
-
-def test_of_equally_high_peaks_the_lowest_comes_first():
-    bins, heights = highest_peaks(np.array([0.0, 2.0, 0.0, 2.0, 0.0, 1.0, 0.0]), 3, gap=1.0)
-    np.testing.assert_array_equal(bins, [1, 3, 5])
-    np.testing.assert_array_equal(heights, [2.0, 2.0, 1.0])
-
-
 @EVERY
 @pytest.mark.parametrize('speed_m_s', [0.0, np.nan])
 def test_without_a_speed_what_needs_one_is_not_a_number_and_the_rest_is_as_ever(name, speed_m_s):
     still, moving = (FEATURES[name]()(windows(noise(500, 2), speed_m_s=speed)) for speed in (speed_m_s, 0.1))
     assert np.array_equal(still, moving) or np.isnan(still).all() or name == 'speed'
-
-
-def test_integral_and_arc_length_have_their_closed_forms():
-    assert FEATURES['signal_energy']()(windows(tone(50.0, amplitude=2.0)))[0, 0] == pytest.approx(2.0, rel=1e-6)
-    ramp = np.arange(11.0)[:, None] * 3.0
-    line = WindowBatch(ramp, rate_hz=0.25)  # steps of 4 s and 3 units: 5 long
-    assert FEATURES['arc_length']()(line)[0, 0] == pytest.approx(50.0)
 
 
 def test_a_ramp_has_no_slope_variance():

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from texture_features.feature import Feature
-from texture_features.features.arc_length import ArcLength
 from texture_features.features.centred_log_ratio import CentredLogRatio
-from texture_features.features.correlation import Correlation
 from texture_features.features.force import Force
 from texture_features.features.friction import Friction
 from texture_features.features.hjorth import Hjorth
@@ -17,49 +15,31 @@ from texture_features.features.log_shares import LogShares
 from texture_features.features.log_variance import LogVariance
 from texture_features.features.low_fft_bins import LowFftBins
 from texture_features.features.mean import ChannelMean
-from texture_features.features.mean_amplitude import MeanAmplitude
-from texture_features.features.mean_hjorth import MeanHjorth
 from texture_features.features.mean_log_bands import MeanLogBands
 from texture_features.features.mean_spatial_bands import MeanSpatialBands
 from texture_features.features.mean_statistics import ChannelMeanStatistics
 from texture_features.features.moments import Moments
-from texture_features.features.ordinal_patterns import OrdinalPatterns
 from texture_features.features.pacinian_power import PacinianPower
 from texture_features.features.peak_to_median_power import PeakToMedianPower
 from texture_features.features.power_autocorrelation import PowerAutocorrelation
-from texture_features.features.region_peaks import RegionPeaks
 from texture_features.features.relative_changes import RelativeChanges
 from texture_features.features.short_time_fourier import ShortTimeFourier
-from texture_features.features.signal_energy import SignalEnergy
 from texture_features.features.slide_onset import SlideOnset
 from texture_features.features.spatial_band_power import SpatialBandPower
 from texture_features.features.spatial_bands import SpatialBands
 from texture_features.features.spatial_variation import SpatialVariation
 from texture_features.features.spectral_exponent import SpectralExponent
-from texture_features.features.spectral_peaks import SpectralPeaks
-from texture_features.features.spectrum import Spectrum
 from texture_features.features.speed import Speed
 from texture_features.features.temporal_variation import TemporalVariation
-from texture_features.features.wavelet_energy import WaveletEnergy
 
 FEATURES: Mapping[str, type[Feature]] = {
     'log_bands': LogBands,  # Welch 1967
     'mean_log_bands': MeanLogBands,
     'low_fft_bins': LowFftBins,
     'hjorth': Hjorth,  # Hjorth 1970; Kaboli et al. 2015
-    'spectral_peaks': SpectralPeaks,  # Roberge et al.
-    'signal_energy': SignalEnergy,  # Roberge et al.
-    'arc_length': ArcLength,  # Roberge et al.
-    'region_peaks': RegionPeaks,  # Jamali & Sammut 2010
-    'mean_amplitude': MeanAmplitude,  # Jamali & Sammut 2010
-    'mean_hjorth': MeanHjorth,  # Kaboli et al. 2015
-    'correlation': Correlation,  # Kaboli et al. 2015
-    'spectrum': Spectrum,  # Hu et al. 2014
     'short_time_fourier': ShortTimeFourier,
-    'wavelet_energy': WaveletEnergy,  # Daubechies 1992
     'moments': Moments,
     'power_autocorrelation': PowerAutocorrelation,
-    'ordinal_patterns': OrdinalPatterns,  # Bandt & Pompe 2002
     'mean': ChannelMean,
     'log_variance': LogVariance,
     'log_difference_variance': LogDifferenceVariance,

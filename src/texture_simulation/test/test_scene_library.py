@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from texture_core.parameters import markdown_table
-from texture_core.resources import folder
+from texture_core.resources import find_file, shipped
 from texture_simulation.effects.catalogue import EFFECTS
 from texture_simulation.emulator_params import EmulatorParams
 from texture_simulation.frictions import FRICTIONS
@@ -18,7 +18,7 @@ from texture_simulation.surfaces.catalogue import KINDS
 
 PACKAGE = Path(__file__).resolve().parents[1]
 README = (PACKAGE / 'README.md').read_text(encoding='utf-8')
-FILES = sorted(folder('texture_simulation', 'config/scenes').glob('*.yaml'))
+FILES = sorted(shipped('texture_simulation', 'config/scenes').values())
 SENSOR_OF = {
     'ets_linear': 'tsf85_3x4', 'ets_circular': 'tsf85_3x4', 'ets_fine': 'tsf85_3x4', 'roughness': 'tsf85',
     'jamali': 'daq', 'kaboli': 'biotac', 'kaboli_shapes': 'biotac', 'hu': 'pvdf',
@@ -47,7 +47,9 @@ def test_all_terms_of_the_library_are_used_by_some_scene() -> None:
 
 
 def test_grades_of_people_lie_apart_one_for_each_texture() -> None:
-    with (folder('texture_simulation', 'config/grades') / 'ets_roughness.csv').open(encoding='utf-8') as file:
+    with (find_file('ets_roughness', 'texture_simulation', 'config/grades', 'grades', '.csv')).open(
+        encoding='utf-8'
+    ) as file:
         rows = list(csv.DictReader(file))
     assert {row['texture'] for row in rows} == set(load_scene('roughness').surfaces)
     assert all(1.0 <= float(row['grade']) <= 5.0 for row in rows)

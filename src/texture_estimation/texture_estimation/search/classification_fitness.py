@@ -35,12 +35,12 @@ class ClassificationFitness:
     --------
     >>> import numpy as np
     >>> from texture_estimation.classification.evidence_rules import SoftVote
-    >>> from texture_estimation.learners.naive_bayes import NaiveBayes
+    >>> from texture_estimation.learners.svm_rbf import SvmRbf
     >>> from texture_estimation.search.surrogates.exact import exact
     >>> codes, slides = np.repeat([0, 1], 4), np.arange(8)
     >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((8, 1))
     >>> halves = (slides % 2 == 0)[None]
-    >>> fitness = ClassificationFitness(exact, NaiveBayes(), SoftVote(), values, codes, slides, halves)
+    >>> fitness = ClassificationFitness(exact, SvmRbf(), SoftVote(), values, codes, slides, halves)
     >>> fitness.start()(0)  # accuracy on the slides that were trained on, and on the others
     (1.0, 1.0)
     """

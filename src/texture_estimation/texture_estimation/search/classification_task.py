@@ -37,7 +37,7 @@ class ClassificationTask:
         """Return the trial of a recipe."""
         windows = recipe.training_windows
         return ClassificationFitness(
-            surrogate=surrogate_of(recipe.learner_name, quick=quick),
+            surrogate=surrogate_of(recipe.learner, quick=quick),
             learner=recipe.learner,
             rule=recipe.evidence,
             values=values,

@@ -14,7 +14,6 @@ from texture_estimation.search.labelled_windows import Cut
 from texture_estimation.search.parallel import ParallelMap, serial_map
 from texture_features.feature import Feature, WindowBatch
 from texture_features.feature_set import JOINT, FeatureSet, InputFeatures
-from texture_features.features.spectral_peaks import SpectralPeaks, by_frequency
 from texture_features.windowing.time_stretch import Stretched
 from texture_features.windowing.windows import WindowParams
 
@@ -26,8 +25,8 @@ Key = tuple[WindowParams, str, Hashable]
 class FeatureCache:
     """Values of feature sets on the same slides.
 
-    A feature is computed once for all feature sets that hold it. The highest peaks of a spectrum are chosen one after
-    the other, so n of them are the first n of any larger number: they are computed once for each gap.
+    A feature is computed once for all feature sets that hold it. One whose values are among those of a wider one, as
+    the n highest peaks are among more, says so by its methods `widest` and `of_widest`: the wider one is computed.
 
     Parameters
     ----------
@@ -137,9 +136,8 @@ class FeatureCache:
         """Return the feature from whose values those of `feature` are taken."""
         if isinstance(feature, Stretched):
             return replace(feature, feature=self._source(feature.feature))
-        if isinstance(feature, SpectralPeaks):
-            return replace(feature, peaks=max(self._most_peaks, feature.peaks), order='intensity')
-        return feature
+        widest = getattr(feature, 'widest', None)
+        return widest(self._most_peaks) if widest else feature
 
 
 def _some(windows: WindowBatch, rows: slice) -> WindowBatch:
@@ -151,10 +149,8 @@ def _derived(block: Array, feature: Feature) -> Array:
     """Return the values of `feature` of those of its source, (n, n_channels, n_names)."""
     if isinstance(feature, Stretched):
         return _derived(block, feature.feature)
-    if not isinstance(feature, SpectralPeaks):
-        return block
-    peaks = block.reshape(*block.shape[:-1], -1, 2)[..., : feature.peaks, :]
-    return by_frequency(peaks) if feature.order == 'frequency' else peaks
+    of_widest = getattr(feature, 'of_widest', None)
+    return np.asarray(of_widest(block)) if of_widest else block
 
 
 def _describe(job: tuple[list[WindowBatch], Feature]) -> Array:

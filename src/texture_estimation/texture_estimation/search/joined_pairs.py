@@ -9,7 +9,7 @@ from texture_core.errors import InvalidParameter
 from texture_estimation.recipe import Recipe
 from texture_features.feature_set import AGAIN
 
-LEARNER = 'tuned_pairs'
+LEARNER = 'texture_papers.roberge:TunedPairs'
 SHARED = ('windows', 'evidence', 'training')
 
 
@@ -29,7 +29,7 @@ def joined_recipe(recipes: Mapping[tuple[str, str], Recipe], base: Recipe) -> Re
     Returns
     -------
     Recipe
-        With the learner `tuned_pairs`.
+        With the learner `TunedPairs` of texture_papers.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from texture_estimation.search.search_task import R
 from texture_estimation.search.variables import Categorical, Individual, Integer, LogReal, SearchSpace, Value, Variable
 
 MAX_INCLUDES = 10
-KEYS = ('description', 'include', 'variables')
+KEYS = ('description', 'include', 'variables', 'recipes', 'pairs_of', 'learners')  # the last three: whom it belongs to
 PACKAGE, FOLDER = 'texture_estimation', 'config/search'
 
 
@@ -59,9 +59,9 @@ class RecipeSpace(Generic[R]):
     --------
     >>> import numpy as np
     >>> from texture_estimation.recipe import load_recipe
-    >>> space = RecipeSpace.load('ets-svm', load_recipe('ets-linear-svm'))
+    >>> space = RecipeSpace.load('svm-rbf', load_recipe('any-speed'))
     >>> space.recipe(space.variables.decode(np.full(len(space.variables.names), 0.5))).learner_name
-    'svm_pairs'
+    'svm_rbf'
     """
 
     base: R

@@ -56,7 +56,7 @@ class RoughnessTask:
         """Return the trial of a recipe."""
         table = np.array([self.grades.of(name) for name in examples.names])
         return RoughnessFitness(
-            regressor_surrogate_of(recipe.regressor_name, quick=quick),
+            regressor_surrogate_of(recipe.regressor, quick=quick),
             recipe.regressor,
             values,
             table[examples.codes],

@@ -2,57 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from texture_core.errors import InvalidParameter
+from texture_core.plain_data import load_yaml
+from texture_core.resources import shipped
 
-OF_RECIPES: Mapping[str, str] = {
-    'ets-linear-ann': 'ets-ann',
-    'ets-linear-ann-vote': 'ets-ann',
-    'ets-linear-svm': 'ets-svm',
-    'ets-linear-svm-vote': 'ets-svm',
-    'ets-circular-ann': 'ets-circular-ann',
-    'ets-circular-svm': 'ets-circular-svm',
-    'ets-fine-ann': 'ets-fine-ann',
-    'ets-fine-svm': 'ets-fine-svm',
-    'ets-roughness-ann1': 'ets-roughness-ann1',
-    'ets-roughness-ann5': 'ets-roughness-ann5',
-    'ets-roughness-svm5': 'ets-roughness-svm5',
-}
-# All pairs of one model share the length of the windows, so it is not searched for each of them.
-OF_PAIRS: Mapping[str, str] = {
-    'ets-circular-ann': 'ets-circular-pairs-ann',
-    'ets-circular-svm': 'ets-circular-pairs-svm',
-}
-OF_LEARNERS: Mapping[str, str] = {
-    'ann_pairs': 'ann-pairs',
-    'svm_pairs': 'svm-pairs',
-    'svm_rbf': 'svm-rbf',
-    'mlp': 'mlp',
-}
+
+def space_for(key: str, name: str) -> str | None:
+    """Return the name of the search space that lists a name under `key`; None if none does.
+
+    Parameters
+    ----------
+    key
+        'recipes', 'learners', or 'pairs_of' where each pair of surfaces of a recipe is searched for by itself.
+    name
+        Of the recipe or learner.
+    """
+    spaces = shipped('texture_estimation', 'config/search')
+    return next((stem for stem, path in spaces.items() if name in load_yaml(path, 'search space').get(key, ())), None)
 
 
 def shipped_space(recipe: str, learner: str, *, per_pair: bool = False) -> str:
     """Return the name of the search space of a recipe, or else of its learner.
-
-    Parameters
-    ----------
-    recipe, learner
-        Names.
-    per_pair
-        Whether each pair of surfaces is searched for by itself.
-
-    Returns
-    -------
-    str
 
     Raises
     ------
     InvalidParameter
         If neither has one.
     """
-    of_pairs = OF_PAIRS.get(recipe) if per_pair else None
-    name = of_pairs or OF_RECIPES.get(recipe) or OF_LEARNERS.get(learner)
+    of_pairs = space_for('pairs_of', recipe) if per_pair else None
+    name = of_pairs or space_for('recipes', recipe) or space_for('learners', learner)
     if not name:
         raise InvalidParameter(
             f"recipe '{recipe}' has no search space of its own, nor has '{learner}'; "

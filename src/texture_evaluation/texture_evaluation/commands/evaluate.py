@@ -12,7 +12,7 @@ from texture_core.command_options import add_channels, add_dask, add_seed, add_s
 from texture_core.errors import InvalidParameter, ModelMismatch
 from texture_core.output_files import refuse_inputs
 from texture_core.plain_data import write_json
-from texture_core.resources import folder
+from texture_core.resources import shipped
 from texture_estimation.channels import FAST_TOPIC, with_channels
 from texture_estimation.model import TextureModel, load_model
 from texture_estimation.model_files import both_files
@@ -117,7 +117,7 @@ def recipes_and_bags(given: Sequence[str]) -> tuple[list[str], list[str]]:
     InvalidParameter
         If no bag is left.
     """
-    known = {path.stem for path in folder('texture_estimation', 'config/recipes').glob('*.yaml')}
+    known = set(shipped('texture_estimation', 'config/recipes'))
     count = 1
     while count < len(given) and not _is_bags(given[count], known):
         count += 1

@@ -27,11 +27,11 @@ class Stretched:
 
     Examples
     --------
-    >>> from texture_features.features.region_peaks import RegionPeaks
+    >>> from texture_features.features.speed import Speed
     >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(2048) / 1000.0)[:, None]  # at 0.1 m/s
     >>> window = WindowBatch(tone, 1000.0, np.array(0.1))
-    >>> round(Stretched(RegionPeaks(peaks=1), to_m_s=0.05)(window).item())  # at half the speed
-    50
+    >>> Stretched(Speed(), to_m_s=0.05)(window).item()  # after stretching
+    0.05
     """
 
     feature: Feature

@@ -1,0 +1,45 @@
+import numpy as np
+import pytest
+
+from texture_estimation.classification.training import train
+from texture_estimation.recipe import load_recipe
+from texture_features.labelled_features import LabelledFeatures
+
+FINGERPRINT = 'abcd1234 signal=1000Hz*1'
+
+
+def gaussian_examples(*, seed=0, labels=('cork', 'felt', 'wood', 'slate'), slides=4, windows=8, spread=1.0, features=6):
+    """Return windows around a centre for each label, with something in common within each slide."""
+    rng = np.random.default_rng(seed)
+    centres = 2.0 * np.random.default_rng(99).normal(size=(len(labels), features))
+    values, names, groups = [], [], []
+    for centre, label in zip(centres, labels, strict=True):
+        for slide in range(slides):
+            common = centre + 0.3 * spread * rng.normal(size=features)
+            values.append(common + spread * rng.normal(size=(windows, features)))
+            names += [label] * windows
+            groups += [f'{label}/{slide}'] * windows
+    return LabelledFeatures(
+        values=np.concatenate(values),
+        labels=np.array(names),
+        groups=np.array(groups),
+        names=tuple(f'signal/f{number}' for number in range(features)),
+        feature_set=FINGERPRINT,
+        window_s=0.5,
+        hop_s=0.25,
+    )
+
+
+@pytest.fixture(scope='session')
+def make_examples():
+    return gaussian_examples
+
+
+@pytest.fixture(scope='session')
+def examples():
+    return gaussian_examples()
+
+
+@pytest.fixture(scope='session')
+def model(examples):
+    return train(load_recipe('default'), examples)

@@ -1,0 +1,438 @@
+"""What every learner must do, and what each of the papers' must do as scikit-learn does it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from sklearn.mixture import GaussianMixture
+from sklearn.naive_bayes import CategoricalNB, GaussianNB
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import SVC
+
+from texture_core.errors import InvalidData, InvalidParameter
+from texture_estimation.classification.training import train
+from texture_estimation.learners.catalogue import LEARNERS
+from texture_estimation.log_probabilities import is_tied
+from texture_estimation.model import load_model
+from texture_estimation.recipe import Recipe
+from texture_papers.hu import SvmMaxWins, principal_components
+from texture_papers.jamali import NaiveBayes, bins_of
+from texture_papers.kaboli import (
+    CrammerSingerClassifier,
+    EmMixture,
+    OnlineLinearClassifier,
+    PassiveAggressive,
+    SvmLinear,
+)
+from texture_papers.roberge import AnnPairs, Network, PairVotes, SvmPairs, _by_examples, _by_weights, fit_network
+
+# What the papers add: the shared checks hold for it, too.
+PAPERS = (
+    *(f'texture_papers.roberge:{name}' for name in ('AnnPairs', 'SvmPairs', 'TunedPairs')),
+    *(f'texture_papers.kaboli:{name}' for name in ('SvmLinear', 'PassiveAggressive', 'EmMixture')),
+    'texture_papers.jamali:NaiveBayes',
+    'texture_papers.hu:SvmMaxWins',
+)
+# Less of what takes time only.
+FASTER = {'texture_papers.kaboli:SvmLinear': {'repeats': 2, 'candidates': 5}}
+
+
+def learn(name, examples):
+    recipe = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': {name: FASTER.get(name, {})}}
+    return train(Recipe.from_mapping(recipe, name), examples)
+
+
+def codes_of(examples):
+    return tuple(np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+
+
+def accuracy(model, examples):
+    return np.mean(np.array(model.decide(examples.values)) == examples.labels)
+
+
+@pytest.fixture(scope='module', params=[*LEARNERS, *PAPERS])
+def name(request):
+    return request.param
+
+
+@pytest.fixture(scope='module')
+def training(name, examples):
+    return learn(name, examples)
+
+
+def test_distinct_surfaces_are_recognised(training, make_examples):
+    assert accuracy(training, make_examples(seed=1)) > 0.85
+
+
+def test_answers_are_log_probabilities_of_finite_size_even_far_from_all_examples(training, examples):
+    for values in (examples.values, np.full((1, 6), 1e6), np.zeros((1, 6)), -examples.values):
+        answers = training.predict_log_proba(values)
+        assert np.isfinite(answers).all()
+        np.testing.assert_allclose(np.exp(answers).sum(axis=1), 1.0)
+
+
+def test_a_window_alone_gets_the_same_decision_as_in_a_batch(training, examples):
+    together = training.predict_log_proba(examples.values)
+    alone = np.stack([training.predict_log_proba(values) for values in examples.values])
+    np.testing.assert_allclose(alone, together, atol=1e-9)
+    assert [training.decide(values[None])[0] for values in examples.values] == training.decide(examples.values)
+
+
+def test_the_same_examples_make_the_same_model(training, name, examples):
+    again = learn(name, examples)
+    np.testing.assert_array_equal(again.predict_log_proba(examples.values), training.predict_log_proba(examples.values))
+
+
+def test_a_model_predicts_the_same_after_it_was_saved(training, examples, tmp_path):
+    loaded = load_model(training.save(tmp_path / 'm'))
+    np.testing.assert_array_equal(
+        loaded.predict_log_proba(examples.values), training.predict_log_proba(examples.values)
+    )
+
+
+@pytest.mark.parametrize('factor', [1e-6, 1e6])
+def test_the_unit_of_the_features_does_not_matter(training, name, examples, factor):
+    scaled = dataclasses.replace(examples, values=examples.values * factor)
+    agree = np.array(learn(name, scaled).decide(scaled.values)) == np.array(training.decide(examples.values))
+    assert agree.mean() > 0.97  # what is iterated may stop a hair elsewhere
+
+
+@pytest.mark.parametrize(
+    'more',
+    [lambda values: values, lambda values: np.full_like(values, 0.1), lambda values: 1e6 + 1e-9 * values],
+    ids=['duplicated', 'constant', 'almost constant'],
+)
+def test_features_that_report_nothing_new_do_no_harm(name, make_examples, more):
+    def widened(examples):
+        values = np.concatenate((examples.values, more(examples.values)), axis=1)
+        return dataclasses.replace(examples, values=values, names=tuple(map(str, range(values.shape[1]))))
+
+    model, fresh = learn(name, widened(make_examples())), widened(make_examples(seed=1))
+    assert np.isfinite(model.predict_log_proba(fresh.values)).all()
+    assert accuracy(model, fresh) > (
+        0.5 if name == 'texture_papers.kaboli:EmMixture' else 0.85
+    )  # clusters are found without labels
+
+
+def test_features_that_report_nothing_at_all_give_finite_answers(name, examples):
+    model = learn(name, dataclasses.replace(examples, values=np.ones_like(examples.values)))
+    assert np.isfinite(model.predict_log_proba(np.ones((3, 6)))).all()
+
+
+@pytest.mark.parametrize(('slides', 'windows'), [(1, 1), (2, 1), (1, 2)])
+def test_one_or_two_windows_of_a_label_are_enough_to_answer(name, make_examples, slides, windows):
+    examples = make_examples(slides=slides, windows=windows)
+    model = learn(name, examples)
+    assert np.isfinite(model.predict_log_proba(examples.values)).all()
+    assert model.labels == ('cork', 'felt', 'slate', 'wood')
+
+
+@pytest.mark.parametrize('n_labels', [2, 3])
+def test_few_labels_are_reported_apart_in_the_right_direction(name, make_examples, n_labels):
+    labels = ('cork', 'felt', 'wood')[:n_labels]
+    assert accuracy(learn(name, make_examples(labels=labels)), make_examples(seed=1, labels=labels)) > 0.85
+
+
+def test_labels_of_unequal_numbers_are_all_trained_on(name, make_examples):
+    many, few = make_examples(), make_examples(seed=4, slides=1, windows=3)
+    rows = np.concatenate(
+        [np.flatnonzero(many.labels != 'felt'), len(many.labels) + np.flatnonzero(few.labels == 'felt')]
+    )
+    both = dataclasses.replace(
+        many,
+        values=np.concatenate((many.values, few.values))[rows],
+        labels=np.concatenate((many.labels, few.labels))[rows],
+        groups=np.concatenate((many.groups, few.groups))[rows],
+    )
+    assert np.isfinite(learn(name, both).predict_log_proba(many.values)).all()
+
+
+def test_a_single_label_is_refused_with_a_sentence(name, make_examples):
+    with pytest.raises(InvalidData, match="all windows are of 'cork'"):
+        learn(name, make_examples(labels=('cork',)))
+
+
+# Each against scikit-learn, on other examples than those trained on
+
+
+@pytest.fixture(scope='module', params=[2, 5])
+def task(request, make_examples):
+    labels = tuple(f'm{number}' for number in range(request.param))
+    examples = make_examples(labels=labels, spread=2.0)
+    return examples, *codes_of(examples), make_examples(seed=5, labels=labels, spread=3.0).values
+
+
+def evaluated(learner, examples, codes, groups, fresh):
+    parameters = learner.fit(examples.values, codes, groups).parameters
+    return learner.predictor(parameters), learner.predictor(parameters)(fresh)
+
+
+def test_pairwise_machines_decide_as_scikit_learn_with_the_kernel_of_matlab(task):
+    examples, codes, _, fresh = task
+    _, answers = evaluated(SvmPairs(box_constraint=2.0, kernel_scale=4.0), *task)
+    scaler = StandardScaler().fit(examples.values)
+    svc = SVC(C=2.0, gamma=1.0 / 16.0).fit(scaler.transform(examples.values), codes)
+    clear = ~is_tied(answers)
+    assert clear.mean() > 0.9
+    np.testing.assert_array_equal(answers.argmax(axis=1)[clear], svc.predict(scaler.transform(fresh))[clear])
+
+
+def test_pairwise_machines_without_standardising_use_the_values_as_they_are(task):
+    examples, codes, _, fresh = task
+    _, answers = evaluated(SvmPairs(standardise=False), *task)
+    svc = SVC(C=10.0, gamma=1.0 / 9.0).fit(examples.values, codes)
+    clear = ~is_tied(answers)
+    np.testing.assert_array_equal(answers.argmax(axis=1)[clear], svc.predict(fresh)[clear])
+
+
+@pytest.mark.parametrize('learner', [SvmPairs(kernel_scale=1e-5), SvmPairs(kernel_scale=1e5, box_constraint=0.01)])
+def test_the_ends_of_the_kernel_scale_give_finite_answers(task, learner):
+    assert np.isfinite(evaluated(learner, *task)[1]).all()
+
+
+def test_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
+    examples, codes, _, fresh = task
+    _, answers = evaluated(NaiveBayes(), *task)
+    scaler = StandardScaler().fit(examples.values)
+    expected = GaussianNB(var_smoothing=1e-9).fit(scaler.transform(examples.values), codes)
+    np.testing.assert_allclose(answers, expected.predict_log_proba(scaler.transform(fresh)), atol=1e-6)
+
+
+def test_counted_naive_bayes_reports_labels_of_one_mean_and_width_apart_that_normal_distributions_cannot():
+    rng = np.random.default_rng(0)
+    flat, forked = rng.uniform(-1.0, 1.0, (300, 1)), rng.choice([-0.577, 0.577], (300, 1))  # variance 1/3 both
+    values, codes = np.concatenate((flat, forked)), np.repeat([0, 1], 300)
+    parameters = NaiveBayes(bins=9).fit(values, codes, np.arange(600)).parameters
+    predict = NaiveBayes.predictor(parameters)
+    assert predict(np.array([[0.577], [0.0]])).argmax(axis=1).tolist() == [1, 0]
+    np.testing.assert_allclose(np.exp(parameters['log_shares']).sum(axis=1), 1.0)
+    np.testing.assert_array_equal(predict(values[:5]), [predict(row) for row in values[:5]])
+    assert np.isfinite(predict(np.array([1e9, -1e9])[:, None])).all()
+
+
+def test_counted_naive_bayes_gives_the_probabilities_of_scikit_learn(task):
+    examples, codes, _, fresh = task
+    parameters = NaiveBayes(bins=4).fit(examples.values, codes, np.arange(len(codes))).parameters
+    known = [bins_of(values, parameters['edges']) for values in (examples.values, fresh)]
+    expected = CategoricalNB(min_categories=4).fit(known[0], codes)
+    np.testing.assert_allclose(NaiveBayes.predictor(parameters)(fresh), expected.predict_log_proba(known[1]), atol=1e-9)
+
+
+@pytest.mark.parametrize('learner', [SvmPairs(ties='nearest'), AnnPairs(ties='nearest', iterations=3)])
+def test_pairwise_learners_give_ties_to_the_clearer_label_if_asked_and_change_nothing_else(task, learner):
+    strict = evaluated(dataclasses.replace(learner, ties='unclassified'), *task)[1]
+    nearest = evaluated(learner, *task)[1]
+    clear = ~is_tied(strict)
+    np.testing.assert_array_equal(nearest.argmax(axis=1)[clear], strict.argmax(axis=1)[clear])
+    assert not is_tied(nearest).any()
+
+
+def test_linear_machines_decide_every_window_as_scikit_learn(task):
+    examples, codes, _, fresh = task
+    learner = SvmLinear(least_c=0.5, most_c=0.5, candidates=1, repeats=1)
+    _, answers = evaluated(learner, *task)
+    scaler = StandardScaler().fit(examples.values)
+    svc = SVC(C=0.5, kernel='linear', break_ties=True).fit(scaler.transform(examples.values), codes)
+    np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(scaler.transform(fresh)))
+
+
+def test_the_penalty_is_the_smallest_of_those_that_do_best(examples):
+    codes, groups = codes_of(examples)
+    fitted = SvmLinear(repeats=2, candidates=3, least_c=1e-9, most_c=1e3).fit(examples.values, codes, groups)
+    assert 'C = 1e-09' not in fitted.note
+
+
+def test_max_wins_on_principal_components_decides_every_window_as_scikit_learn(task):
+    examples, codes, _, fresh = task
+    predict, answers = evaluated(SvmMaxWins(variance=0.9, gamma=1.0, c=3.0), *task)
+    project = lambda values: (values - examples.values.mean(axis=0)) @ predict.components  # noqa: E731
+    svc = SVC(C=3.0, gamma='scale', break_ties=True).fit(project(examples.values), codes)
+    np.testing.assert_array_equal(answers.argmax(axis=1), svc.predict(project(fresh)))
+
+
+def test_the_mixture_finds_the_clusters_of_scikit_learn(task):
+    examples, codes, _, fresh = task
+    predict, _ = evaluated(EmMixture(starts=1), *task)
+    scaler = StandardScaler().fit(examples.values)
+    mixture = GaussianMixture(len(np.unique(codes)), reg_covar=1e-3, random_state=0).fit(
+        scaler.transform(examples.values)
+    )
+    np.testing.assert_array_equal(
+        predict.cluster_scores(fresh).argmax(axis=1), mixture.predict(scaler.transform(fresh))
+    )
+
+
+def test_a_label_without_a_cluster_is_never_recognised():
+    values = np.concatenate((np.zeros((8, 1)), np.ones((8, 1)))) + 0.01 * np.arange(16)[:, None]
+    codes = np.array([0] * 8 + [1] * 7 + [2])
+    parameters = EmMixture(seed=1).fit(np.repeat(values, 2, axis=1), codes, np.arange(16)).parameters
+    assert set(EmMixture.predictor(parameters)(np.repeat(values, 2, axis=1)).argmax(axis=1)) == {0, 1}
+
+
+# The parts that learners are made of
+
+
+def test_votes_are_counted_and_a_tie_of_three_is_undecided():
+    votes = PairVotes(3)
+    first_wins = np.array([[True, True, True], [True, False, True], [False, True, False]])
+    assert votes.won(first_wins).tolist() == [[2, 1, 0], [1, 1, 1], [1, 1, 1]]
+    assert is_tied(votes.won(first_wins)).tolist() == [False, True, True]
+    assert votes.won_clearly(np.array([3.0, -1.0, 1.0])).argmax() == 0
+
+
+@pytest.mark.parametrize('transfer', ['sigmoid', 'linear'])
+def test_a_step_is_the_same_by_weights_and_by_examples(transfer):
+    rng = np.random.default_rng(2)
+    network = Network.random(7, 3, rng, transfer)
+    values, residual = rng.normal(size=(20, 3)), rng.normal(size=20)
+    by_weights, by_examples = _by_weights(network, values), _by_examples(network, values)
+    steps = [
+        form.step(np.linalg.solve(form.curvature + 0.1 * np.eye(len(form.curvature)), form.slope(residual)))
+        for form in (by_weights, by_examples)
+    ]
+    np.testing.assert_allclose(by_weights.output, by_examples.output)
+    np.testing.assert_allclose(*steps, atol=1e-10)
+
+
+@pytest.mark.parametrize('transfer', ['sigmoid', 'linear'])
+def test_the_jacobian_of_a_network_is_its_slope(transfer):
+    rng = np.random.default_rng(0)
+    network = Network.random(4, 3, rng, transfer)
+    values = rng.normal(size=(5, 3))
+    output, jacobian = network.jacobian(values)
+    step = 1e-6 * rng.normal(size=jacobian.shape[1])
+    np.testing.assert_allclose(network.moved(step)(values) - output, jacobian @ step, atol=1e-10)
+
+
+@pytest.mark.parametrize('n_hidden', [1, 5])
+def test_a_network_with_a_linear_hidden_layer_is_the_plane_of_least_squares(n_hidden):
+    rng = np.random.default_rng(4)
+    values, targets = rng.normal(size=(60, 3)), rng.normal(size=60)
+    start = Network.random(n_hidden, 3, rng, 'linear')
+    network = fit_network(start, values, targets, np.zeros(60, dtype=bool), 500)
+    extended = np.column_stack((values, np.ones(60)))
+    plane = np.linalg.lstsq(extended, targets, rcond=None)[0]
+    np.testing.assert_allclose(network(values), extended @ plane, atol=1e-3)
+
+
+def test_a_network_learns_exclusive_or():
+    values = np.array([[0, 0], [0, 1], [1, 0], [1, 1]], dtype=float) * 2 - 1
+    targets = np.array([0.0, 1.0, 1.0, 0.0])
+    start = Network.random(6, 2, np.random.default_rng(1))
+    network = fit_network(start, values, targets, np.zeros(4, dtype=bool), 100)
+    np.testing.assert_allclose(network(values), targets, atol=0.01)
+
+
+def test_a_network_with_noise_stops_before_it_learns_the_noise():
+    rng = np.random.default_rng(2)
+    values, targets = rng.normal(size=(140, 5)), rng.integers(0, 2, 140).astype(float)
+    held = np.arange(140) % 7 == 6
+    network = fit_network(Network.random(20, 5, rng), values, targets, held, 200)
+    assert np.mean((network(values[~held]) > 0.5) == targets[~held]) < 0.9
+
+
+def test_outputs_of_all_networks_together_are_those_of_each(task):
+    examples, codes, groups, fresh = task
+    parameters = AnnPairs().fit(examples.values, codes, groups).parameters
+    outputs = AnnPairs.predictor(parameters).outputs(fresh)
+    standard = (fresh - parameters['mean']) / parameters['scale']
+    for pair in range(len(parameters['out_bias'])):
+        network = Network(
+            *(parameters[part][pair] for part in ('hidden', 'hidden_bias', 'out')), parameters['out_bias'][pair]
+        )
+        np.testing.assert_allclose(outputs[:, pair], network(standard), atol=1e-9)
+
+
+def test_an_example_that_is_far_enough_moves_no_plane_and_another_just_so_far_as_needed():
+    online = OnlineLinearClassifier(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]))
+    online.update(np.array([2.0, 0.0]), 0)
+    assert online.planes.tolist() == [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]
+    online.update(np.array([0.0, 1.0]), 0)
+    np.testing.assert_allclose(online.planes @ [0.0, 1.0, 1.0], [1.0, -1.0])
+
+
+def test_no_example_moves_a_plane_further_than_c():
+    online = OnlineLinearClassifier(np.zeros((2, 2)), c=0.1)
+    online.update(np.array([0.1]), 0)
+    np.testing.assert_allclose(online.planes, [[0.01, 0.1], [-0.01, -0.1]])
+
+
+@pytest.mark.parametrize('c', [0.01, 1.0])
+def test_multi_class_planes_move_as_little_as_the_example_demands(c):
+    # Crammer et al. 2006, section 8: least ||W - W'||² / 2 + c · slack, the true label ahead of its strongest rival.
+    rng = np.random.default_rng(3)
+    for code in range(3):
+        planes, values = rng.normal(size=(3, 4)), rng.normal(size=3)
+        extended = np.append(values, 1.0)
+        scores = planes @ extended
+        rival = max(set(range(3)) - {code}, key=lambda label: scores[label])
+
+        def cost(unknown, planes=planes):
+            return 0.5 * np.square(unknown[:-1] - planes.ravel()).sum() + c * unknown[-1]
+
+        def margin(unknown, code=code, rival=rival, extended=extended):
+            weights = unknown[:-1].reshape(3, 4)
+            return (weights[code] - weights[rival]) @ extended - 1.0 + unknown[-1]
+
+        least = minimize(
+            cost,
+            np.append(planes.ravel(), 10.0),
+            method='SLSQP',
+            constraints=[{'type': 'ineq', 'fun': margin}, {'type': 'ineq', 'fun': lambda unknown: unknown[-1]}],
+            options={'ftol': 1e-12, 'maxiter': 200},
+        )
+        online = CrammerSingerClassifier(planes.copy(), c)
+        online.update(values, code)
+        np.testing.assert_allclose(online.planes, least.x[:-1].reshape(3, 4), atol=1e-4)
+
+
+def test_two_labels_learn_together_what_opposite_planes_of_half_the_length_learn():
+    rng = np.random.default_rng(0)
+    together, apart = CrammerSingerClassifier(np.zeros((2, 3)), 5.0), OnlineLinearClassifier(np.zeros((2, 3)), 10.0)
+    for _ in range(20):
+        values, code = rng.normal(size=2), int(rng.integers(2))
+        together.update(values, code)
+        apart.update(values, code)
+        np.testing.assert_allclose(together.planes[0] - together.planes[1], apart.planes[0], atol=1e-12)
+
+
+def test_online_learning_may_stop_after_some_examples_of_each_label(make_examples):
+    examples = make_examples(spread=0.5)
+    codes, groups = codes_of(examples)
+    after_three = PassiveAggressive(rounds=3).fit(examples.values, codes, groups).parameters
+    first = np.sort(np.concatenate([np.flatnonzero(codes == code)[:3] for code in range(4)]))
+    alone = PassiveAggressive().fit(examples.values[first], codes[first], groups[first]).parameters
+    np.testing.assert_allclose(after_three['planes'], alone['planes'], atol=1e-9)
+    assert np.mean(PassiveAggressive.predictor(after_three)(examples.values).argmax(axis=1) == codes) > 0.9
+
+
+@pytest.mark.parametrize('shape', [(50, 6), (5, 40)])
+def test_principal_components_are_orthonormal_and_explain_what_they_should(shape):
+    values = np.random.default_rng(0).normal(size=shape) * np.geomspace(1.0, 0.01, shape[1])
+    centred = values - values.mean(axis=0)
+    kept = principal_components(centred, 0.95)
+    np.testing.assert_allclose(kept.T @ kept, np.eye(kept.shape[1]), atol=1e-9)
+    explained = (centred @ kept).var(axis=0) / centred.var(axis=0).sum()
+    assert explained.sum() >= 0.95 > explained[:-1].sum()
+
+
+def test_components_of_examples_less_their_own_means_are_those_of_eq_7():
+    values = np.random.default_rng(0).normal(size=(40, 6)) + np.arange(6.0) + np.arange(40.0)[:, None]
+    codes = np.repeat([0, 1], 20)
+    parameters = SvmMaxWins(variance=0.9, centre='examples').fit(values, codes, np.arange(40)).parameters
+    centred = values - values.mean(axis=1, keepdims=True)  # eq. 7: the mean over k of x_i(k)
+    variances, vectors = np.linalg.eigh(centred.T @ centred / 40)  # eq. 8
+    shares = np.cumsum(variances[::-1]) / variances.sum()  # eq. 10
+    count = int((shares < 0.9).sum()) + 1
+    assert parameters['components'].shape == (6, count)
+    projected = (values - parameters['mean']) @ parameters['components']
+    np.testing.assert_allclose(np.abs(projected), np.abs(centred @ vectors[:, ::-1][:, :count]), atol=1e-9)
+
+
+def test_two_directions_have_components_of_their_own_and_odd_features_are_refused(examples):
+    codes, groups = codes_of(examples)
+    components = SvmMaxWins(blocks=2).fit(examples.values, codes, groups).parameters['components']
+    assert not ((components[:3] != 0).any(axis=0) & (components[3:] != 0).any(axis=0)).any()
+    with pytest.raises(InvalidParameter, match="'blocks' of svm_max_wins is 4"):
+        SvmMaxWins(blocks=4).fit(examples.values, codes, groups)

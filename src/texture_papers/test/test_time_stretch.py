@@ -1,0 +1,137 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidParameter
+from texture_core.window import Window
+from texture_features.catalogue import FEATURES
+from texture_features.feature import WindowBatch
+from texture_features.feature_set import FeatureSet
+from texture_features.windowing.time_stretch import Stretched, resample, stretched_lengths
+from texture_features.windowing.windows import CutWindow
+from texture_papers.roberge import SpectralPeaks
+
+RATE_HZ = 1000.0
+RECIPE = {'inputs': {'signal': {'stretch_to_m_s': 0.1, 'features': [{'log_bands': {'bands': 16}}, 'hjorth', 'speed']}}}
+
+
+def ridges(speed_m_s, pitch_m=2e-3, n_samples=500):
+    """Return what ridges give at a speed: a tone of speed / pitch."""
+    return np.sin(2 * np.pi * speed_m_s / pitch_m * np.arange(n_samples) / RATE_HZ)[:, None]
+
+
+@pytest.mark.parametrize('speed_m_s', [0.05, 0.1, 0.137, 0.2])
+def test_ridges_give_one_tone_at_any_speed(speed_m_s):
+    feature = Stretched(SpectralPeaks(peaks=1), 0.1)
+    frequency_hz, amplitude = feature(WindowBatch(ridges(speed_m_s), RATE_HZ, np.array(speed_m_s)))[0]
+    assert frequency_hz == pytest.approx(50.0, abs=1.0)
+    assert amplitude == pytest.approx(1.0, rel=0.1)
+
+
+def test_one_second_at_one_metre_a_second_is_half_a_second_at_two():
+    assert stretched_lengths(np.array(1.0), 1000, 2.0) == 500
+
+
+@pytest.mark.parametrize('speed_m_s', [np.nan, 0.0, -0.1])
+def test_an_unknown_or_no_speed_leaves_a_window_as_it_is(speed_m_s):
+    samples = np.random.default_rng(0).normal(size=(500, 2))
+    feature = FEATURES['hjorth']()
+    given = WindowBatch(samples, RATE_HZ, np.array(speed_m_s))
+    np.testing.assert_array_equal(Stretched(feature, 0.1)(given), feature(WindowBatch(samples, RATE_HZ)))
+
+
+def test_no_window_becomes_endless_or_empty():
+    speeds = np.array([1e-9, 1e9, np.inf])
+    np.testing.assert_array_equal(stretched_lengths(speeds, 500, 0.1), [50, 5000, 5000])
+    np.testing.assert_array_equal(stretched_lengths(speeds, 1, 0.1), [1, 1, 1])
+
+
+@pytest.mark.parametrize('length', [50, 333, 499, 500, 501, 1000])
+def test_a_line_stays_a_line(length):
+    line = 3.0 + 0.5 * np.arange(500.0)[:, None]
+    expected = 3.0 + 0.5 * np.arange(length) * 500 / length
+    middle = slice(length // 10, length - length // 10)
+    np.testing.assert_allclose(resample(line, length)[middle, 0], expected[middle], rtol=0.02)
+
+
+def test_what_would_lie_above_half_the_rate_is_left_out():
+    fast = np.sin(2 * np.pi * 400.0 * np.arange(500) / RATE_HZ)[:, None]
+    assert np.abs(resample(fast, 250)[10:-10]).max() < 0.05
+
+
+def test_the_stretched_feature_is_reported_the_new_speed():
+    class Told:
+        per_channel, names = False, ('',)
+
+        def __call__(self, windows):
+            return np.asarray(windows.speed_m_s)[..., None, None]
+
+    samples = np.zeros((3, 500, 1))
+    reported = Stretched(Told(), 0.1)(WindowBatch(samples, RATE_HZ, np.array([0.2, 0.0501, np.nan])))
+    np.testing.assert_allclose(reported[:, 0, 0], [0.1, 0.1, np.nan], rtol=0.01)
+
+
+def cut(speed_m_s, seed=0):
+    window = Window(np.random.default_rng(seed).normal(size=(500, 1)), RATE_HZ, ('c',))
+    return CutWindow(seed, 'e', 0.5, 0.1, {'signal': window}, speed_m_s=speed_m_s)
+
+
+def test_a_recipe_stretches_an_input_the_same_for_one_window_as_for_many():
+    feature_set = FeatureSet.from_mapping(RECIPE)
+    events = [cut(speed, seed) for seed, speed in enumerate([0.1, 0.15, np.nan, 0.15, 0.0, 0.2, 0.07])]
+    for event, vector in zip(events, feature_set.extract_many(events), strict=True):
+        np.testing.assert_array_equal(vector.values, feature_set.extract(event).values)
+        assert np.array_equal(vector.values[-1], event.speed_m_s, equal_nan=True)  # the speed is not stretched away
+    plain = FeatureSet.from_mapping({'inputs': {'signal': {'features': RECIPE['inputs']['signal']['features']}}})
+    assert plain.extract(events[0]).feature_set != feature_set.extract(events[0]).feature_set
+    assert plain.extract(events[0]).names == feature_set.extract(events[0]).names
+    np.testing.assert_array_equal(plain.extract(events[0]).values, feature_set.extract(events[0]).values)
+
+
+def test_a_stretched_recipe_written_out_is_the_same_again():
+    feature_set = FeatureSet.from_mapping(RECIPE)
+    assert FeatureSet.from_mapping(feature_set.as_mapping()) == feature_set
+
+
+def test_joined_inputs_see_both_windows_and_are_cut_from_both_topics():
+    recipe = {
+        'inputs': {
+            'finger1/signal': {'features': ['hjorth']},
+            'finger1/signal_static': {'features': ['texture_papers.kaboli:MeanHjorth']},
+            'finger1/signal+finger1/signal_static': {'features': ['texture_papers.kaboli:Correlation']},
+        }
+    }
+    feature_set = FeatureSet.from_mapping(recipe)
+    assert feature_set.topics == ('finger1/signal', 'finger1/signal_static')
+    rng = np.random.default_rng(0)
+    windows = {
+        'finger1/signal': Window(rng.normal(size=(500, 1)), RATE_HZ, ('pac',)),
+        'finger1/signal_static': Window(rng.normal(size=(50, 19)), 100.0, tuple(map(str, range(19)))),
+    }
+    events = [dataclasses.replace(cut(0.1), windows=windows)] * 2
+    vector = feature_set.extract_many(events)[1]
+    assert vector.names[-2:] == tuple(
+        f'finger1/signal+finger1/signal_static/texture_papers.kaboli:Correlation/{kind}'
+        for kind in ('pearson', 'spearman')
+    )
+    assert len(vector.names) == 8
+    np.testing.assert_array_equal(vector.values, feature_set.extract(events[0]).values)
+    assert FeatureSet.from_mapping(feature_set.as_mapping()) == feature_set
+
+
+@pytest.mark.parametrize(
+    ('inputs', 'sentence'),
+    [
+        ({'a+b': {'features': ['hjorth']}}, "describes one input; list it under 'a'"),
+        ({'a+a': {'features': ['texture_papers.kaboli:Correlation']}}, 'each once'),
+        ({'a+': {'features': ['texture_papers.kaboli:Correlation']}}, 'each once'),
+        ({'a+b': {'stretch_to_m_s': 0.1, 'features': ['texture_papers.kaboli:Correlation']}}, 'cannot be stretched'),
+        ({'a': {'stretch_to_m_s': -0.1, 'features': ['hjorth']}}, 'at least 0'),
+        ({'a': {'stretch_to': 0.1, 'features': ['hjorth']}}, "did you mean 'stretch_to_m_s'"),
+    ],
+)
+def test_a_wrong_input_gets_one_sentence(inputs, sentence):
+    with pytest.raises(InvalidParameter, match=sentence) as caught:
+        FeatureSet.from_mapping({'inputs': inputs})
+    assert '\n' not in str(caught.value)

@@ -1,0 +1,174 @@
+"""One model in which each pair of textures has features and a learner of its own."""
+
+import dataclasses
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from texture_core.errors import InvalidParameter, ModelMismatch, UnknownName
+from texture_estimation.classification.training import train
+from texture_estimation.learners.learner import of_examples
+from texture_estimation.log_probabilities import is_tied
+from texture_estimation.model import load_model
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.search.joined_pairs import joined_recipe
+from texture_papers.roberge import AnnPairs, SvmPairs, TunedPairs
+
+LABELS = ('cork', 'felt', 'slate', 'wood')
+NAMES = ('signal#1/a', 'signal#1/b', 'signal#2/a', 'signal#2/b', 'signal#2/c', 'signal#3/a')
+ENTRIES = [
+    {
+        'pair': ['felt', 'cork'],
+        'inputs': ['signal#1'],
+        'learner': {'texture_papers.roberge:SvmPairs': {'kernel_scale': 2.0}},
+    },
+    {
+        'pair': ['cork', 'slate'],
+        'inputs': ['signal#2', 'signal#3'],
+        'learner': {'texture_papers.roberge:AnnPairs': {'hidden': 5}},
+    },
+    {'pair': ['slate', 'wood'], 'inputs': ['signal#2'], 'learner': {'texture_papers.roberge:AnnPairs': {'hidden': 3}}},
+]
+COLUMNS = {('cork', 'felt'): [0, 1], ('cork', 'slate'): [2, 3, 4, 5], ('slate', 'wood'): [2, 3, 4]}
+LEARNERS = {
+    ('cork', 'felt'): SvmPairs(kernel_scale=2.0),
+    ('cork', 'slate'): AnnPairs(hidden=5),
+    ('slate', 'wood'): AnnPairs(hidden=3),
+}
+
+
+@pytest.fixture
+def tuned() -> TunedPairs:
+    return TunedPairs.from_recipe({'pairs': ENTRIES}, 'recipe').of_examples(NAMES, LABELS)
+
+
+@pytest.fixture
+def numbers(examples):
+    return tuple(np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+
+
+def test_each_pair_is_decided_by_its_own_learner_on_its_own_features_alone(tuned, examples, numbers, make_examples):
+    codes, groups = numbers
+    fresh = make_examples(seed=3).values
+    decisions = tuned.predictor(tuned.fit(examples.values, codes, groups).parameters).decisions(fresh)
+    for number, pair in enumerate(combinations(LABELS, 2)):
+        rows = np.isin(examples.labels, pair)
+        columns = COLUMNS.get(pair, list(range(6)))
+        learner = LEARNERS.get(pair, SvmPairs())
+        alone = learner.fit(examples.values[rows][:, columns], (examples.labels[rows] == pair[1]) * 1, groups[rows])
+        expected = learner.predictor(alone.parameters)(fresh[:, columns]).argmax(axis=1)
+        np.testing.assert_array_equal(decisions[:, number] <= 0, expected == 1)
+
+
+def test_a_feature_that_a_pair_does_not_see_does_not_move_its_decision(tuned, examples, numbers):
+    predictor = tuned.predictor(tuned.fit(examples.values, *numbers).parameters)
+    changed = examples.values.copy()
+    changed[:, 2:] += 100.0
+    before, after = predictor.decisions(examples.values), predictor.decisions(changed)
+    np.testing.assert_array_equal(before[:, 0], after[:, 0])  # cork and felt see the first two features
+    assert np.abs(before[:, 1] - after[:, 1]).max() > 0.1
+
+
+def test_the_pairs_won_decide_and_a_tie_is_unclassified(tuned, examples, numbers):
+    predictor = tuned.predictor(tuned.fit(examples.values, *numbers).parameters)
+    wins = np.zeros((len(examples.values), 4))
+    decisions = predictor.decisions(examples.values)
+    for number, (first, second) in enumerate(combinations(range(4), 2)):
+        wins[:, first] += decisions[:, number] > 0
+        wins[:, second] += decisions[:, number] <= 0
+    answers = predictor(examples.values)
+    np.testing.assert_array_equal(is_tied(answers), is_tied(wins))
+    np.testing.assert_array_equal(answers.argmax(axis=1), wins.argmax(axis=1))
+
+
+@pytest.fixture
+def recipe() -> Recipe:
+    section = {'features': ['hjorth']}
+    content = {
+        'inputs': {f'signal#{number}': section for number in (1, 2, 3)},
+        'learner': {'texture_papers.roberge:TunedPairs': {}},
+    }
+    content['learner']['texture_papers.roberge:TunedPairs']['pairs'] = ENTRIES
+    return Recipe.from_mapping(content, 'mine')
+
+
+def test_a_model_of_pairs_is_stored_as_arrays_and_loads_with_all_its_variables(recipe, examples, tmp_path):
+    named = dataclasses.replace(examples, names=NAMES)
+    model = train(recipe, named)
+    loaded = load_model(model.save(tmp_path / 'm'))
+    np.testing.assert_array_equal(loaded.predict_log_proba(named.values), model.predict_log_proba(named.values))
+    assert loaded.recipe.as_mapping() == recipe.as_mapping()
+    assert '3 of 6 pairs have variables of their own' in loaded.training['calibration']
+    assert b'SVC' not in (tmp_path / 'm.skops').read_bytes()
+    broken = {**model.parameters, 'n_pairs': 10}
+    with pytest.raises(ModelMismatch, match='10 pairs are decided by 6 learners'):
+        TunedPairs.predictor(broken)
+
+
+def test_pairs_of_textures_that_were_not_measured_are_left_out(recipe, make_examples):
+    two = make_examples(labels=('cork', 'plum'))
+    model = train(recipe, dataclasses.replace(two, names=NAMES))
+    assert '0 of 1 pairs have variables of their own' in model.training['calibration']
+
+
+def test_a_window_alone_of_forty_five_pairs_is_decided_as_in_a_batch(make_examples):
+    labels = tuple(f'm{number}' for number in range(10))
+    examples = make_examples(labels=labels, features=8)
+    codes, groups = (np.unique(column, return_inverse=True)[1] for column in (examples.labels, examples.groups))
+    learner = TunedPairs('texture_papers.roberge:AnnPairs', AnnPairs(hidden=3, iterations=3))
+    predictor = learner.predictor(learner.fit(examples.values, codes, groups).parameters)
+    alone = np.stack([predictor.decisions(values) for values in examples.values])
+    np.testing.assert_allclose(alone, predictor.decisions(examples.values), atol=1e-9)
+    assert alone.shape == (len(examples.values), 45)
+
+
+@pytest.mark.parametrize(
+    ('values', 'error', 'sentence'),
+    [
+        ({'pair': []}, InvalidParameter, "did you mean 'pairs'"),
+        ({'ties': 'random'}, InvalidParameter, "ties is 'random'; allowed is unclassified or nearest"),
+        ({'learner': 'mlp'}, UnknownName, "no learner of pairs 'mlp'"),
+        ({'pairs': [{'pair': ['cork']}]}, InvalidParameter, 'the labels of two textures are needed'),
+        ({'pairs': [{'pair': ['a', 'b'], 'input': []}]}, InvalidParameter, "did you mean 'inputs'"),
+        ({'pairs': ['cork']}, InvalidParameter, "pair 1: came 'cork'; a mapping with pair and learner is needed"),
+        ({'pairs': [{'pair': 'ab'}]}, InvalidParameter, "pair is 'ab'; a list of names is needed"),
+        ({'pairs': [{'pair': ['a', 'b']}, {'pair': ['b', 'a']}]}, InvalidParameter, 'is listed twice'),
+        ([1], InvalidParameter, 'a mapping with a list of pairs is needed'),
+    ],
+)
+def test_mistakes_in_a_recipe_are_named(values, error, sentence):
+    content = {'inputs': {'signal': {'features': ['hjorth']}}, 'learner': {'texture_papers.roberge:TunedPairs': values}}
+    with pytest.raises(error, match=sentence):
+        Recipe.from_mapping(content, 'mine')
+
+
+def test_an_input_that_no_feature_has_is_named(examples):
+    learner = TunedPairs.from_recipe({'pairs': [{'pair': ['cork', 'felt'], 'inputs': ['signal#9']}]}, 'recipe')
+    with pytest.raises(InvalidParameter, match=r"sees the input 'signal#9', which is not among .* \(signal\)"):
+        of_examples(learner, examples.names, LABELS)
+
+
+def test_names_are_asked_for_where_pairs_have_variables_of_their_own(examples, numbers):
+    with pytest.raises(InvalidParameter, match='the names of the features and textures are not known'):
+        TunedPairs.from_recipe({'pairs': ENTRIES}, 'recipe').fit(examples.values, *numbers)
+
+
+def test_the_recipes_of_pairs_become_one_with_equal_inputs_shared():
+    base = load_recipe('ets-linear-svm')
+    other = base.as_mapping()
+    other['inputs']['signal']['features'][0]['texture_papers.roberge:SpectralPeaks']['peaks'] = 3
+    changed = Recipe.from_mapping(other, 'other')
+    joined = joined_recipe({('a', 'b'): base, ('a', 'c'): changed, ('b', 'c'): base}, base)
+    assert [item.topic for item in joined.feature_set.inputs] == ['signal#1', 'signal#2']
+    assert [pair.inputs for pair in joined.learner.pairs] == [('signal#1',), ('signal#2',), ('signal#1',)]
+    assert joined.feature_set.windows == base.feature_set.windows
+    assert Recipe.from_mapping(joined.as_mapping(), joined.name).as_mapping() == joined.as_mapping()
+
+
+def test_pairs_that_differ_in_their_windows_are_not_joined():
+    base = load_recipe('ets-circular-svm')
+    other = base.as_mapping()
+    other['windows']['length_s'] = 0.1
+    with pytest.raises(InvalidParameter, match="differ in 'windows', which a model has once"):
+        joined_recipe({('a', 'b'): base, ('a', 'c'): Recipe.from_mapping(other, 'other')}, base)

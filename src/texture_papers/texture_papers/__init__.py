@@ -1,0 +1,1 @@
+"""Everything that is of the five papers: their features, learners and experiments."""

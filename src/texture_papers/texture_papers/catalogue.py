@@ -1,0 +1,68 @@
+"""The papers' experiments by name, rebuilt on simulated surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+
+from texture_core.catalogue import find
+from texture_papers import hu_experiment, jamali_experiment, kaboli_experiment, rispal_experiment, roberge_experiment
+from texture_papers.protocol import Experiment, ExperimentResult, Run, over_seeds
+from texture_papers.report import run
+
+PROTOCOLS = (
+    roberge_experiment.LINEAR,
+    roberge_experiment.CIRCULAR,
+    roberge_experiment.FINE,
+    jamali_experiment.PROTOCOL,
+    kaboli_experiment.PROTOCOL,
+    kaboli_experiment.SHAPES,
+    hu_experiment.PROTOCOL,
+)
+EXPERIMENTS: Mapping[str, Run] = {
+    **{protocol.name: partial(run, protocol) for protocol in PROTOCOLS},
+    'friction': roberge_experiment.run_friction,  # the further question of Roberge et al.
+    'hu-components': hu_experiment.run_components,  # how many components one linen takes
+    'roughness': rispal_experiment.run,  # Rispal et al.: grades of textures never touched
+}
+
+__all__ = ['EXPERIMENTS', 'Experiment', 'ExperimentResult', 'run_experiment', 'run_over_seeds']
+
+
+def run_experiment(name: str, experiment: Experiment) -> tuple[ExperimentResult, Path]:
+    """Run one experiment; return its result and the JSON file, beside which its charts lie.
+
+    Raises
+    ------
+    TextureError
+        If there is no such experiment or it cannot be run.
+    """
+    result = find(EXPERIMENTS, name, 'experiment')(experiment)
+    return result, result.write(experiment.out)
+
+
+def run_over_seeds(name: str, experiment: Experiment, count: int) -> tuple[ExperimentResult, Path]:
+    """Run one experiment with so many seeds from its own on; return what `run_experiment` does.
+
+    Parameters
+    ----------
+    name
+        Name of the experiment.
+    experiment
+        First seed, folder and options.
+    count
+        Number of seeds.
+
+    Returns
+    -------
+    (ExperimentResult, Path)
+        Means and intervals over the seeds, and the file they are in.
+
+    Raises
+    ------
+    TextureError
+        If there is no such experiment, it cannot be run, or there are fewer than two seeds.
+    """
+    result = over_seeds(find(EXPERIMENTS, name, 'experiment'), name, experiment, count)
+    return result, result.write(experiment.out)

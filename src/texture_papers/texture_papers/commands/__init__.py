@@ -1,0 +1,1 @@
+"""Subcommands of `texture` that this package brings."""

@@ -1,0 +1,41 @@
+"""`texture experiment`: rebuild a paper's experiment: its figures beside ours."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from texture_core.command_options import add_seed
+from texture_papers.catalogue import EXPERIMENTS, Experiment, run_experiment, run_over_seeds
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the sub-command."""
+    parser.add_argument('name', help=f'one of {", ".join(EXPERIMENTS)}')
+    parser.add_argument('--out', type=Path, default=Path('docs/charts'), metavar='DIR', help='folder for the results')
+    parser.add_argument('--quick', '--reduced', action='store_true', help='fewer slides; not for publishing')
+    parser.add_argument(
+        '--tune', action='store_true', help="search the recipe's parameters first, as the paper does, if it can"
+    )
+    parser.add_argument(
+        '--seeds', type=int, default=1, metavar='N', help='so many seeds from --seed on: mean and interval over them'
+    )
+    add_seed(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run one experiment, print its table and name the files."""
+    experiment = Experiment(options.out, options.seed, options.quick, options.tune)
+    if options.seeds == 1:
+        result, path = run_experiment(options.name, experiment)
+    else:
+        result, path = run_over_seeds(options.name, experiment, options.seeds)
+    if options.quick:
+        print('REDUCED: fewer slides, not comparable with a published figure')
+    print(f'{result.name}: {result.measured}')
+    print(f'data: {result.data}; split: {result.split}')
+    for line in result.lines:
+        print(line)
+    for file in (path, *result.charts):
+        print(f'  {file}')
+    return 0

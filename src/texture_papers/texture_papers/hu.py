@@ -1,0 +1,238 @@
+"""Fabrics by a finger of PVDF (Hu et al. 2014): power spectrum, principal components, machines by Max Wins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.catalogue import find
+from texture_core.errors import InvalidParameter
+from texture_core.parameters import param
+from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.pair_coupling import uncalibrated
+from texture_estimation.learners.svm_predictor import SvmPredictor, export
+from texture_estimation.log_probabilities import log_softmax
+from texture_features.feature import WindowBatch
+from texture_features.spectra.spectrum import long_densities
+from texture_papers.roberge import PairVotes
+
+SCALES: Mapping[str, Callable[[Array, float], Array]] = {
+    'log': lambda density, floor: np.log(density + floor),
+    'power': lambda density, floor: density,
+    'magnitude': lambda density, floor: np.sqrt(density),
+}
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Power spectral density at equal steps up to half the sampling rate, its square root or its logarithm.
+
+    Meant for a learner that begins with principal components. A window shorter than 2 · `points` is padded with zeros;
+    of a longer one the mean over segments of that length, half overlapping, is taken.
+
+    Source: Hu et al. 2014, section 4.1 (12 288 points there).
+
+    Examples
+    --------
+    >>> tone = np.sin(2 * np.pi * 100.0 * np.arange(1000) / 1000.0)[:, None]
+    >>> spectrum = Spectrum(points=500)(WindowBatch(tone, rate_hz=1000.0))  # at 1, 2, … 500 Hz
+    >>> int(spectrum[0].argmax()) + 1
+    100
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    points: int = param(
+        12288,
+        'Sets the number of frequency bins k · rate / (2 · points), k from 1; more bins resolve finer.',
+        low=2,
+        high=1 << 19,
+    )
+    scale: str = param(
+        'log',
+        "Sets what is given of the power density: its logarithm 'log', 'power' itself, or its square root 'magnitude'.",
+        choices=tuple(SCALES),
+    )
+    floor: float = param(
+        1e-20,
+        'Power density added before the logarithm, so that silence gives a finite value, unit²/Hz.',
+        low=1e-300,
+        high=1e300,
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Number of the frequency, from 1."""
+        return tuple(str(point + 1) for point in range(self.points))
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return log(density + floor), the density, or its square root."""
+        density = long_densities(windows.rows, windows.rate_hz, self.points)
+        return find(SCALES, self.scale, 'scale of the spectrum')(density, self.floor)
+
+
+CACHE_MB = 500
+TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class SvmMaxWins:
+    """The first principal components that explain most of the variance, and RBF machines for all pairs of labels.
+
+    The label that wins most pairs is taken; ties are broken by the clearer decisions.
+
+    Source: Hu et al. 2014, section 4: 99 % of the variance, for each of two directions, joined.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = SvmMaxWins().fit(values, codes, groups)
+    >>> predictor = SvmMaxWins.predictor(fitted.parameters)
+    >>> isinstance(predictor, PcaSvmPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
+    """
+
+    variance: float = param(
+        0.99,
+        'Sets the fraction of the variance that the kept principal components explain; a larger one keeps '
+        'more of them.',
+        low=0.01,
+        high=1.0,
+    )
+    blocks: int = param(
+        1,
+        'Sets the number of equal feature blocks with separate components, such as the directions x and y.',
+        low=1,
+        high=64,
+    )
+    c: float = param(
+        10.0,
+        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        low=1e-6,
+        high=1e9,
+    )
+    gamma: float = param(
+        1.0, 'Gamma of the kernel exp(-gamma d² / (n_components · variance)); larger is narrower.', low=1e-9, high=1e9
+    )
+
+    centre: str = param(
+        'features',
+        "Sets what is subtracted before the components are sought: 'features' the mean of each feature over the "
+        "examples, 'examples' the mean of each example over its features, as eq. 7 of the paper has it.",
+        choices=('features', 'examples'),
+    )
+
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
+
+        Raises
+        ------
+        InvalidParameter
+            If the features cannot be cut into the blocks.
+        """
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415  # scikit-learn takes a second to import
+        from sklearn.svm import SVC  # noqa: PLC0415
+
+        mean, components = self._components(X)
+        projected = (X - mean) @ components
+        # The machine expects a scaler: one that changes the unit of all components alike, or not at all.
+        unit = float(projected.std()) or 1.0
+        scaler = StandardScaler().fit(projected)
+        scaler.mean_, scaler.scale_ = np.zeros(projected.shape[1]), np.full(projected.shape[1], unit)
+        gamma = self.gamma / projected.shape[1]
+        svc = SVC(C=self.c, kernel='rbf', gamma=gamma, cache_size=CACHE_MB).fit(projected / unit, y)
+        parameters = {'mean': mean, 'components': components, 'scaler': scaler, 'svc': svc}
+        return Fitted(parameters, None, f'not calibrated: pairs won; {components.shape[1]} principal components')
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> PcaSvmPredictor:
+        """Return the predictor made from the stored parameters."""
+        n_labels = len(parameters['svc'].n_support_)
+        svm = export(parameters['scaler'], parameters['svc'], uncalibrated(n_labels))
+        return PcaSvmPredictor(parameters['mean'], parameters['components'], svm, PairVotes(n_labels))
+
+    def _components(self, values: Array) -> tuple[Array, Array]:
+        """Return the mean, (n_features,), and the components of all blocks, (n_features, n_components).
+
+        Where the mean of each example is subtracted, the components hold that: x - mean(x) projected on p is x
+        projected on p - mean(p).
+        """
+        n_features = values.shape[1]
+        if n_features % self.blocks:
+            raise InvalidParameter(
+                f"parameter 'blocks' of svm_max_wins is {self.blocks}, which does not divide {n_features} features; "
+                'give as many blocks as directions are joined'
+            )
+        of_examples = self.centre == 'examples'
+        mean = np.zeros(n_features) if of_examples else values.mean(axis=0)
+        size = n_features // self.blocks
+        found = [
+            principal_components(part - part.mean(axis=int(of_examples), keepdims=True), self.variance)
+            for part in np.split(values, self.blocks, axis=1)
+        ]
+        components = np.zeros((n_features, sum(part.shape[1] for part in found)))
+        column = 0
+        for block, part in enumerate(found):
+            own = part - part.mean(axis=0) if of_examples else part
+            components[block * size : (block + 1) * size, column : column + part.shape[1]] = own
+            column += part.shape[1]
+        return mean, components
+
+
+@dataclass(frozen=True, eq=False)
+class PcaSvmPredictor:
+    """Machines of all pairs on principal components.
+
+    Parameters
+    ----------
+    mean : (n_features,)
+    components : (n_features, n_components)
+    svm, votes
+        What decides between pairs, and counts them.
+    """
+
+    mean: Array
+    components: Array
+    svm: SvmPredictor
+    votes: PairVotes
+
+    def __call__(self, X: Array) -> Array:
+        """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""
+        return log_softmax(self.votes.won_clearly(self.svm.decisions((X - self.mean) @ self.components)))
+
+
+def principal_components(centred: Array, share: float) -> Array:
+    """Return the fewest components, (n_features, n_components), that explain a share of the variance; at least one.
+
+    Parameters
+    ----------
+    centred : (n, n_features)
+        Zero mean.
+    share
+        Fraction of the variance that they explain at least, 0 to 1.
+
+    Returns
+    -------
+    (n_features, n_components)
+        Orthonormal columns, the one of the largest variance first.
+
+    Source: Hu et al. 2014, eq. 7 to 12.
+    """
+    n, n_features = centred.shape
+    # The smaller of the two products has the same variances; its vectors lead to those of the other.
+    wide = n < n_features
+    variances, vectors = np.linalg.eigh(centred @ centred.T if wide else centred.T @ centred)
+    variances, vectors = np.maximum(variances[::-1], 0.0), vectors[:, ::-1]
+    total = float(variances.sum())
+    if total <= 0.0:
+        return np.eye(n_features, 1)
+    explained = np.cumsum(variances) / total
+    count = int(np.searchsorted(explained, share - TINY)) + 1
+    kept = vectors[:, : min(count, int((variances > TINY * variances[0]).sum()))]
+    return np.asarray(centred.T @ kept / np.sqrt(variances[: kept.shape[1]]) if wide else kept)

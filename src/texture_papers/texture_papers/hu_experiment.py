@@ -1,0 +1,185 @@
+"""Five linens measured along x and along y (Hu et al. 2014)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from texture_core.arrays import Array
+from texture_core.errors import InvalidParameter
+from texture_papers.hu import principal_components
+from texture_papers.protocol import (
+    FEW,
+    OURS,
+    Anchor,
+    Experiment,
+    ExperimentResult,
+    Figures,
+    Finding,
+    Method,
+    MethodResults,
+    PaperProtocol,
+    RecognitionTask,
+    Slides,
+    View,
+    Visits,
+    digest_of,
+    drawn,
+    gather,
+    mean,
+    recipe_of,
+)
+from texture_papers.report import better_on, finding_as_json, higher
+from texture_simulation.scene import load_scene
+from texture_simulation.simulated_slide import SimulatedSlide
+
+TASK = 'five linens'
+SLIDE_S = 3.0
+BOTH, ONE = 'hu-pca-svm-xy', 'hu-pca-svm'
+X_ONLY, Y_ONLY = f'{ONE}, x alone', f'{ONE}, y alone'
+LOG, POWER, CENTRED = f'{BOTH}, logarithm', f'{BOTH}, power', f'{BOTH}, mean of the features subtracted'
+ALONG_X_AND_Y = (View(), View(turned_rad=math.pi / 2))
+
+
+def findings(outcomes: MethodResults) -> list[Finding]:
+    """Check what section 5 tells."""
+    both, x_only, y_only = (outcomes[TASK, name] for name in (BOTH, X_ONLY, Y_ONLY))
+    log, power = (outcomes[TASK, name] for name in (LOG, POWER))
+    return [
+        better_on('linen 1, which differs between x and y, is distinguished best (100 %)', both, 'linen_1'),
+        higher('x and y joined are better than x alone', both, x_only),
+        higher('x and y joined are better than y alone', both, y_only),
+        higher('not of the paper: magnitudes distinguish better than powers', both, power),
+        higher('not of the paper: magnitudes distinguish better than their logarithm', both, log),
+    ]
+
+
+PROTOCOL = PaperProtocol(
+    name='hu',
+    scene='hu',
+    paper='Hu et al. 2014, "A finger-shaped tactile sensor for fabric surfaces evaluation", section 5',
+    tasks=(
+        RecognitionTask(
+            TASK,
+            (Visits('25.5 mm/s, 1.5 N', 60, SimulatedSlide(0.0255, 1.5, SLIDE_S), ALONG_X_AND_Y),),
+            (
+                Method(BOTH, Figures(test=0.92)),
+                Method(ONE, label=X_ONLY, views=(0,), splits=FEW),
+                Method(ONE, label=Y_ONLY, views=(1,), splits=FEW),
+                Method(BOTH, features={'texture_papers.hu:Spectrum': {'scale': 'power'}}, label=POWER, splits=FEW),
+                Method(BOTH, features={'texture_papers.hu:Spectrum': {'scale': 'log'}}, label=LOG, splits=FEW),
+                Method(BOTH, learner={'centre': 'features'}, label=CENTRED, splits=FEW),
+                replace(OURS, splits=2),
+            ),
+        ),
+    ),
+    divide=drawn(2 / 3, 10),
+    split='10 random draws of 200 of the 300 places for training',
+    anchor=Anchor(
+        TASK,
+        BOTH,
+        0.92,
+        'table 1',
+        setting='how near linen 4 is to linen 3, so that these are confused is built in',
+    ),
+    findings=findings,
+    quick_count=10,
+)
+
+
+NAME, PAPER = 'hu-components', 39
+COMPONENT_METHODS = {'magnitude': BOTH, 'power': POWER, 'logarithm': LOG}
+DIRECTIONS = ('x', 'y')
+QUICK = ('linen_2', 'linen_3')  # fewer slides could not have 39 components
+Counts = Mapping[str, Mapping[str, Mapping[str, int]]]  # by scale, direction and linen
+
+
+def run_components(experiment: Experiment) -> ExperimentResult:
+    """Count the components of each linen in each direction, of magnitudes, powers and their logarithms.
+
+    Raises
+    ------
+    InvalidParameter
+        If a search is asked for.
+    """
+    if experiment.tune:
+        raise InvalidParameter(f"experiment '{NAME}' has nothing to tune; leave --tune out")
+    [task] = PROTOCOL.tasks
+    task = replace(task, surfaces=QUICK) if experiment.quick else task
+    slides = gather(load_scene(PROTOCOL.scene), task, experiment.seed, slow=False)
+    counts = {scale: components(slides, method) for scale, method in COMPONENT_METHODS.items()}
+    return ExperimentResult(
+        name=NAME,
+        measured='principal components that hold 99 % of the variance of the slides over one linen in one direction',
+        data=f"simulated: scene '{PROTOCOL.scene}', {task.visits[0].count} slides of each linen along x and along y",
+        split='none: components are sought on all slides over one linen',
+        numbers={
+            'seed': experiment.seed,
+            'recipes': {BOTH: digest_of(BOTH)},
+            'paper': PAPER,
+            'components': counts,
+            'findings': [finding_as_json(finding) for finding in component_findings(counts)],
+        },
+        lines=tuple(
+            f'{scale}, along {direction}: {", ".join(f"{name} {count}" for name, count in linens.items())}'
+            for scale, directions in counts.items()
+            for direction, linens in directions.items()
+        ),
+    )
+
+
+def components(slides: Slides, method: str) -> Mapping[str, Mapping[str, int]]:
+    """Return by direction and linen how many components the recipe of a method of the experiment keeps of one linen."""
+    recipe = recipe_of(next(one for one in PROTOCOL.tasks[0].methods if one.name == method))
+    values, owner = slides.extract(recipe.feature_set)
+    share = recipe.learner.variance  # type: ignore[attr-defined]  # of SvmMaxWins
+    return {
+        direction: {linen: kept(part[slides.codes[owner] == code], share) for code, linen in enumerate(slides.surfaces)}
+        for direction, part in zip(DIRECTIONS, np.split(values, len(DIRECTIONS), axis=1), strict=True)
+    }
+
+
+def kept(values: Array, share: float) -> int:
+    """Return how many components explain a share of the variance, the mean of each example subtracted (eq. 7).
+
+    Parameters
+    ----------
+    values : (n_slides, n_points)
+        Spectra.
+    share
+        Fraction of the variance, 0 to 1.
+
+    Returns
+    -------
+    int
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> kept(np.array([[3.0, -3.0, 0.0, 0.0], [0.0, 0.0, 0.1, -0.1]]), 0.99)
+    1
+    """
+    return principal_components(values - values.mean(axis=1, keepdims=True), share).shape[1]
+
+
+def component_findings(counts: Counts) -> list[Finding]:
+    """Check the 39 components of the paper with each reading of its spectrum, over linens and directions."""
+    found = {scale: np.array([[*of.values()] for of in parts.values()]).ravel() for scale, parts in counts.items()}
+    away = {scale: np.abs(values - PAPER) for scale, values in found.items()}
+    return [
+        *(_component_finding(f'one linen takes {PAPER} components or more: {scale}', values - PAPER, values,
+                             reaches=True)
+          for scale, values in found.items()),
+        *(_component_finding(f'not of the paper: magnitudes are nearer to its {PAPER} components than the {other}',
+                   away[other] - away['magnitude'], found[other], reaches=False)
+          for other in ('power', 'logarithm')),
+    ]  # fmt: skip
+
+
+def _component_finding(claim: str, difference: Array, values: Array, *, reaches: bool) -> Finding:
+    interval = mean(difference)
+    holds = interval.high >= 0.0 if reaches else interval.above()
+    return Finding(claim, f'{values.mean():.1f} components, {values.min()} to {values.max()}', interval, holds, reaches)

@@ -1,0 +1,659 @@
+"""Objects in a hand by texture (Kaboli et al. 2015): Hjorth parameters, correlations; three learners."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+from texture_core.catalogue import find
+from texture_core.parameters import param
+from texture_estimation.learners.learner import Codes, Fitted
+from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.log_probabilities import log_softmax
+from texture_features.feature import WindowBatch, centred, power
+from texture_features.features.hjorth import Hjorth
+from texture_papers.roberge import PairVotes
+
+
+@dataclass(frozen=True)
+class MeanHjorth:
+    """Means over the channels of activity (or its logarithm), mobility and complexity: what `hjorth` gives for each.
+
+    Source: Kaboli et al. 2015, eq. 6 (with `log_activity` off, and of a BioTac's slow channels the electrodes alone).
+
+    Examples
+    --------
+    >>> samples = np.array([[1.0, 10.0], [-1.0, -10.0]])  # powers of 1 and 100
+    >>> MeanHjorth(log_activity=False)(WindowBatch(samples, rate_hz=100.0))[0, 0].item()
+    50.5
+    """
+
+    per_channel: ClassVar[bool] = False
+
+    log_activity: bool = param(True, 'Averages the logarithm of the activity instead of the activity itself.')
+    floor: float = param(
+        1e-20, 'Power added before the logarithm, so that silence gives a finite value, unit².', low=1e-300, high=1e300
+    )
+
+    omit: str = param(
+        '', "Sets which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
+    )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Activity, mobility, complexity."""
+        return self._per_channel.names
+
+    @property
+    def _per_channel(self) -> Hjorth:
+        return Hjorth(self.log_activity, self.floor)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the means."""
+        values = self._per_channel(windows)
+        if self.omit:
+            values = values[..., windows.without(self.omit), :]
+        means: Array = np.add.reduce(values, axis=-2, keepdims=True) / values.shape[-2]
+        return means
+
+
+TINY = 1e-150
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Mean linear (Pearson) and monotonic (Spearman) correlation of the channels of one input with those of another.
+
+    Both are brought to the grid of the input with fewer samples: a sample there is compared with the mean of the other
+    input's samples until the next. Each pair of channels counts the same. Equal samples share the mean of their ranks.
+    A channel that is constant, or a single sample long, correlates with nothing: 0. Of one input alone it is the mean
+    correlation of its channels with each other, 0 for a single channel.
+
+    Source: Kaboli et al. 2015, eq. 4 and 5; eq. 6 has the means over the electrodes alone.
+
+    Examples
+    --------
+    >>> rise = np.arange(10.0)[:, None]
+    >>> joined = WindowBatch(rise, rate_hz=100.0, joined=(WindowBatch(-(rise**3), rate_hz=100.0),))
+    >>> pearson, spearman = Correlation()(joined)[0].round(2).tolist()
+    >>> spearman, -1.0 < pearson < -0.9  # monotonic, but not along a straight line
+    (-1.0, True)
+    """
+
+    per_channel: ClassVar[bool] = False
+    names: ClassVar[tuple[str, ...]] = ('pearson', 'spearman')
+    joins: ClassVar[bool] = True
+
+    omit: str = param(
+        '', "Sets which channels are left out of the means, by their names, such as 'tdc tac pdc'; empty: none."
+    )
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return the two correlations, (..., 1, 2)."""
+        inputs = (windows, *windows.joined)
+        count = min(item.samples.shape[-2] for item in inputs)
+        rows = [cell_means(self._rows(item), count) for item in inputs]
+        values = [_mean_correlation(of_inputs) for of_inputs in (rows, [ranks(of_input) for of_input in rows])]
+        return np.stack(values, axis=-1)[..., None, :]
+
+    def _rows(self, windows: WindowBatch) -> Array:
+        rows = windows.centred_rows
+        return rows[..., windows.without(self.omit), :] if self.omit else rows
+
+
+def cell_means(rows: Array, count: int) -> Array:
+    """Return the means of `count` equal cells of rows, (..., count); at most as many as there are samples.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+    count
+        Number of cells, at most n_samples.
+
+    Returns
+    -------
+    (..., count)
+        In the unit of the rows.
+    """
+    length = rows.shape[-1]
+    if length == count:
+        return rows
+    starts = -(-np.arange(count) * length // count)
+    means: Array = np.add.reduceat(rows, starts, axis=-1) / np.diff(np.append(starts, length))
+    return means
+
+
+def ranks(rows: Array) -> Array:
+    """Return the rank of each sample within its row, from 0; equal ones share their mean rank.
+
+    Parameters
+    ----------
+    rows : (..., n_samples)
+
+    Returns
+    -------
+    (..., n_samples)
+        Whole numbers, or halves for equal samples.
+    """
+    order = np.argsort(rows, axis=-1, kind='stable')
+    ordered = np.take_along_axis(rows, order, axis=-1)
+    place = np.arange(rows.shape[-1])
+    begins = np.ones(rows.shape, dtype=bool)
+    begins[..., 1:] = ordered[..., 1:] != ordered[..., :-1]
+    first = np.maximum.accumulate(np.where(begins, place, 0), axis=-1)
+    last = _until_next(begins, place)
+    ranked = np.empty_like(rows)
+    np.put_along_axis(ranked, order, (first + last) / 2.0, axis=-1)
+    return ranked
+
+
+def _until_next(begins: NDArray[np.bool_], place: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the last place of the run of equal samples that each place is in."""
+    ends = np.ones_like(begins)
+    ends[..., :-1] = begins[..., 1:]
+    backwards = np.where(ends, place, place[-1])[..., ::-1]
+    last: NDArray[np.intp] = np.minimum.accumulate(backwards, axis=-1)[..., ::-1]
+    return last
+
+
+def _mean_correlation(inputs: Sequence[Array]) -> Array:
+    """Return the mean correlation, (...), of all pairs of rows of different inputs, or of different rows of one."""
+    units = np.concatenate([_unit(rows) for rows in inputs], axis=-2)
+    origin = np.repeat(np.arange(len(inputs)), [rows.shape[-2] for rows in inputs])
+    alone = len(inputs) == 1
+    first, second = np.triu_indices(len(origin), k=1)
+    chosen = alone | (origin[first] != origin[second])
+    if not chosen.any():
+        return np.zeros(units.shape[:-2])
+    products = (units @ units.swapaxes(-1, -2))[..., first[chosen], second[chosen]]
+    mean: Array = np.add.reduce(np.ascontiguousarray(products), axis=-1) / products.shape[-1]
+    return mean
+
+
+def _unit(rows: Array) -> Array:
+    """Return zero-mean rows of length 1; 0 for a constant row."""
+    difference = centred(rows)
+    spread = np.sqrt(power(difference))
+    # What rounding leaves of a constant row is no variation.
+    largest = np.abs(rows).max(axis=-1)
+    varies = spread > 1e-12 * largest
+    scale = np.where(varies, 1.0 / (spread + TINY), 0.0) / np.sqrt(rows.shape[-1])
+    unit: Array = difference * scale[..., None]
+    return unit
+
+
+ITERATIONS = 100_000  # of libsvm: a pair that cannot be separated need not be fitted to the last digit
+
+
+@dataclass(frozen=True)
+class SvmLinear:
+    """Linear machines for all pairs; most pairs won, ties broken by the clearer decisions.
+
+    The penalty C with the best mean accuracy over `repeats` random splits into `folds` parts is taken, the smallest
+    of those that tie. No slide is on both sides of a split.
+
+    Source: Kaboli et al. 2015, section V.A: 5 folds, 10 repeats, 20 values.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = SvmLinear(repeats=1).fit(values, codes, groups)
+    >>> predictor = SvmLinear.predictor(fitted.parameters)
+    >>> isinstance(predictor, LinearPairsPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
+    """
+
+    folds: int = param(5, 'Sets the number of cross-validation folds; more folds take longer to train.', low=2, high=50)
+    repeats: int = param(
+        10,
+        'Sets the number of repetitions of the cross-validation with other random folds; more take longer to train.',
+        low=1,
+        high=1000,
+    )
+    candidates: int = param(
+        20, 'Number of values of C that are tried, evenly spaced on a logarithmic scale.', low=1, high=200
+    )
+    least_c: float = param(1e-3, 'Smallest value of C that is tried.', low=1e-9, high=1e9)
+    most_c: float = param(1e3, 'Largest value of C that is tried.', low=1e-9, high=1e9)
+    examples: int = param(200, 'Largest number of examples with which C is chosen; more are subsampled evenly.', low=10)
+    seed: int = param(0, 'Sets the seed of the random folds; equal seeds give equal models.', low=0)
+
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        c = self._choose(standard, y, groups)
+        weights, intercepts = _planes(_svc(standard, y, c))
+        parameters = {'mean': mean, 'scale': scale, 'weights': weights, 'intercepts': intercepts}
+        note = f'not calibrated: pairs won; C = {c:.3g} by {self.repeats} times {self.folds}-fold cross-validation'
+        return Fitted(parameters, None, note)
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> LinearPairsPredictor:
+        """Return the predictor made from the stored parameters."""
+        return LinearPairsPredictor(**parameters)
+
+    def _choose(self, standard: Array, y: Codes, groups: Codes) -> float:
+        """Return the penalty that does best on what is held out; the middle one if nothing can be."""
+        tried = np.geomspace(self.least_c, self.most_c, self.candidates)
+        rows = _evenly(y, self.examples)
+        rng = np.random.default_rng(self.seed)
+        assignments = [_divide(y[rows], groups[rows], self.folds, rng) for _ in range(self.repeats)]
+        splits = [split for folds_of in assignments for split in _splits(rows, folds_of, y)]
+        if not splits:
+            return float(tried[len(tried) // 2])
+        right = [
+            sum(int((_svc(standard[a], y[a], c).predict(standard[b]) == y[b]).sum()) for a, b in splits) for c in tried
+        ]
+        return float(tried[int(np.argmax(right))])
+
+
+@dataclass(frozen=True, eq=False)
+class LinearPairsPredictor:
+    """Linear decisions between all pairs.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    weights : (n_pairs, n_features)
+    intercepts : (n_pairs,)
+    """
+
+    mean: Array
+    scale: Array
+    weights: Array
+    intercepts: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, '_weights', (self.weights / self.scale).T.copy())
+        n_pairs = len(self.intercepts)
+        object.__setattr__(self, '_votes', PairVotes.of_pairs(n_pairs))
+
+    def __call__(self, X: Array) -> Array:
+        """Return log softmax of the pairs won, (..., n_labels) of (..., n_features)."""
+        return log_softmax(self._votes.won_clearly(self.decisions(X)))  # type: ignore[attr-defined]
+
+    def decisions(self, X: Array) -> Array:
+        """Return the decision value of each pair, (..., n_pairs); positive for its first label.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n_pairs)
+            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+        """
+        decisions: Array = (X - self.mean) @ self._weights + self.intercepts  # type: ignore[attr-defined]
+        return decisions
+
+
+def _svc(standard: Array, y: Codes, c: float) -> Any:
+    from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415  # scikit-learn takes a second to import
+    from sklearn.svm import SVC  # noqa: PLC0415
+
+    with warnings.catch_warnings():
+        warnings.simplefilter('ignore', ConvergenceWarning)  # the limit of iterations is meant
+        return SVC(C=c, kernel='linear', max_iter=ITERATIONS).fit(standard, y)
+
+
+def _planes(svc: Any) -> tuple[Array, Array]:
+    """Return weights and intercept of each pair; scikit-learn turns the sign round for two labels."""
+    sign = -1.0 if len(svc.n_support_) == 2 else 1.0
+    return sign * np.asarray(svc.coef_), sign * np.asarray(svc.intercept_)
+
+
+def _evenly(y: Codes, count: int) -> NDArray[np.intp]:
+    """Return at most `count` rows, as many of each label, spread over all of its examples; two of each at least."""
+    labels = np.unique(y)
+    each = max(2, count // len(labels))
+    chosen = []
+    for label in labels:
+        rows = np.flatnonzero(y == label)
+        chosen.append(rows[np.unique(np.linspace(0, len(rows) - 1, min(each, len(rows))).astype(np.intp))])
+    return np.sort(np.concatenate(chosen))
+
+
+def _splits(rows: Codes, folds_of: Codes, y: Codes) -> Iterator[tuple[Codes, Codes]]:
+    """Yield the rows for training and those held out of each fold that leaves two labels for the training."""
+    for part in np.unique(folds_of):
+        training, held = rows[folds_of != part], rows[folds_of == part]
+        if len(np.unique(y[training])) > 1:
+            yield training, held
+
+
+def _divide(y: Codes, groups: Codes, folds: int, rng: np.random.Generator) -> Codes:
+    """Return the part of each example at random: the slides of each label are assigned in turn."""
+    folds_of = np.zeros(len(y), dtype=np.intp)
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
+        slides = np.unique(groups[rows], return_inverse=True)[1].reshape(-1)
+        if slides.max() == 0:  # a single slide: its windows are assigned
+            slides = np.arange(len(rows))
+        folds_of[rows] = rng.permutation(slides.max() + 1)[slides] % folds
+    return folds_of
+
+
+@dataclass(frozen=True)
+class PassiveAggressive:
+    """A plane for each label, moved by each example that is not at a distance from where it would be mistaken.
+
+    The examples are taken in rounds: the first of each label, then the second of each, and so on. Their order matters.
+
+    Source: Crammer et al. 2006, PA-I: section 4 (one label against the others), section 8 (all labels together);
+    Kaboli et al. 2015, section V.B.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = PassiveAggressive().fit(values, codes, groups)
+    >>> predictor = PassiveAggressive.predictor(fitted.parameters)
+    >>> isinstance(predictor, LinearPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
+    """
+
+    c: float = param(1.0, 'Aggressiveness: largest update of a hyperplane by one example.', low=1e-9, high=1e9)
+    multiclass: str = param(
+        'one_vs_rest',
+        "Sets how planes of several labels learn: 'one_vs_rest' moves the plane of each label by itself, "
+        "'crammer_singer' moves those of the true label and of its strongest rival alone.",
+        choices=('one_vs_rest', 'crammer_singer'),
+    )
+    rounds: int = param(0, 'Sets the number of examples of each label to train on; 0 takes all.', low=0)
+
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features) and label numbers `y` 0… (n,) in the order given."""
+        order = _in_rounds(y, self.rounds)
+        # Only what was seen may be known: the scale, too, is that of the training examples.
+        mean, scale = standardisation(X[order])
+        classifier = find(UPDATES, self.multiclass, 'multi-class form of passive-aggressive learning')
+        online = classifier(np.zeros((int(y.max()) + 1, X.shape[1] + 1)), self.c)
+        for row in order:
+            online.update((X[row] - mean) / scale, int(y[row]))
+        return Fitted(
+            {'mean': mean, 'scale': scale, 'planes': online.planes}, None, 'not calibrated: distances from the planes'
+        )
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> LinearPredictor:
+        """Return the predictor made from the stored parameters."""
+        return LinearPredictor(**parameters)
+
+
+@dataclass
+class OnlineLinearClassifier:
+    """Planes that learn example by example.
+
+    Parameters
+    ----------
+    planes : (n_labels, n_features + 1)
+        Weights, and the bias last.
+    c
+        How far one example may move a plane.
+
+    Examples
+    --------
+    >>> online = OnlineLinearClassifier(np.zeros((2, 2)))
+    >>> online.update(np.array([1.0]), code=0)
+    >>> online.planes.tolist()  # both planes are now at a distance of 1 from it
+    [[0.5, 0.5], [-0.5, -0.5]]
+    """
+
+    planes: Array
+    c: float = 1.0
+
+    def update(self, standard: Array, code: int) -> None:
+        """Learn from one example, (n_features,), of label number `code`.
+
+        Parameters
+        ----------
+        standard : (n_features,)
+            Standardised features.
+        code
+            Number of the true label.
+        """
+        extended = np.append(standard, 1.0)
+        side = np.full(len(self.planes), -1.0)
+        side[code] = 1.0
+        loss = np.maximum(0.0, 1.0 - side * (self.planes @ extended))
+        step = np.minimum(self.c, loss / (extended @ extended))
+        self.planes += (step * side)[:, None] * extended
+
+
+@dataclass
+class CrammerSingerClassifier:
+    """Planes that learn together: the true label is to score higher by 1 than every other.
+
+    Parameters
+    ----------
+    planes : (n_labels, n_features + 1)
+        Weights, and the bias last.
+    c
+        How far one example may move a plane.
+
+    Examples
+    --------
+    >>> online = CrammerSingerClassifier(np.zeros((2, 2)))
+    >>> online.update(np.array([1.0]), code=0)
+    >>> (online.planes @ [1.0, 1.0]).tolist()  # the true label scores higher by 1
+    [0.5, -0.5]
+    """
+
+    planes: Array
+    c: float = 1.0
+
+    def update(self, standard: Array, code: int) -> None:
+        """Learn from one example, (n_features,), of label number `code`.
+
+        Of all planes for which the true label scores higher by 1 than the rival that scored highest, the nearest are
+        taken: tau = min(c, loss / (2 |x|²)) is added to the one and subtracted from the other, times x.
+
+        Source: Crammer et al. 2006, section 8.
+
+        Parameters
+        ----------
+        standard : (n_features,)
+            Standardised features.
+        code
+            Number of the true label.
+        """
+        if len(self.planes) < 2:
+            return
+        extended = np.append(standard, 1.0)
+        scores = self.planes @ extended
+        rivals = scores.copy()
+        rivals[code] = -np.inf
+        rival = int(rivals.argmax())
+        loss = max(0.0, 1.0 - float(scores[code] - scores[rival]))
+        step = min(self.c, loss / (2.0 * float(extended @ extended))) * extended
+        self.planes[code] += step
+        self.planes[rival] -= step
+
+
+UPDATES: Mapping[str, type[OnlineLinearClassifier] | type[CrammerSingerClassifier]] = {
+    'one_vs_rest': OnlineLinearClassifier,
+    'crammer_singer': CrammerSingerClassifier,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class LinearPredictor:
+    """Signed distances from planes.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    planes : (n_labels, n_features + 1)
+        Weights, and the bias last.
+    """
+
+    mean: Array
+    scale: Array
+    planes: Array
+
+    def __post_init__(self) -> None:
+        weights = self.planes[:, :-1] / self.scale
+        object.__setattr__(self, '_weights', weights.T.copy())
+        object.__setattr__(self, '_bias', self.planes[:, -1].copy())
+
+    def __call__(self, X: Array) -> Array:
+        """Return log softmax of the distances, (..., n_labels) of (..., n_features)."""
+        scores: Array = (X - self.mean) @ self._weights + self._bias  # type: ignore[attr-defined]
+        return log_softmax(scores)
+
+
+def _in_rounds(y: Codes, rounds: int) -> Codes:
+    """Return the rows in rounds: the first example of each label, then the second of each, and so on."""
+    number = np.empty(len(y), dtype=np.intp)
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
+        number[rows] = np.arange(len(rows))
+    order = np.argsort(number, kind='stable')
+    return order[number[order] < rounds] if rounds else order
+
+
+# A label to which no cluster belongs keeps so much, so that its logarithm is finite.
+LEAST = 1e-6
+
+
+@dataclass(frozen=True)
+class EmMixture:
+    """A mixture of normal distributions fitted by expectation and maximisation; classes to clusters by majority.
+
+    A label that no cluster is named after is never recognised.
+
+    Source: Kaboli et al. 2015, section V.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = EmMixture().fit(values, codes, groups)
+    >>> predictor = EmMixture.predictor(fitted.parameters)
+    >>> isinstance(predictor, MixturePredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
+    """
+
+    clusters_per_label: int = param(
+        1, 'Sets the number of clusters per label; more clusters fit more diverse slides of one label.', low=1, high=50
+    )
+    covariance: str = param(
+        'full',
+        "Covariance of a cluster: 'full', or 'diag' if features are taken as independent.",
+        choices=('full', 'diag'),
+    )
+    regularisation: float = param(
+        1e-3,
+        'Sets the variance added to the standardised features, which keeps clusters from collapsing; a '
+        'larger one smooths more.',
+        low=1e-9,
+    )
+    starts: int = param(
+        3, 'Number of random initialisations; the result with the highest likelihood is kept.', low=1, high=1000
+    )
+    seed: int = param(0, 'Sets the seed of the random initialisations; equal seeds give equal models.', low=0)
+
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
+        from sklearn.mixture import GaussianMixture  # noqa: PLC0415  # scikit-learn takes a second to import
+
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        n_labels = int(y.max()) + 1
+        distinct = len(np.unique(standard, axis=0))
+        mixture = GaussianMixture(
+            min(self.clusters_per_label * n_labels, distinct),
+            covariance_type=self.covariance,
+            reg_covar=self.regularisation,
+            n_init=self.starts,
+            random_state=self.seed,
+        ).fit(standard)
+        found = mixture.predict(standard)
+        n_clusters = len(mixture.weights_)
+        counts = np.zeros((n_clusters, n_labels))
+        np.add.at(counts, (found, y), 1.0)
+        factors = mixture.precisions_cholesky_
+        parameters = {
+            'mean': mean,
+            'scale': scale,
+            'centres': mixture.means_,
+            'factors': factors if self.covariance == 'full' else np.stack([np.diag(row) for row in factors]),
+            'log_weights': np.log(mixture.weights_),
+            'names': np.eye(n_labels)[counts.argmax(axis=1)],
+        }
+        return Fitted(parameters, None, 'not calibrated: probabilities of clusters found without labels')
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> MixturePredictor:
+        """Return the predictor made from the stored parameters."""
+        return MixturePredictor(**parameters)
+
+
+@dataclass(frozen=True, eq=False)
+class MixturePredictor:
+    """A mixture of normal distributions, each with the name of a label.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    centres : (n_clusters, n_features)
+    factors : (n_clusters, n_features, n_features)
+        Upper triangular; the precision matrix is factor · factorᵀ.
+    log_weights : (n_clusters,)
+    names : (n_clusters, n_labels)
+        1 for the label of the cluster, else 0.
+    """
+
+    mean: Array
+    scale: Array
+    centres: Array
+    factors: Array
+    log_weights: Array
+    names: Array
+
+    def __post_init__(self) -> None:
+        n_features = self.factors.shape[1]
+        together = self.factors.transpose(1, 0, 2).reshape(n_features, -1)
+        shift = np.einsum('kf,kfg->kg', self.centres, self.factors)
+        determinants = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
+        object.__setattr__(self, '_together', together.copy())
+        object.__setattr__(self, '_shift', shift)
+        object.__setattr__(self, '_constant', determinants + self.log_weights)
+
+    def __call__(self, X: Array) -> Array:
+        """Return the log-probability of each label, (..., n_labels) of (..., n_features)."""
+        shares = np.exp(log_softmax(self.cluster_scores(X)))
+        return log_softmax(np.log(shares @ self.names + LEAST))
+
+    def cluster_scores(self, X: Array) -> Array:
+        """Return the log-density of each cluster times its weight, but for a constant, (..., n_clusters).
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n_clusters)
+            In nats.
+        """
+        standard = (X - self.mean) / self.scale
+        white = (standard @ self._together).reshape(*standard.shape[:-1], *self._shift.shape)  # type: ignore[attr-defined]
+        white -= self._shift  # type: ignore[attr-defined]
+        scores: Array = self._constant - 0.5 * np.add.reduce(white * white, axis=-1)  # type: ignore[attr-defined]
+        return scores

@@ -1,0 +1,1254 @@
+"""Experiments of papers on simulated surfaces: what was done, by which recipes, over which seeds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import platform
+import re
+import tempfile
+import time
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from scipy.stats import t
+from sklearn.model_selection import BaseCrossValidator, RepeatedStratifiedKFold, ShuffleSplit, StratifiedShuffleSplit
+
+from texture_core.arrays import AnyArray, Array, Samples
+from texture_core.catalogue import find
+from texture_core.errors import InvalidParameter, UnknownName
+from texture_estimation.learners.learner import Codes
+from texture_estimation.recipe import Recipe, load_recipe
+from texture_estimation.roughness.roughness_recipe import load_roughness_recipe
+from texture_estimation.search.classification_task import ClassificationTask
+from texture_estimation.search.feature_cache import FeatureCache
+from texture_estimation.search.fitness import UNDECIDED, decided_by_slide
+from texture_estimation.search.generation import SearchParams
+from texture_estimation.search.optimise import SearchResult, optimise
+from texture_estimation.search.parallel import threaded_map
+from texture_estimation.search.recipe_space import RecipeSpace
+from texture_estimation.search.search_slides import SearchSlides
+from texture_estimation.search.search_task import R, SearchTask
+from texture_estimation.search.shipped_spaces import space_for
+from texture_estimation.search.slide_arrays import ArrayStream, SlideArrays
+from texture_features.feature_set import FeatureSet, InputFeatures
+from texture_features.windowing.axes import SEPARATOR, axis_along
+from texture_features.windowing.time_stretch import Stretched
+from texture_simulation.offline import simulate_slide_streams
+from texture_simulation.scene import Scene
+from texture_simulation.sensors.catalogue import SENSORS
+from texture_simulation.simulated_slide import SimulatedSlide
+from texture_simulation.surfaces.curvature import Curved
+
+NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A figure and the interval that holds it with 95 %: other slides over the same surfaces would give another one."""
+
+    value: float
+    low: float
+    high: float
+
+    def above(self, border: float = 0.0) -> bool | None:
+        """Tell whether the figure is above a border; None if the interval does not tell."""
+        if self.low > border:
+            return True
+        return False if self.high < border else None
+
+    def times(self, factor: float) -> Interval:
+        """Return the figure in another unit."""
+        return Interval(self.value * factor, self.low * factor, self.high * factor)
+
+    def as_json(self) -> list[float]:
+        """Return value, low and high, rounded."""
+        return [round(self.value, 4), round(self.low, 4), round(self.high, 4)]
+
+
+def share(right: Array) -> Interval:
+    """Return the share of slides that are right (Wilson's interval).
+
+    Parameters
+    ----------
+    right : (n_slides,)
+        1 or 0, or between if a slide was evaluated several times.
+    """
+    n, p, z2 = len(right), float(np.mean(right)), NORMAL_95**2
+    middle = (p + z2 / (2 * n)) / (1 + z2 / n)
+    reach = NORMAL_95 * np.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
+    # Where all or none are right, rounding may leave the share just outside.
+    return Interval(p, min(p, float(middle - reach)), max(p, float(middle + reach)))
+
+
+def mean(values: Array) -> Interval:
+    """Return the mean over slides, such as that of differences between two methods on the same slides.
+
+    Parameters
+    ----------
+    values : (n,)
+        One number a slide.
+    """
+    centre = float(np.mean(values))
+    reach = NORMAL_95 * math.sqrt(_uncertainty(values))
+    return Interval(centre, centre - reach, centre + reach)
+
+
+def mean_share(values: Array) -> Interval:
+    """Return the mean of shares, such as those of several draws; its interval is cut where no share can lie.
+
+    Parameters
+    ----------
+    values : (n,)
+        Shares, 0 to 1.
+    """
+    found = mean(values)
+    return Interval(found.value, max(found.low, 0.0), min(found.high, 1.0))
+
+
+def apart(first: Array, second: Array) -> Interval:
+    """Return how much higher the mean of the first is, of slides that are not the same; (n,) and (m,).
+
+    Parameters
+    ----------
+    first : (n,)
+        One number a slide.
+    second : (m,)
+        One number a slide.
+    """
+    centre = float(np.mean(first) - np.mean(second))
+    reach = NORMAL_95 * math.sqrt(_uncertainty(first) + _uncertainty(second))
+    return Interval(centre, centre - reach, centre + reach)
+
+
+def _uncertainty(values: Array) -> float:
+    """Return the variance of a mean; one value says nothing of it."""
+    return float(np.var(values, ddof=1)) / len(values) if len(values) > 1 else math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class MethodResult:
+    """Decisions on all slides.
+
+    Parameters
+    ----------
+    surfaces
+        Names.
+    codes : (n_slides,)
+        Number of the surface of each slide.
+    conditions : (n_slides,) of text
+        How it was touched.
+    decided : (n_divisions, n_slides)
+        Number of the surface that it is taken for, or UNDECIDED.
+    trained_on : (n_divisions, n_slides)
+        Whether it was trained on.
+    train_s
+        Mean time of a training and of classifying all slides.
+    note
+        What else is to be reported of the training.
+    """
+
+    surfaces: tuple[str, ...]
+    codes: Codes
+    conditions: NDArray[np.str_]
+    decided: NDArray[np.intp]
+    trained_on: NDArray[np.bool_]
+    train_s: float
+    note: str = ''
+
+    @property
+    def learning(self) -> float | None:
+        """Share of the training slides that are recognised; None if none is used for training as a whole."""
+        return float((self.decided == self.codes)[self.trained_on].mean()) if self.trained_on.any() else None
+
+    @property
+    def tested(self) -> NDArray[np.bool_]:
+        """Which slides were held out in some split, (n_slides,)."""
+        return np.asarray(~self.trained_on.all(axis=0))
+
+    @property
+    def test(self) -> Interval:
+        """Share of the slides held out that are recognised."""
+        return share(self.right())
+
+    @property
+    def unclassified(self) -> float:
+        """Share of the slides held out that are taken for nothing."""
+        return float((self.decided == UNDECIDED)[~self.trained_on].mean())
+
+    @property
+    def confusion(self) -> AnyArray:
+        """Share of the test slides of each surface (row) that are taken for each surface, or for nothing (last)."""
+        n = len(self.surfaces)
+        table = np.zeros((n, n + 1))
+        true, said = np.broadcast_to(self.codes, self.decided.shape)[~self.trained_on], self.decided[~self.trained_on]
+        np.add.at(table, (true, np.where(said == UNDECIDED, n, said)), 1.0)
+        shares: AnyArray = table / np.maximum(table.sum(axis=1, keepdims=True), 1.0)
+        return shares
+
+    def right(self, of: NDArray[np.bool_] | None = None) -> Array:
+        """Return how often each slide was recognised when held out, (n_tested,); `of` (n_slides,) chooses.
+
+        Parameters
+        ----------
+        of : (n_slides,) bool
+            Which slides count; None for all.
+
+        Returns
+        -------
+        (n_tested,)
+            0 to 1.
+        """
+        return self._tested(self.decided == self.codes, of)
+
+    def taken_for(self, first: str, second: str, of: NDArray[np.bool_] | None = None) -> Array:
+        """Return how often each slide was taken for the other one of two surfaces, (n_tested,).
+
+        Parameters
+        ----------
+        first, second
+            Labels of the two surfaces.
+        of : (n_slides,) bool
+            Which slides count; None for all.
+
+        Returns
+        -------
+        (n_tested,)
+            0 to 1.
+        """
+        pair = [self.surfaces.index(first), self.surfaces.index(second)]
+        other = np.select([self.codes == pair[0], self.codes == pair[1]], [pair[1], pair[0]], default=UNDECIDED - 1)
+        return self._tested(self.decided == other, of)
+
+    def wrong(self) -> Array:
+        """Return how often each slide was taken for another surface, (n_tested,); what is unclassified is not.
+
+        Returns
+        -------
+        (n_tested,)
+            0 to 1.
+        """
+        return self._tested((self.decided != self.codes) & (self.decided != UNDECIDED))
+
+    def nothing(self) -> Array:
+        """Return how often each slide was taken for nothing, (n_tested,).
+
+        Returns
+        -------
+        (n_tested,)
+            0 to 1.
+        """
+        return self._tested(self.decided == UNDECIDED)
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """Return all pairs of surfaces, those taken for each other most often first."""
+        n = len(self.surfaces)
+        table = self.confusion[:, :n]
+        both = table + table.T
+        order = sorted(zip(*np.triu_indices(n, k=1), strict=True), key=lambda place: -both[place])
+        return [(self.surfaces[first], self.surfaces[second]) for first, second in order]
+
+    def _tested(self, events: NDArray[np.bool_], of: NDArray[np.bool_] | None = None) -> Array:
+        chosen = self.tested if of is None else self.tested & of
+        times = (~self.trained_on).sum(axis=0)[chosen]
+        shares: Array = (events & ~self.trained_on).sum(axis=0)[chosen] / times
+        return shares
+
+
+Mask = NDArray[np.bool_]
+# (surface and condition of each slide, randomness, whether to hurry) -> which slides are used for training, by split
+Splitter = Callable[[Codes, NDArray[np.str_], np.random.Generator, bool], Mask]
+Table = Sequence[Sequence[float]]
+
+
+@dataclass(frozen=True)
+class View:
+    """One of the ways in which a trial measures a surface; the features of all views of a trial are joined."""
+
+    finger: int = 0
+    turned_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Visits:
+    """Trials that are alike, over each surface.
+
+    Parameters
+    ----------
+    condition
+        What they have in common, in words.
+    count
+        How many over each surface.
+    sliding
+        How the finger goes.
+    views
+        What a trial consists of.
+    radius_m
+        Radius of curvature of all objects, instead of their own; 0 for their own.
+    random
+        Relative spread of speed and force from trial to trial; above 0, the direction is a random one, too.
+    """
+
+    condition: str
+    count: int
+    sliding: SimulatedSlide
+    views: tuple[View, ...] = (View(),)
+    radius_m: float = 0.0
+    random: float = 0.0
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a paper tells of a method, as shares; None if it does not."""
+
+    learning: float | None = None
+    test: float | None = None
+    unclassified: float | None = None  # of the test slides
+
+
+@dataclass(frozen=True)
+class Method:
+    """A recipe on trial.
+
+    Parameters
+    ----------
+    recipe
+        Its name.
+    paper
+        What the paper got with it.
+    learner
+        Parameters of the learner that a variation changes; what has no label of its own is the released recipe.
+    features
+        Parameters of features, by the feature's name, that it changes.
+    stretch_to_m_s, also
+        Speed to which the vibration is stretched, and features of it beside those of the recipe.
+    label
+        Name in the table; '' for that of the recipe.
+    views
+        Which views of a slide it is given; () for all.
+    singly
+        Whether the windows are assigned for training one by one, half of them, instead of slide by slide: all slides
+        are then tested though parts of each are in the training set: data leakage on purpose, to measure its effect.
+    splits
+        It is tried on so many of the splits; 0 for all.
+    confusion : (n_surfaces, n_surfaces) or (n_surfaces, n_surfaces + 1)
+        The paper's table; the last column, if there is one more, counts what is unclassified.
+    """
+
+    recipe: str
+    paper: Figures = Figures()
+    learner: Mapping[str, Any] = field(default_factory=dict)
+    features: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    stretch_to_m_s: float = 0.0
+    also: tuple[str, ...] = ()
+    label: str = ''
+    views: tuple[int, ...] = ()
+    singly: bool = False
+    splits: int = 0
+    confusion: Table | None = None
+
+    @property
+    def name(self) -> str:
+        """Name in the table."""
+        return self.label or self.recipe
+
+
+# Decisions do not depend on the calibration, which takes most of the time: two parts will do.
+OURS = Method('default', learner={'folds': 2})
+FEW = 5  # splits: enough for a method that stands beside the paper's, where it takes long
+
+
+@dataclass(frozen=True)
+class RecognitionTask:
+    """Surfaces to tell apart, how they are touched, and what tries to.
+
+    Parameters
+    ----------
+    name
+        In a few words.
+    visits
+        How each surface is touched.
+    methods
+        What tries to distinguish them.
+    surfaces
+        Names; () for all of the scene.
+    """
+
+    name: str
+    visits: tuple[Visits, ...]
+    methods: tuple[Method, ...]
+    surfaces: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something a paper found, and whether it is found here.
+
+    Parameters
+    ----------
+    claim
+        In the paper's sense.
+    here
+        What was measured here, in words and numbers.
+    interval
+        What decides, with 95 %.
+    holds
+        None if the interval does not decide.
+    reaches
+        Whether the claim is that a figure is reached: it holds where the interval does not lie below 0 as a whole.
+    """
+
+    claim: str
+    here: str
+    interval: Interval
+    holds: bool | None
+    reaches: bool = False
+
+
+MethodResults = Mapping[tuple[str, str], MethodResult]  # (task, method) -> what came out
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """The one stated figure by which the difficulty of a scene is set: so many test slides are right by this method.
+
+    Parameters
+    ----------
+    setting
+        What of the scene was set by it.
+    experiment
+        Whose figure it is, if not of the same experiment.
+    shortfall
+        Why the figure could not be met; '' if it was.
+    parts
+        The paper's figures of the same method on parts of the same slides, by task: set along with it, no findings.
+    """
+
+    task: str
+    method: str
+    test: float
+    source: str
+    setting: str = 'noise of the fast channels'
+    experiment: str = ''
+    shortfall: str = ''
+    parts: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def figures(self) -> Mapping[str, float]:
+        """All figures that are set, by task."""
+        return {self.task: self.test, **self.parts}
+
+
+@dataclass(frozen=True)
+class PaperProtocol:
+    """A paper's experiment.
+
+    Parameters
+    ----------
+    name, scene
+        Of the experiment and of what is touched.
+    paper
+        Who did it.
+    tasks
+        What was to be distinguished, by what.
+    divide, split
+        Which slides are used for training, and that in words.
+    anchor
+        What the scene's noise was set by.
+    findings
+        Checks what the paper found.
+    by_condition
+        Whether the share recognised is also reported for each condition of the test.
+    quick_count
+        Trials over each surface, instead of those of each of the visits, for tests.
+    """
+
+    name: str
+    scene: str
+    paper: str
+    tasks: tuple[RecognitionTask, ...]
+    divide: Splitter
+    split: str
+    anchor: Anchor
+    findings: Callable[[MethodResults], Sequence[Finding]]
+    quick_count: int = 8
+    by_condition: bool = False
+
+
+def halves(count: int) -> Splitter:
+    """Return what draws random halves, each surface halved."""
+    return _of(lambda quick, seed: StratifiedShuffleSplit(2 if quick else count, train_size=0.5, random_state=seed))
+
+
+def _of(make: Callable[[bool, int], BaseCrossValidator]) -> Splitter:
+    """Return the splits of one of scikit-learn's splitters, as which slides each trains on."""
+
+    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
+        parts = list(make(quick, int(rng.integers(2**31))).split(codes, codes))
+        trained_on = np.zeros((len(parts), len(codes)), dtype=bool)
+        for row, (training, _) in zip(trained_on, parts, strict=True):
+            row[training] = True
+        return trained_on
+
+    return divide
+
+
+def folds(count: int, repeats: int) -> Splitter:
+    """Return what holds out each part of the slides in turn, each surface assigned at random, several times."""
+
+    def splitter(quick: bool, seed: int) -> BaseCrossValidator:
+        of_all: BaseCrossValidator = RepeatedStratifiedKFold(
+            n_splits=2 if quick else count, n_repeats=1 if quick else repeats, random_state=seed
+        )
+        return of_all
+
+    return _of(splitter)
+
+
+def drawn(share: float, count: int) -> Splitter:
+    """Return what draws so large a share of all slides for training, whatever their surface."""
+    return _of(lambda quick, seed: ShuffleSplit(2 if quick else count, train_size=share, random_state=seed))
+
+
+def training_in(condition: str) -> Splitter:
+    """Return what is trained on the slides of one condition and tests on all others."""
+
+    def divide(codes: Codes, conditions: NDArray[np.str_], rng: np.random.Generator, quick: bool) -> Mask:
+        trained_on: Mask = (conditions == condition)[None, :]
+        return trained_on
+
+    return divide
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Where an experiment writes, its seed, and whether to hurry.
+
+    Parameters
+    ----------
+    out
+        Folder for the JSON and the charts.
+    seed
+        Of everything random.
+    quick
+        Fewer slides, for tests; such numbers are not for publishing.
+    tune
+        Search the parameters first, as the paper does; refused where the paper has no search.
+    splits
+        Try each method on at most so many of the splits; 0 for all.
+    papers_only
+        Leave our own recipes out.
+    """
+
+    out: Path
+    seed: int = 0
+    quick: bool = False
+    tune: bool = False
+    splits: int = 0
+    papers_only: bool = False
+
+
+@dataclass(frozen=True)
+class ExperimentResult:
+    """The numbers of one experiment; `lines` are the table for people, the paper's figures beside ours."""
+
+    name: str
+    measured: str
+    data: str
+    split: str
+    numbers: Mapping[str, Any]
+    charts: tuple[Path, ...] = ()
+    lines: tuple[str, ...] = ()
+
+    def write(self, out: Path) -> Path:
+        """Write the JSON and return its path."""
+        out.mkdir(parents=True, exist_ok=True)
+        content = {
+            'name': self.name,
+            'measured': self.measured,
+            'data': self.data,
+            'split': self.split,
+            'machine': f'{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}',
+            'numbers': self.numbers,
+            'charts': [chart.name for chart in self.charts],
+        }
+        path = out / f'{self.name}.json'
+        path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + '\n', encoding='utf-8')
+        return path
+
+
+Run = Callable[[Experiment], ExperimentResult]
+
+
+# What of `training` decides the label after a whole slide. The rest says when a slide ends early, or what is outside.
+DECISIVE_OF_TRAINING = frozenset({'augmentation', 'false_rejection_rate', 'hop_s', 'start_weight'})
+# Values with which a parameter of the evidence rule changes nothing: stored digests are older than the parameter.
+NEUTRAL = {'late_weight': 1.0}
+OWN_CLASS = re.compile(r'texture_papers\.\w+:(\w+)')
+
+
+def digest_of(recipe: str) -> str:
+    """Return eight letters of what of a shipped recipe, by its name, decides the label after a whole slide.
+
+    Descriptions, the tare of inputs, and rules for ending a slide early do not count.
+
+    Raises
+    ------
+    UnknownName
+        If there is no such recipe.
+    """
+    try:
+        definition = load_recipe(recipe).as_mapping()
+    except UnknownName:
+        definition = load_roughness_recipe(recipe).as_mapping()
+    text = OWN_CLASS.sub(_short_name, json.dumps(_decisive(definition), sort_keys=True))
+    return hashlib.sha256(json.dumps(json.loads(text), sort_keys=True).encode()).hexdigest()[:8]
+
+
+def _short_name(found: re.Match[str]) -> str:
+    """Return 'region_peaks' of 'texture_papers.jamali:RegionPeaks': in which module a class stands decides nothing."""
+    return re.sub(r'(?<!^)(?=[A-Z])', '_', found.group(1)).lower()
+
+
+def _decisive(definition: Mapping[str, Any]) -> dict[str, Any]:
+    decisive = {name: value for name, value in definition.items() if name != 'description'}
+    if 'inputs' in decisive:
+        decisive['inputs'] = {
+            name: {key: value for key, value in part.items() if key != 'tare'}
+            for name, part in decisive['inputs'].items()
+        }
+    if 'evidence' in decisive:
+        decisive['evidence'] = {
+            rule: {key: value for key, value in params.items() if NEUTRAL.get(key) != value}
+            if isinstance(params, Mapping)
+            else params
+            for rule, params in decisive['evidence'].items()
+        }
+    if 'training' in decisive:
+        decisive['training'] = {
+            name: value for name, value in decisive['training'].items() if name in DECISIVE_OF_TRAINING
+        }
+    return decisive
+
+
+FULL = SearchParams()  # 20 individuals, 30 generations, 20 halves: the paper's
+QUICK = SearchParams(population=4, generations=2, halves=2, finalists=1)
+
+
+@dataclass(frozen=True, eq=False)
+class TunedRecipe(Generic[R]):
+    """A recipe that was searched for, and what it took."""
+
+    found: SearchResult[R]
+    seconds: float
+    cpu_seconds: float
+    scans: int
+
+    @property
+    def recipe(self) -> R:
+        """The best."""
+        return self.found.best.recipe
+
+    def figures(self) -> dict[str, Any]:
+        """Return what the search took and how good it thinks the best is."""
+        record, history = self.found.best.record, self.found.found.history
+        return {
+            'seconds': round(self.seconds, 1),
+            'cpu_seconds': round(self.cpu_seconds, 1),  # of all cores: what a busy machine would have needed alone
+            'scans': self.scans,
+            'generations': len(history),
+            'individuals_tried': history[-1].evaluated,
+            'halves_evaluated': history[-1].halves,
+            'learning': float(record.learning.mean()),
+            'test': float(record.test.mean()),
+        }
+
+    def write(self, path: Path) -> Path:
+        """Write the recipe as a file that training reads; return its path.
+
+        Raises
+        ------
+        InvalidParameter
+            If the file cannot be written.
+        """
+        text = yaml.safe_dump(self.recipe.as_mapping(), sort_keys=False, allow_unicode=True, width=120)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding='utf-8')
+        except OSError as error:
+            raise InvalidParameter(f"'{path}' cannot be written: {error.strerror}; name another folder") from error
+        return path
+
+
+def tune(space: RecipeSpace[R], scans: SlideArrays, task: SearchTask[R], seed: int, *, quick: bool) -> TunedRecipe[R]:
+    """Return the best recipe of a space on these scans, and what it took to find it.
+
+    Parameters
+    ----------
+    space
+        The recipe, and what of it is varied.
+    scans
+        Slides that the search may use.
+    task
+        Classification or roughness.
+    seed
+        Seed of the search.
+    quick
+        Whether a short search will do.
+
+    Returns
+    -------
+    TunedRecipe
+    """
+    params = replace(QUICK if quick else FULL, seed=seed)
+    began, cpu_began = time.perf_counter(), time.process_time()
+    with threaded_map() as parallel_map:
+        found = optimise(space, SearchSlides(scans, params.halves, seed), params, task, parallel_map=parallel_map)
+    return TunedRecipe(found, time.perf_counter() - began, time.process_time() - cpu_began, len(scans.labels))
+
+
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Slides:
+    """Trials over known surfaces, in a random order.
+
+    Parameters
+    ----------
+    surfaces
+        Names.
+    codes : (n_slides,)
+        Number of the surface of each.
+    conditions : (n_slides,) of text
+        How it was touched.
+    views
+        What each consists of.
+    axes
+        Axis along which the slides of each view go: 'x', 'y', or '' for neither.
+    """
+
+    surfaces: tuple[str, ...]
+    codes: Codes
+    conditions: NDArray[np.str_]
+    views: tuple[SlideArrays, ...]
+    axes: tuple[str, ...] = ()
+
+    @cached_property
+    def _caches(self) -> tuple[FeatureCache, ...]:
+        return tuple(FeatureCache(view) for view in self.views)
+
+    @cached_property
+    def _along_axes(self) -> FeatureCache:
+        """Features of inputs with an axis, 'signal@x': the streams of the view along it."""
+        streams = {
+            f'{topic}{SEPARATOR}{axis}': stream
+            for axis, view in zip(self.axes, self.views, strict=True)
+            for topic, stream in view.streams.items()
+        }
+        return FeatureCache(replace(self.views[0], streams=streams, _known={}))
+
+    def extract(self, feature_set: FeatureSet, views: Sequence[int] = ()) -> tuple[Array, Codes]:
+        """Return the features of all windows, of some or all views, (n, n_features), and their slides, (n,).
+
+        A feature set whose inputs have an axis joins the views itself.
+
+        Parameters
+        ----------
+        feature_set
+            Windows and features.
+        views
+            Numbers of the views; () for all.
+
+        Returns
+        -------
+        (n, n_features)
+            Features of windows.
+        (n,)
+            Number of the slide of each.
+        """
+        joins = feature_set.window_names != feature_set.topics
+        chosen = [self._along_axes] if joins else [self._caches[n] for n in views or range(len(self.views))]
+        values = np.concatenate([cache.values(feature_set) for cache in chosen], axis=1)
+        return values, self.views[0](feature_set.windows).slides
+
+
+def gather(scene: Scene, task: RecognitionTask, seed: int, *, slow: bool) -> Slides:
+    """Return the slides of a task.
+
+    A slide is the same in all tasks that hold it: its randomness follows from seed, surface and condition.
+
+    Parameters
+    ----------
+    scene
+        What is touched.
+    task
+        How.
+    seed
+        Of everything random.
+    slow
+        Whether the slow stream is needed.
+
+    Returns
+    -------
+    Slides
+    """
+    surfaces = task.surfaces or tuple(scene.surfaces)
+    kinds = [(surface, visits) for surface in surfaces for visits in task.visits]
+    counts = [visits.count for _, visits in kinds]
+    order = np.random.default_rng(seed).permutation(sum(counts))
+    codes = np.repeat([surfaces.index(surface) for surface, _ in kinds], counts)[order]
+    conditions = np.repeat([visits.condition for _, visits in kinds], counts)[order]
+    speed = np.repeat([float(visits.sliding.speed_m_s) for _, visits in kinds], counts)[order]
+    force = np.repeat([float(visits.sliding.force_n) for _, visits in kinds], counts)[order]
+    kind = find(SENSORS, scene.sensor, 'sensor model')
+    measured = {stream.topic: stream for stream in kind.streams}
+    views = []
+    for number in range(len(task.visits[0].views)):
+        parts = [_measured(scene, surface, visits, number, seed, slow=slow) for surface, visits in kinds]
+        streams = {
+            topic: ArrayStream(
+                np.concatenate([part[topic] for part in parts])[order],
+                measured[topic].rate_hz,
+                measured[topic].channels,
+            )
+            for topic in parts[0]
+        }
+        views.append(SlideArrays(streams, np.asarray(surfaces)[codes], speed, force))
+    axes = tuple(axis_along(float(task.visits[0].sliding.direction_rad) + v.turned_rad) for v in task.visits[0].views)
+    return Slides(surfaces, codes, conditions, tuple(views), axes)
+
+
+def _measured(
+    scene: Scene, surface: str, visits: Visits, number: int, seed: int, *, slow: bool
+) -> Mapping[str, Samples]:
+    view: View = visits.views[number]
+    kind = find(SENSORS, scene.sensor, 'sensor model')
+    # A window is cut where every stream has samples: the slowest decides, and a slide ends with one of its samples.
+    slowest_hz = min(stream.rate_hz for stream in kind.streams[: None if slow else 1])
+    duration_s = math.ceil(visits.sliding.duration_s * slowest_hz - ROUNDING) / slowest_hz
+    own = [seed, list(scene.surfaces).index(surface), zlib.crc32(visits.condition.encode())]
+    rng = np.random.default_rng([*own, number])
+    sliding = replace(_sliding(visits, np.random.default_rng(own)), duration_s=duration_s)
+    sliding = replace(sliding, direction_rad=sliding.direction_rad + view.turned_rad)
+    touched = _shaped(scene, surface, visits.radius_m)
+    return simulate_slide_streams(touched, surface, visits.count, sliding, rng, finger=view.finger, slow=slow)
+
+
+def _sliding(visits: Visits, rng: np.random.Generator) -> SimulatedSlide:
+    """Return how the fingers of each trial go: all views of a trial alike."""
+    if not visits.random:
+        return visits.sliding
+    speed, force = (1.0 + visits.random * rng.uniform(-1.0, 1.0, (2, visits.count))) * np.array(
+        [[visits.sliding.speed_m_s], [visits.sliding.force_n]]
+    )
+    heading = rng.uniform(0.0, 2.0 * math.pi, visits.count)
+    return replace(visits.sliding, speed_m_s=speed, force_n=force, direction_rad=heading)
+
+
+def _shaped(scene: Scene, surface: str, radius_m: float) -> Scene:
+    """Return the scene with one object curved in another way; as it is for a radius of 0."""
+    if not radius_m:
+        return scene
+    curved = replace(scene.surface(surface), shape=Curved(radius_m))
+    return replace(scene, surfaces={**scene.surfaces, surface: curved})
+
+
+FAST, SLOW = 'signal', 'signal_static'
+OUR_RECIPES = ('default', 'vibration-and-taxels')
+TunedRecipes = Mapping[tuple[str, str], TunedRecipe[Recipe]]  # by task and recipe
+NONE: TunedRecipes = {}
+
+
+def outcomes(
+    protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool, tuned: TunedRecipes = NONE, splits: int = 0
+) -> MethodResults:
+    """Return what comes out of each method in each task.
+
+    Parameters
+    ----------
+    protocol
+        Methods and tasks of the paper.
+    scene
+        Surfaces, sensor and effects.
+    seed
+        Of everything random.
+    quick
+        Whether fewer slides will do.
+    tuned
+        Recipes that were searched for.
+    splits
+        Each method is tried on at most so many splits; 0 for all.
+
+    Returns
+    -------
+    MethodResults
+        By task and method.
+    """
+    return {
+        (task.name, method): outcome
+        for task in protocol.tasks
+        for method, outcome in of_task(protocol, task, scene, seed, quick=quick, tuned=tuned, splits=splits)
+    }
+
+
+def without_ours(protocol: PaperProtocol) -> PaperProtocol:
+    """Return the protocol with the methods of the paper and their variations alone."""
+    tasks = [
+        replace(task, methods=tuple(method for method in task.methods if method.recipe not in OUR_RECIPES))
+        for task in protocol.tasks
+    ]
+    return replace(protocol, tasks=tuple(tasks))
+
+
+def of_task(
+    protocol: PaperProtocol,
+    task: RecognitionTask,
+    scene: Scene,
+    seed: int,
+    *,
+    quick: bool,
+    tuned: TunedRecipes = NONE,
+    splits: int = 0,
+) -> Iterator[tuple[str, MethodResult]]:
+    """Yield what comes out of each method in one task.
+
+    One with a recipe that was searched for is tried on the first split alone: in the others it would be tested on
+    slides that the search has seen.
+
+    Parameters
+    ----------
+    protocol
+        Methods and tasks of the paper.
+    task
+        The task.
+    scene
+        Surfaces, sensor and effects.
+    seed
+        Of everything random.
+    quick
+        Whether fewer slides will do.
+    tuned
+        Recipes that were searched for.
+    splits
+        Number of splits that are run; 0 for all.
+
+    Yields
+    ------
+    (str, MethodResult)
+        Name of the method, and its result.
+    """
+    slides, trained_on = _gathered(protocol, task, scene, seed, quick=quick)
+    for method in task.methods:
+        found = tuned.get((task.name, method.recipe))
+        recipe = found.recipe if found else recipe_of(method)
+        most = 1 if found else min(filter(None, (method.splits, splits)), default=len(trained_on))
+        yield method.name, evaluate_method(recipe, slides, trained_on[:most], method.views, singly=method.singly)
+
+
+def searched(protocol: PaperProtocol, scene: Scene, seed: int, *, quick: bool) -> TunedRecipes:
+    """Return the recipes for which the paper has a genetic search, found on what the first split is trained on.
+
+    Parameters
+    ----------
+    protocol
+        Methods and tasks of the paper.
+    scene
+        Surfaces, sensor and effects.
+    seed
+        Of everything random.
+    quick
+        Whether a short search will do.
+
+    Returns
+    -------
+    TunedRecipes
+
+    Raises
+    ------
+    InvalidParameter
+        If the paper searches for none.
+    """
+    methods = {
+        (task.name, method.recipe): (task, method)
+        for task in protocol.tasks
+        for method in reversed(task.methods)  # of several with one recipe, the first
+        if space_for('recipes', method.recipe)
+    }
+    if not methods:
+        raise InvalidParameter(
+            f"experiment '{protocol.name}' has nothing to tune: its paper searches for no parameters; leave --tune out"
+        )
+    found = {}
+    for key, (task, method) in methods.items():
+        slides, trained_on = _gathered(protocol, task, scene, seed, quick=quick)
+        space = RecipeSpace.load(str(space_for('recipes', method.recipe)), recipe_of(method))
+        found[key] = tune(space, slides.views[0].of(trained_on[0]), ClassificationTask(), seed, quick=quick)
+    return found
+
+
+def _gathered(
+    protocol: PaperProtocol, task: RecognitionTask, scene: Scene, seed: int, *, quick: bool
+) -> tuple[Slides, Mask]:
+    """Return the slides of a task, and which of them each split is trained on."""
+    task = reduced(task, protocol.quick_count) if quick else task
+    slow = any(SLOW in recipe_of(method).feature_set.topics for method in task.methods)
+    slides = gather(scene, task, seed, slow=slow)
+    return slides, protocol.divide(slides.codes, slides.conditions, np.random.default_rng(seed), quick)
+
+
+def recipe_of(method: Method) -> Recipe:
+    """Return the recipe as the protocol asks for it."""
+    recipe = load_recipe(method.recipe)
+    if method.stretch_to_m_s or method.also:
+        recipe = _with_motion(recipe, method)
+    inputs = tuple(_changed(item, method.features) for item in recipe.feature_set.inputs)
+    learner: Any = recipe.learner
+    return replace(
+        recipe,
+        feature_set=replace(recipe.feature_set, inputs=inputs, _layouts={}),
+        learner=replace(learner, **method.learner),
+    )
+
+
+def _with_motion(recipe: Recipe, method: Method) -> Recipe:
+    content = recipe.as_mapping()
+    vibration = content['inputs'][FAST]
+    features = [*vibration['features'], *method.also]
+    content['inputs'][FAST] = {'stretch_to_m_s': method.stretch_to_m_s, 'features': features}
+    return Recipe.from_mapping(content, recipe.name)
+
+
+def _changed(item: InputFeatures, parameters: Mapping[str, Mapping[str, Any]]) -> InputFeatures:
+    features: list[tuple[str, Any]] = list(item.features)
+    changed = tuple((name, _with_parameters(feature, parameters.get(name, {}))) for name, feature in features)
+    return replace(item, features=changed)
+
+
+def _with_parameters(feature: Any, parameters: Mapping[str, Any]) -> Any:
+    if isinstance(feature, Stretched):
+        return replace(feature, feature=_with_parameters(feature.feature, parameters))
+    return replace(feature, **parameters)
+
+
+def evaluate_method(
+    recipe: Recipe,
+    slides: Slides,
+    trained_on: Mask,
+    views: Sequence[int] = (),
+    *,
+    singly: bool = False,
+    beside: Array | None = None,
+) -> MethodResult:
+    """Learn from the slides of each split and evaluate all.
+
+    Parameters
+    ----------
+    recipe
+        What learns and classifies.
+    slides
+        What was measured.
+    trained_on : (n_divisions, n_slides)
+        Which are used for training.
+    views
+        Which views of the slides are used; () for all.
+    singly
+        See `Method`.
+    beside : (n_slides, n_values) or None
+        Values of each slide that its windows have beside the features.
+
+    Returns
+    -------
+    MethodResult
+        Of all splits together.
+    """
+    to_learn = replace(recipe.feature_set, windows=recipe.training_windows, _layouts={})
+    trained, owner = slides.extract(to_learn, views)
+    asked, slide = slides.extract(recipe.feature_set, views)
+    if beside is not None:
+        trained, asked = np.hstack((trained, beside[owner])), np.hstack((asked, beside[slide]))
+    windows = recipe.feature_set.windows
+    decided = np.empty(trained_on.shape, dtype=np.intp)
+    rows_of = _halves_of_windows(owner, len(trained_on)) if singly else trained_on[:, owner]
+    began = time.perf_counter()
+    for number, rows in enumerate(rows_of):
+        fitted = recipe.learner.fit(trained[rows], slides.codes[owner[rows]], owner[rows])
+        scores = recipe.learner.predictor(fitted.parameters)(asked)
+        decided[number], _ = decided_by_slide(scores, slide, recipe.evidence, windows.hop_s / windows.length_s)
+    taken_s = (time.perf_counter() - began) / len(trained_on)
+    known = np.zeros_like(trained_on) if singly else trained_on
+    return MethodResult(slides.surfaces, slides.codes, slides.conditions, decided, known, taken_s, fitted.note)
+
+
+def _halves_of_windows(owner: Codes, count: int) -> Mask:
+    rng = np.random.default_rng(count)
+    return np.stack([rng.permutation(len(owner)) < len(owner) // 2 for _ in range(count)])
+
+
+def reduced(task: RecognitionTask, count: int) -> RecognitionTask:
+    """Return the task with fewer slides: so many over each surface, as equally as may be among the visits."""
+    each = max(1, count // len(task.visits))
+    visits = tuple(replace(visit, count=min(visit.count, each)) for visit in task.visits)
+    return replace(task, visits=visits)
+
+
+LEVEL = 0.95
+VERDICTS = {True: 'holds', False: 'does not hold', None: 'not decided'}
+SEED_SPLITS = 2  # of a further seed: what differs between seeds are the slides
+
+
+def over_seeds(run: Run, name: str, experiment: Experiment, count: int) -> ExperimentResult:
+    """Run an experiment with so many seeds, and add means and intervals over them to the result of the first.
+
+    The first seed is run as the experiment asks, and written. Each further one is run on at most two splits, without
+    our own recipes, and kept in the folder `seeds`. What is there already, with the recipes as they are now, is not run
+    again.
+
+    Parameters
+    ----------
+    run
+        Runs the experiment with one seed.
+    name
+        Name of the experiment.
+    experiment
+        First seed, folder and options.
+    count
+        Number of seeds, at least 2.
+
+    Returns
+    -------
+    ExperimentResult
+        That of the first seed, with means and intervals over all.
+
+    Raises
+    ------
+    InvalidParameter
+        If fewer than two seeds are asked for.
+    """
+    if count < 2:
+        raise InvalidParameter(f'{count} seeds were asked for; two or more are needed for an interval over seeds')
+    first = _first(run, name, experiment)
+    further = replace(experiment, splits=SEED_SPLITS, papers_only=True, tune=False)
+    others = [_kept(run, name, replace(further, seed=experiment.seed + number)) for number in range(1, count)]
+    numbers = with_seeds(first.numbers, others)
+    return replace(first, numbers=numbers, lines=(*first.lines, *seed_lines(numbers)))
+
+
+def _first(run: Run, name: str, experiment: Experiment) -> ExperimentResult:
+    """Return the result of the first seed, as it was written if it was."""
+    path = experiment.out / f'{name}.json'
+    if path.is_file() and not experiment.quick and not experiment.tune:
+        content = json.loads(path.read_text(encoding='utf-8'))
+        numbers = content['numbers']
+        if numbers.get('seed') == experiment.seed and is_current(numbers):
+            texts = {key: content[key] for key in ('name', 'measured', 'data', 'split')}
+            return ExperimentResult(**texts, numbers=numbers, charts=tuple(map(Path, content['charts'])))
+    result = run(experiment)
+    result.write(experiment.out)
+    return result
+
+
+def is_current(numbers: Mapping[str, Any]) -> bool:
+    """Return whether numbers are those of the recipes as they are defined now."""
+    recipes = numbers.get('recipes', {})
+    return bool(recipes) and all(digest_of(recipe) == stored for recipe, stored in recipes.items())
+
+
+def _kept(run: Run, name: str, experiment: Experiment) -> Mapping[str, Any]:
+    """Return the numbers of one further seed, from the folder if they are there."""
+    path = experiment.out / 'seeds' / f'{name}-{experiment.seed}{"-reduced" if experiment.quick else ""}.json'
+    if path.is_file():
+        numbers: Mapping[str, Any] = json.loads(path.read_text(encoding='utf-8'))
+        if is_current(numbers):
+            return numbers
+    with tempfile.TemporaryDirectory() as folder:
+        numbers = run(replace(experiment, out=Path(folder))).numbers
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(numbers, ensure_ascii=False) + '\n', encoding='utf-8')
+    return numbers
+
+
+def with_seeds(first: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the numbers of the first seed with mean and interval over all seeds beside each figure and finding."""
+    numbers: dict[str, Any] = json.loads(json.dumps(first))
+    runs = [numbers, *others]
+    numbers['seeds'] = [run['seed'] for run in runs]
+    for task, methods in numbers.get('tasks', {}).items():
+        for method, figures in methods.items():
+            found = [run['tasks'][task][method]['test'][0] for run in runs if method in run['tasks'][task]]
+            _add(figures, found)
+            for name, part in figures.get('conditions', {}).items():
+                same = [run['tasks'][task].get(method, {}).get('conditions', {}).get(name) for run in runs]
+                _add(part, [one['test'][0] for one in same if one])
+    for regressor, parts in numbers.get('regressors', {}).items():
+        for part, figures in parts.items():
+            found = [
+                run['regressors'][regressor][part]['error']
+                for run in runs
+                if part in run['regressors'].get(regressor, {})
+            ]
+            _add(figures, found)
+    for finding in numbers['findings']:
+        same = [one for run in runs for one in run['findings'] if one['claim'] == finding['claim']]
+        _add(finding, [one['interval'][0] for one in same])
+        if 'over_seeds' in finding:
+            finding['verdict'] = VERDICTS[verdict(Interval(*finding['over_seeds']), reaches=finding['reaches'])]
+    return numbers
+
+
+def verdict(interval: Interval, *, reaches: bool) -> bool | None:
+    """Return whether a claim holds; None if the interval does not decide.
+
+    Parameters
+    ----------
+    interval
+        Of what decides.
+    reaches
+        Whether the claim is that a figure is reached; else it is that the interval lies above 0.
+    """
+    return interval.high >= 0.0 if reaches else interval.above()
+
+
+def mean_over_seeds(values: Sequence[float]) -> Interval:
+    """Return the mean of one figure of each seed, and the interval of the mean by Student's t, 95 %."""
+    array = np.asarray(values, dtype=np.float64)
+    centre, n = float(array.mean()), len(array)
+    reach = float(t.ppf(0.5 + LEVEL / 2.0, n - 1) * array.std(ddof=1) / np.sqrt(n))
+    return Interval(centre, centre - reach, centre + reach)
+
+
+def seed_lines(numbers: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the means over seeds as a table for people."""
+    yield f'over {len(numbers["seeds"])} seeds: mean, and its interval of 95 %'
+    for name, values in _over_seeds(numbers.get('tasks', {})):
+        mean, low, high = (100 * value for value in values)
+        yield f'  {name}: {mean:.1f} % ({low:.1f} to {high:.1f})'
+    for name, (mean, low, high) in _over_seeds(numbers.get('regressors', {})):
+        yield f'  {name}: {mean:.2f} ({low:.2f} to {high:.2f}) grades'
+    for finding in numbers['findings']:
+        if 'over_seeds' in finding:
+            mean, low, high = finding['over_seeds']
+            yield f'  {finding["verdict"]:14} {finding["claim"]}: {mean:+.3f} ({low:+.3f} to {high:+.3f})'
+
+
+def _add(figures: dict[str, Any], found: Sequence[float]) -> None:
+    if len(found) > 1:
+        figures['by_seed'] = list(found)
+        figures['over_seeds'] = mean_over_seeds(found).as_json()
+
+
+def _over_seeds(groups: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Sequence[float]]]:
+    """Yield the name, and mean and interval over seeds, of each member of each group that has them."""
+    for group, members in groups.items():
+        for member, figures in members.items():
+            if 'over_seeds' in figures:
+                yield f'{group}, {member}', figures['over_seeds']

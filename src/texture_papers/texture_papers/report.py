@@ -1,0 +1,563 @@
+"""Figures of the papers beside ours: tables, charts, and whether the claims hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texture_core.arrays import AnyArray, Array
+from texture_evaluation.charts import COLOURS, chart
+from texture_papers.protocol import (
+    NONE,
+    VERDICTS,
+    Experiment,
+    ExperimentResult,
+    Finding,
+    Interval,
+    Method,
+    MethodResult,
+    MethodResults,
+    PaperProtocol,
+    RecognitionTask,
+    Table,
+    TunedRecipes,
+    apart,
+    digest_of,
+    mean,
+    outcomes,
+    searched,
+    share,
+    without_ours,
+)
+from texture_simulation.scene import load_scene
+
+Pair = tuple[str, str]
+
+
+def higher(claim: str, first: MethodResult, second: MethodResult) -> Finding:
+    """Check that one method recognises more than another, slide by slide.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    first, second
+        Results on the same slides.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    both = first.tested & second.tested
+    gain = mean(first.right(both) - second.right(both))
+    return Finding(claim, f'{percent(first.test)} against {percent(second.test)}', gain, gain.above())
+
+
+def higher_elsewhere(claim: str, first: MethodResult, second: MethodResult) -> Finding:
+    """Check that more slides of one kind are recognised than of another kind.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    first, second
+        Results on different slides.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    gain = apart(first.right(), second.right())
+    return Finding(claim, f'{percent(first.test)} against {percent(second.test)}', gain, gain.above())
+
+
+def lower_in(claim: str, outcome: MethodResult, condition: str) -> Finding:
+    """Check that slides of one condition are recognised less often than all others.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    condition
+        Name of the condition.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    here = outcome.conditions == condition
+    loss = apart(outcome.right(~here), outcome.right(here))
+    names = dict.fromkeys(outcome.conditions.tolist())
+    shares = {name: outcome.right(outcome.conditions == name).mean() for name in names}
+    reported = ', '.join(f'{name} {100 * value:.1f} %' for name, value in shares.items())
+    return Finding(claim, reported, loss, loss.above())
+
+
+def kept_in(claim: str, outcome: MethodResult, changed: str, reference: str, margin: float = 0.05) -> Finding:
+    """Check that slides of one condition are recognised at most a margin less often than those of another.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    changed, reference
+        Names of the conditions.
+    margin
+        Largest loss that counts as none, 0 to 1.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    here, before = (outcome.right(outcome.conditions == name) for name in (changed, reference))
+    gain = apart(here, before)
+    kept = Interval(gain.value + margin, gain.low + margin, gain.high + margin)
+    reported = f'{percent(share(here))} against {percent(share(before))}, {100 * margin:g} points granted'
+    return Finding(claim, reported, kept, kept.above())
+
+
+def at_least(claim: str, outcome: MethodResult, border: float) -> Finding:
+    """Check that the share of test slides recognised is not below a figure: the interval reaches it.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    border
+        Share, 0 to 1.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    test = outcome.test
+    over = Interval(test.value - border, test.low - border, test.high - border)
+    return Finding(claim, percent(test), over, over.high >= 0.0, reaches=True)
+
+
+def most_errors(claim: str, outcome: MethodResult, pairs: Sequence[Pair]) -> Finding:
+    """Check that a surface is taken for the other of these pairs more often than for that of the next most confused.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    pairs
+        Pairs of surfaces.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here.
+    """
+    own = sum((outcome.taken_for(*pair) for pair in pairs), start=np.zeros(1))
+    others = [pair for pair in outcome.pairs() if frozenset(pair) not in {frozenset(one) for one in pairs}]
+    rivals = sum((outcome.taken_for(*pair) for pair in others[: len(pairs)]), start=np.zeros(1))
+    lead = mean(own - rivals)
+    named = ' and '.join('/'.join(pair) for pair in others[: len(pairs)])
+    here = f'{_of_errors(own, outcome)} of all errors; next: {named} with {_of_errors(rivals, outcome)}'
+    return Finding(claim, here, lead, lead.above())
+
+
+def better_on(claim: str, outcome: MethodResult, surface: str) -> Finding:
+    """Check that one surface is recognised more often than the others together.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    surface
+        Label of the surface.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    here = outcome.codes == outcome.surfaces.index(surface)
+    gain = apart(outcome.right(here), outcome.right(~here))
+    reported = (
+        f'{100 * outcome.right(here).mean():.1f} % right, of the others {100 * outcome.right(~here).mean():.1f} %'
+    )
+    return Finding(claim, reported, gain, gain.above())
+
+
+def seldom(claim: str, outcome: MethodResult, pair: Pair, border: float) -> Finding:
+    """Check that two surfaces are taken for each other in fewer than a share of their slides.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    outcome
+        Result of the method.
+    pair
+        Two surfaces.
+    border
+        Share, 0 to 1.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    of_pair = np.isin(outcome.codes, [outcome.surfaces.index(name) for name in pair])
+    taken = share(outcome.taken_for(*pair, of=of_pair))
+    below = Interval(border - taken.value, border - taken.high, border - taken.low)
+    return Finding(
+        claim, f'{percent(taken)} of their slides, fewer than {100 * border:g} % needed', below, below.above()
+    )
+
+
+def more_spread(claim: str, first: MethodResult, second: MethodResult, alike: Sequence[Pair]) -> Finding:
+    """Check that by the first method more slides are taken for a surface that is not alike than by the second.
+
+    Parameters
+    ----------
+    claim
+        Sentence of the paper.
+    first, second
+        Results on the same slides.
+    alike
+        Pairs of surfaces that are alike.
+
+    Returns
+    -------
+    Finding
+        Whether it holds here, with an interval.
+    """
+    novel = [one.wrong() - sum((one.taken_for(*pair) for pair in alike), start=np.zeros(1)) for one in (first, second)]
+    more = mean(novel[0] - novel[1])
+    reported = ' against '.join(f'{100 * part.mean():.1f} %' for part in novel)
+    return Finding(claim, f'{reported} of the slides', more, more.above())
+
+
+def percent(part: Interval) -> str:
+    """Return a share with its interval."""
+    return f'{100 * part.value:.1f} % ({100 * part.low:.1f} to {100 * part.high:.1f})'
+
+
+def _of_errors(part: Array, outcome: MethodResult) -> str:
+    wrong = outcome.wrong().sum()
+    return f'{100 * part.sum() / wrong:.0f} %' if wrong else 'none'
+
+
+def accuracy_chart(
+    panels: Mapping[str, Mapping[str, tuple[float | None, Interval]]], title: str, path: str | Path
+) -> Path:
+    """Draw the share of test slides recognised by each method: the paper's as a cross, the simulated with its interval.
+
+    Parameters
+    ----------
+    panels
+        Task → method → the paper's share, if it tells, and the simulated one.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
+    heights = [len(methods) + 1 for methods in panels.values()]
+    with chart(path, (7.0, 1.2 + 0.3 * sum(heights)), title) as figure:
+        rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+        for axes, (task, methods) in zip(rows, panels.items(), strict=True):
+            _bars(axes, methods)
+            axes.set_title(task)
+        rows[-1].set_xlabel('test slides recognised (%)')
+        rows[0].legend(loc='lower left', bbox_to_anchor=(0.5, 1.0), ncols=2)
+    return Path(path)
+
+
+def confusions_chart(
+    tables: Mapping[str, tuple[Sequence[str], AnyArray, AnyArray]], title: str, path: str | Path
+) -> Path:
+    """Draw tables of confusion: the paper's on the left, the simulated on the right, in % of each row.
+
+    Parameters
+    ----------
+    tables
+        Method → surfaces, and two tables of shares with a last column for what is unclassified.
+    title
+        Above the chart.
+    path
+        File that is written.
+
+    Returns
+    -------
+    Path
+        Of the file.
+    """
+    side = 2.2 + 0.3 * max(len(surfaces) for surfaces, _, _ in tables.values())
+    with chart(path, (2.0 * side + 1.5, side * len(tables)), title) as figure:
+        rows = figure.subplots(len(tables), 2, squeeze=False)
+        for (left, right), (name, (surfaces, theirs, ours)) in zip(rows, tables.items(), strict=True):
+            _table(left, surfaces, theirs)
+            _table(right, surfaces, ours)
+            left.set_title(f'{name}: paper')
+            right.set_title(f'{name}: simulated')
+    return Path(path)
+
+
+def _bars(axes: Any, methods: Mapping[str, tuple[float | None, Interval]]) -> None:
+    at = np.arange(len(methods))
+    ours = [interval for _, interval in methods.values()]
+    values = 100 * np.array([interval.value for interval in ours])
+    reach = 100 * np.array([[i.value - i.low for i in ours], [i.high - i.value for i in ours]])
+    axes.errorbar(values, at, xerr=reach, fmt='o', markersize=4, color=COLOURS[0], label='simulated, 95 % interval')
+    reported = [
+        (100 * paper, place) for place, (paper, _) in zip(at, methods.values(), strict=True) if paper is not None
+    ]
+    axes.plot(*zip(*reported, strict=True), 'x', color=COLOURS[5], label='paper') if reported else None
+    axes.set_yticks(at, list(methods))
+    axes.set(ylim=(len(methods) - 0.4, -0.6))
+
+
+def _table(axes: Any, surfaces: Sequence[str], table: AnyArray) -> None:
+    percent = 100 * np.asarray(table)
+    axes.imshow(percent, cmap='Blues', vmin=0, vmax=100)
+    axes.grid(visible=False)
+    axes.set_xticks(range(percent.shape[1]), [*surfaces, 'unclassified'], rotation=90)
+    axes.set_yticks(range(len(surfaces)), surfaces)
+    axes.set(xlabel='taken for', ylabel='surface')
+    for row, column in np.argwhere(percent >= 0.5):
+        value = percent[row, column]
+        axes.text(column, row, f'{value:.0f}', ha='center', va='center', fontsize=7,
+                  color='white' if value > 60 else 'black')  # fmt: skip
+
+
+TUNED = '-tuned'
+SEARCHED = '; recipes that were searched for: the first alone, whose slides for training the search was given'
+
+
+def run(protocol: PaperProtocol, experiment: Experiment) -> ExperimentResult:
+    """Rebuild a paper's experiment on simulated surfaces."""
+    scene = load_scene(protocol.scene)
+    protocol = without_ours(protocol) if experiment.papers_only else protocol
+    tuned = searched(protocol, scene, experiment.seed, quick=experiment.quick) if experiment.tune else NONE
+    found = outcomes(protocol, scene, experiment.seed, quick=experiment.quick, tuned=tuned, splits=experiment.splits)
+    name = f'{protocol.name}{TUNED if tuned else ""}'
+    checked = protocol.findings(found)
+    slides = {task.name: _slides(found[task.name, task.methods[0].name]) for task in protocol.tasks}
+    return ExperimentResult(
+        name=name,
+        measured=f'slides recognised, as in {protocol.paper}; intervals of 95 % over slides',
+        data=(
+            f"simulated: scene '{scene.name}' ({scene.about}); "
+            f'slides a surface: {", ".join(f"{count} ({name})" for name, count in slides.items())}'
+        ),
+        split=f'{protocol.split}{SEARCHED if tuned else ""}',
+        numbers={
+            'seed': experiment.seed,
+            'recipes': {m.recipe: digest_of(m.recipe) for task in protocol.tasks for m in task.methods},
+            'difficulty': _difficulty(protocol, found),
+            'tasks': {
+                task.name: {
+                    m.name: figures_of(m, found[task.name, m.name], by_condition=protocol.by_condition)
+                    for m in task.methods
+                }
+                for task in protocol.tasks
+            },
+            'findings': [finding_as_json(finding) for finding in checked],
+            'tuning': {f'{recipe}, {task}': one.figures() for (task, recipe), one in tuned.items()},
+        },
+        charts=_charts(protocol, found, name, experiment.out),
+        lines=(*_lines(protocol, found, checked), *_tuning_lines(tuned, experiment.out)),
+    )  # fmt: skip
+
+
+def _slides(outcome: MethodResult) -> int:
+    return len(outcome.codes) // len(outcome.surfaces)
+
+
+def _difficulty(protocol: PaperProtocol, found: MethodResults) -> dict[str, Any]:
+    anchor = protocol.anchor
+    outcome = found.get((anchor.task, anchor.method)) if not anchor.experiment else None
+    parts = {
+        task: {'paper': test, 'here': found[task, anchor.method].test.as_json()} for task, test in anchor.parts.items()
+    }
+    return {
+        'set_by': f'{anchor.experiment or protocol.name}: {anchor.method}, {anchor.task}: {anchor.source}',
+        'paper': anchor.test,
+        'here': outcome and outcome.test.as_json(),
+        'setting': anchor.setting,
+        'shortfall': anchor.shortfall,
+        'parts': parts,
+    }
+
+
+def figures_of(method: Method, outcome: MethodResult, *, by_condition: bool = False) -> dict[str, Any]:
+    """Return the figures of one method as an experiment's JSON holds them.
+
+    Parameters
+    ----------
+    method
+        With the paper's figures.
+    outcome
+        What came out.
+    by_condition
+        Whether the share recognised is given for each condition of the test, too.
+
+    Returns
+    -------
+    dict
+    """
+    paper = {name: getattr(method.paper, name) for name in ('learning', 'test', 'unclassified')}
+    return {
+        'paper': {name: value for name, value in paper.items() if value is not None},
+        'learning': None if outcome.learning is None else round(outcome.learning, 4),
+        'test': outcome.test.as_json(),
+        'unclassified': round(outcome.unclassified, 4),
+        **(_by_condition(outcome) if by_condition else {}),
+        'note': outcome.note,
+        'train_s': round(outcome.train_s, 3),
+        'surfaces': list(outcome.surfaces),
+        'confusion_last_unclassified': np.round(outcome.confusion, 3).tolist(),
+    }
+
+
+def _by_condition(outcome: MethodResult) -> dict[str, Any]:
+    """Return the share recognised under each condition in which slides were tested."""
+    names = dict.fromkeys(outcome.conditions[outcome.tested].tolist())
+    return {
+        'conditions': {name: {'test': share(outcome.right(outcome.conditions == name)).as_json()} for name in names}
+    }
+
+
+def finding_as_json(finding: Finding) -> dict[str, Any]:
+    """Return a finding as an experiment's JSON holds it."""
+    return {
+        'claim': finding.claim,
+        'here': finding.here,
+        'interval': finding.interval.as_json(),
+        'verdict': VERDICTS[finding.holds],
+        'reaches': finding.reaches,
+    }
+
+
+def _charts(protocol: PaperProtocol, found: MethodResults, name: str, out: Path) -> tuple[Path, ...]:
+    stem = f'experiment_{name.replace("-", "_")}'
+    panels = {
+        task.name: {m.name: (m.paper.test, found[task.name, m.name].test) for m in task.methods}
+        for task in protocol.tasks
+    }
+    charts = [accuracy_chart(panels, f'{name}: slides recognised, paper and simulation', out / f'{stem}.png')]
+    several = len(protocol.tasks) > 1
+    tables = {
+        f'{method.name}, {task.name}' if several else method.name: (
+            outcome.surfaces,
+            shares_of(method.confusion),
+            outcome.confusion,
+        )
+        for task in protocol.tasks
+        for method in task.methods
+        for outcome in [found[task.name, method.name]]
+        if method.confusion is not None
+    }
+    if tables:
+        path = out / f'{stem}_confusion.png'
+        charts.append(confusions_chart(tables, f'{name}: confusion matrices, % of each surface', path))
+    return tuple(charts)
+
+
+def _lines(protocol: PaperProtocol, found: MethodResults, checked: Sequence[Finding]) -> Iterator[str]:
+    yield (
+        f'{"%":38}{"paper: learning":>16}{"test":>7}{"unclassified":>14}   '
+        f'{"simulated: learning":>20}{"test":>22}{"unclassified":>14}'
+    )
+    for task in protocol.tasks:
+        yield f'{task.name}:'
+        for method in task.methods:
+            yield _row(method, found[task.name, method.name])
+    anchor = protocol.anchor
+    where = f'{anchor.task} of {anchor.experiment}' if anchor.experiment else anchor.task
+    yield (
+        f'anchor, no finding: {anchor.setting}, set so that {anchor.method} ({where}) recognises '
+        f'{100 * anchor.test:.1f} % ({anchor.source}){f"; {anchor.shortfall}" if anchor.shortfall else ""}'
+    )
+    yield 'findings of the paper:'
+    for finding in checked:
+        interval = finding.interval.times(100.0)
+        yield f'  {VERDICTS[finding.holds]:14} {finding.claim}'
+        reported = f'{interval.value:+.1f} points ({interval.low:+.1f} to {interval.high:+.1f})'
+        yield f'  {"":14} here {finding.here}; decided by {reported}'
+    for task in protocol.tasks:
+        for method in task.methods:
+            if method.confusion is not None:
+                yield from _confusion_lines(task, method, found[task.name, method.name])
+
+
+def _tuning_lines(tuned: TunedRecipes, out: Path) -> Iterator[str]:
+    """Write the recipes that were searched for, and tell where they are and what they took."""
+    for (task, recipe), one in tuned.items():
+        path = one.write(out / f'{recipe}{TUNED}-{task.replace(" ", "-")}.yaml')
+        facts = one.figures()
+        yield (
+            f'searched: {path}: training {100 * facts["learning"]:.1f} %, test {100 * facts["test"]:.1f} % within the '
+            f'search; {facts["individuals_tried"]} individuals on {facts["scans"]} slides in {facts["seconds"]:.0f} s'
+        )
+
+
+def _row(method: Method, outcome: MethodResult) -> str:
+    paper = method.paper
+    return (
+        f'  {method.name:36}{_share(paper.learning):>16}{_share(paper.test):>7}{_share(paper.unclassified):>14}   '
+        f'{_share(outcome.learning):>20}{_plain(outcome):>22}{_share(outcome.unclassified):>14}'
+    )
+
+
+def _plain(outcome: MethodResult) -> str:
+    return percent(outcome.test).replace(' %', '')
+
+
+def _share(value: float | None) -> str:
+    return '–' if value is None else f'{100 * value:.1f}'
+
+
+def _confusion_lines(task: RecognitionTask, method: Method, outcome: MethodResult) -> Iterator[str]:
+    yield f'{method.name}, {task.name}: % of each surface taken for each, paper | simulated (last: none)'
+    width = max(map(len, outcome.surfaces))
+    for name, theirs, ours in zip(outcome.surfaces, shares_of(method.confusion), outcome.confusion, strict=True):
+        left, right = (' '.join(f'{100 * value:3.0f}' for value in row) for row in (theirs, ours))
+        yield f'  {name:{width}}  {left}  | {right}'
+
+
+def shares_of(table: Table | None) -> AnyArray:
+    """Return a paper's table as shares of each row, with a last column for what is unclassified.
+
+    Parameters
+    ----------
+    table
+        Counts or per cents as printed; None if the paper has none.
+
+    Returns
+    -------
+    (n_labels, n_labels + 1)
+        0 to 1.
+    """
+    counts = np.asarray(table, dtype=np.float64)
+    if counts.shape[1] == counts.shape[0]:
+        counts = np.column_stack((counts, np.zeros(len(counts))))
+    shares: AnyArray = counts / counts.sum(axis=1, keepdims=True)
+    return shares

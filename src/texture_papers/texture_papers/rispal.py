@@ -1,0 +1,459 @@
+"""Roughness by dynamic tactile sensing (Rispal et al.): three regressors of grades."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+from texture_core.parameters import param
+from texture_estimation.learners.learner import Codes
+from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.roughness.regressor import GRADES, ROUGH, SMOOTH
+from texture_estimation.search.cost import of_machines, of_networks
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.surrogates.regressor_surrogate import GradesOfHalf
+from texture_papers.roberge import (
+    LINEAR,
+    SIGMOID,
+    SURROGATE_CACHE_MB,
+    TOLERANCE,
+    TRANSFERS,
+    Network,
+    SurrogateNetworks,
+    fit_network,
+    kernel_of,
+    sample_rows,
+)
+
+
+def mean_of_votes(votes: NDArray[np.bool_]) -> Array:
+    """Return the mean of the grades that fired, (...,) of (..., 5); NaN where none did.
+
+    Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C, where 0 stands
+    for none.
+
+    Parameters
+    ----------
+    votes : (..., 5) bool
+        Whether each whole grade fired.
+
+    Returns
+    -------
+    (...)
+        Grades 1 to 5, or NaN.
+    """
+    count = votes.sum(axis=-1)
+    total = votes @ GRADES
+    mean: Array = np.divide(total, count, out=np.full(np.shape(total), np.nan), where=count > 0)
+    return mean
+
+
+def grade_membership(grades: Array) -> NDArray[np.bool_]:
+    """Return to which of the five whole grades each grade belongs, (n, 5).
+
+    Parameters
+    ----------
+    grades : (n,)
+        1 to 5.
+
+    Returns
+    -------
+    (n, 5) bool
+    """
+    member: NDArray[np.bool_] = np.rint(grades)[:, None] == GRADES
+    return member
+
+
+# One of so many windows of each texture tells when to stop: MATLAB holds out 15 %.
+HELD_OUT = 7
+
+
+@dataclass(frozen=True, eq=False)
+class RegressionNetworks:
+    """Hidden layers with one linear output each, over the same standardised features.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+    hidden : (n_networks · n_hidden, n_features)
+    hidden_bias : (n_networks · n_hidden,)
+    out : (n_networks, n_hidden)
+    out_bias : (n_networks,)
+    linear : ()
+        Whether the hidden layers are linear, not sigmoid.
+
+    Examples
+    --------
+    >>> zero, one = np.zeros(1), np.ones(1)
+    >>> networks = RegressionNetworks(zero, one, one[None], zero, one[None], zero)
+    >>> networks(np.array([[0.5]])).round(3).tolist()  # tanh(0.5)
+    [[0.462]]
+    """
+
+    mean: Array
+    scale: Array
+    hidden: Array
+    hidden_bias: Array
+    out: Array
+    out_bias: Array
+    linear: Array = field(default_factory=lambda: np.array(False))
+
+    def __call__(self, X: Array) -> Array:
+        """Return the outputs, (..., n_networks) of (..., n_features)."""
+        active = TRANSFERS[LINEAR if self.linear else SIGMOID](
+            (X - self.mean) / self.scale @ self.hidden.T + self.hidden_bias
+        )
+        by_network = active.reshape(*active.shape[:-1], *self.out.shape)
+        outputs: Array = (by_network * self.out).sum(axis=-1) + self.out_bias
+        return outputs
+
+
+def fit_networks(
+    values: Array, targets: Sequence[Array], groups: Codes, *, hidden: int, iterations: int, seed: int, transfer: str
+) -> Mapping[str, Any]:
+    """Return the fields of `RegressionNetworks`, one network for each target, (n,), of values (n, n_features).
+
+    Parameters
+    ----------
+    values : (n, n_features)
+        Features of windows.
+    targets : of each network (n,)
+        What it is to answer.
+    groups : (n,)
+        Number of the texture of each window; whole textures are held out to stop early.
+    hidden
+        Neurons of the hidden layer.
+    iterations
+        Largest number of steps.
+    seed
+        Seed of the first weights and of what is held out.
+    transfer
+        Name of the transfer function of the output.
+
+    Returns
+    -------
+    dict
+        Arrays by the names of the fields.
+    """
+    mean, scale = standardisation(values)
+    standard = (values - mean) / scale
+    rng = np.random.default_rng(seed)
+    held = _held_out(groups)
+    fitted = [
+        fit_network(Network.random(hidden, values.shape[1], rng, transfer), standard, target, held, iterations)
+        for target in targets
+    ]
+    return {
+        'mean': mean,
+        'scale': scale,
+        'hidden': np.concatenate([network.hidden for network in fitted]),
+        'hidden_bias': np.concatenate([network.hidden_bias for network in fitted]),
+        'out': np.stack([network.out for network in fitted]),
+        'out_bias': np.array([network.out_bias for network in fitted]),
+        'linear': np.array(transfer == LINEAR),
+    }
+
+
+def _held_out(textures: Codes) -> Any:
+    """Return every seventh window of each texture, (n,) bool."""
+    held = np.zeros(len(textures), dtype=bool)
+    for code in np.unique(textures):
+        held[np.flatnonzero(textures == code)[HELD_OUT - 1 :: HELD_OUT]] = True
+    return held
+
+
+# Examples of each texture that a network is trained on.
+EXAMPLES_OF_TEXTURE = 16
+
+
+def ann1_surrogate(regressor: Ann1, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
+    """Return a scorer of one half split by one network whose output is the grade."""
+    return _networks_surrogate(regressor, X, y[None], groups, lambda outputs: np.clip(outputs[:, 0], SMOOTH, ROUGH))
+
+
+def ann5_surrogate(regressor: Ann5, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
+    """Return a scorer of one half split by a network for each grade."""
+    wanted = grade_membership(y).T.astype(np.float64)
+    return _networks_surrogate(regressor, X, wanted, groups, lambda outputs: mean_of_votes(outputs >= VOTE_THRESHOLD))
+
+
+def _networks_surrogate(
+    regressor: Ann1 | Ann5, values: Array, targets: Array, groups: Codes, grade: Callable[[Array], Array]
+) -> GradesOfHalf:
+    mean, scale = standardisation(values)
+    standard = np.ascontiguousarray((values - mean) / scale)
+
+    def graded(training: Mask) -> Array:
+        rng = np.random.default_rng(regressor.seed)
+        rows = sample_rows(groups, training, EXAMPLES_OF_TEXTURE, rng).ravel()
+        networks = SurrogateNetworks.fitted(
+            standard[None, rows], targets[:, rows], regressor.hidden, rng, regressor.transfer
+        )
+        return grade(networks.outputs(standard))
+
+    return graded
+
+
+def svm5_surrogate(regressor: Svm5, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
+    """Return a scorer with one SVM per grade, standardised over all examples as in `svm_pairs`."""
+    from sklearn.svm import SVC  # noqa: PLC0415  # takes a second
+
+    kernel = kernel_of(X, regressor.kernel_scale)
+    members = grade_membership(y).T
+
+    def graded(training: Mask) -> Array:
+        rows = np.flatnonzero(training)
+        known = kernel.take(rows, axis=0)
+        among_known = known.take(rows, axis=1).astype(np.float64)
+        weights = np.zeros((len(rows), len(members)), dtype=np.float32)
+        # A grade that no texture has never fires.
+        offsets = np.full(len(members), -1.0, dtype=np.float32)
+        for number, member in enumerate(members[:, rows]):
+            if member.all():
+                offsets[number] = 1.0
+            elif member.any():
+                svc = SVC(C=regressor.c, kernel='precomputed', tol=TOLERANCE, cache_size=SURROGATE_CACHE_MB).fit(
+                    among_known, member
+                )
+                weights[svc.support_, number] = svc.dual_coef_[0]
+                offsets[number] = svc.intercept_[0]
+        return mean_of_votes(known.T @ weights + offsets > 0)
+
+    return graded
+
+
+@dataclass(frozen=True)
+class Ann1:
+    """A network with a hidden layer and one linear output, the grade.
+
+    The paper's text says that the hidden layer is linear, which leaves a linear model whatever its number of neurons;
+    `transfer` gives either.
+
+    Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
+    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
+    >>> predictor = Ann1.predictor(Ann1().fit(values, grades, textures))
+    >>> isinstance(predictor, NetworkRegressorPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    (True, True)
+    """
+
+    hidden: int = param(
+        10,
+        'Sets the number of neurons in the hidden layer; more neurons separate finer and cost computing time.',
+        low=1,
+        high=200,
+    )
+    iterations: int = param(
+        50, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
+    )
+    seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
+    transfer: str = param(
+        'sigmoid',
+        "Sets the transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
+        choices=tuple(TRANSFERS),
+    )
+
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,)."""
+        return fit_networks(X, [y], groups, **asdict(self))
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> NetworkRegressorPredictor:
+        """Return the predictor made from the stored parameters."""
+        return NetworkRegressorPredictor(RegressionNetworks(**parameters))
+
+    def surrogate(self, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
+        """Return what stands for the regressor in a search."""
+        return ann1_surrogate(self, X, y, groups)
+
+    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
+        """Return what a window costs."""
+        return of_networks(1.0, self.hidden, n_values)
+
+
+@dataclass(frozen=True, eq=False)
+class NetworkRegressorPredictor:
+    """The grade is the output, within 1 and 5."""
+
+    networks: RegressionNetworks
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        """Return grade and standard deviation, the latter not known."""
+        grade = np.clip(self.networks(X)[..., 0], SMOOTH, ROUGH)
+        return grade, np.zeros_like(grade)
+
+
+VOTE_THRESHOLD = 0.5  # the networks are trained 0 and 1, and their output is rounded
+
+
+@dataclass(frozen=True)
+class Ann5:
+    """A network for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
+
+    Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
+    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
+    >>> predictor = Ann5.predictor(Ann5().fit(values, grades, textures))
+    >>> isinstance(predictor, VotingNetworksPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    (True, True)
+    """
+
+    hidden: int = param(
+        10,
+        'Sets the number of neurons in the hidden layer of each network; more neurons fit finer and cost '
+        'computing time.',
+        low=1,
+        high=200,
+    )
+    iterations: int = param(
+        30, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
+    )
+    seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
+    transfer: str = param(
+        'sigmoid',
+        "Sets the transfer function of the hidden layer: 'sigmoid', or 'linear' as in the paper's text.",
+        choices=tuple(TRANSFERS),
+    )
+
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X` (n, n_features), grades `y` (n,) and numbers of the textures, `groups` (n,)."""
+        targets = grade_membership(y).T.astype(np.float64)
+        return fit_networks(X, list(targets), groups, **asdict(self))
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> VotingNetworksPredictor:
+        """Return the predictor made from the stored parameters."""
+        return VotingNetworksPredictor(RegressionNetworks(**parameters))
+
+    def surrogate(self, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
+        """Return what stands for the regressor in a search."""
+        return ann5_surrogate(self, X, y, groups)
+
+    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
+        """Return what a window costs."""
+        return of_networks(n_labels, self.hidden, n_values)
+
+
+@dataclass(frozen=True, eq=False)
+class VotingNetworksPredictor:
+    """The mean of the grades whose network fires."""
+
+    networks: RegressionNetworks
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        """Return grade and standard deviation, the latter not known."""
+        grade = mean_of_votes(self.networks(X) >= VOTE_THRESHOLD)
+        return grade, np.zeros_like(grade)
+
+
+@dataclass(frozen=True)
+class Svm5:
+    """An RBF machine for each grade that says yes or no; the grade is the mean of those that fire, none if none does.
+
+    Source: Rispal et al., "Texture roughness estimation using dynamic tactile sensing", section IV.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> grades, textures = np.repeat([1.0, 3.0, 5.0], 20), np.repeat(np.arange(3), 20)
+    >>> values = grades[:, None] + 0.1 * np.random.default_rng(0).standard_normal((60, 1))
+    >>> predictor = Svm5.predictor(Svm5().fit(values, grades, textures))
+    >>> isinstance(predictor, VotingSvmsPredictor), bool(np.nanmean(np.abs(predictor(values)[0] - grades)) < 0.5)
+    (True, True)
+    """
+
+    c: float = param(
+        10.0,
+        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        low=1e-6,
+        high=1e9,
+    )
+    kernel_scale: float = param(
+        3.0,
+        'Sets the width of the kernel exp(-(d / scale)²) over standardised features; a larger one smooths more.',
+        low=1e-9,
+        high=1e9,
+    )
+
+    def fit(self, X: Array, y: Array, groups: Codes) -> Mapping[str, Any]:
+        """Learn from features `X` (n, n_features) and grades `y` (n,)."""
+        from sklearn.svm import SVC  # noqa: PLC0415  # takes a second, and a node that only grades has no need of it
+
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        weights = np.zeros((len(X), len(GRADES)))
+        # A grade that no texture has never fires.
+        offsets = np.full(len(GRADES), -1.0)
+        for number, member in enumerate(grade_membership(y).T):
+            if member.all():
+                offsets[number] = 1.0
+            elif member.any():
+                svc = SVC(C=self.c, kernel='rbf', gamma=self.kernel_scale**-2.0).fit(standard, member)
+                weights[svc.support_, number] = svc.dual_coef_[0]
+                offsets[number] = svc.intercept_[0]
+        used = weights.any(axis=1)
+        return {
+            'mean': mean,
+            'scale': scale,
+            'vectors': standard[used],
+            'weights': weights[used],
+            'offsets': offsets,
+            'gamma': self.kernel_scale**-2.0,
+        }
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> VotingSvmsPredictor:
+        """Return the predictor made from the stored parameters."""
+        return VotingSvmsPredictor(**parameters)
+
+    def surrogate(self, X: Array, y: Array, groups: Codes) -> GradesOfHalf:
+        """Return what stands for the regressor in a search."""
+        return svm5_surrogate(self, X, y, groups)
+
+    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
+        """Return what a window costs."""
+        return of_machines(n_labels, n_values, n_training)
+
+
+@dataclass(frozen=True, eq=False)
+class VotingSvmsPredictor:
+    """The mean of the grades whose machine fires.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+    vectors : (n_vectors, n_features)
+        Support vectors of all machines.
+    weights : (n_vectors, 5)
+    offsets : (5,)
+    gamma
+        Of the kernel exp(-gamma d²).
+    """
+
+    mean: Array
+    scale: Array
+    vectors: Array
+    weights: Array
+    offsets: Array
+    gamma: float
+
+    def __call__(self, X: Array) -> tuple[Array, Array]:
+        """Return grade and standard deviation, the latter not known."""
+        standard = (X - self.mean) / self.scale
+        squares = (standard**2).sum(axis=-1)[..., None] + (self.vectors**2).sum(axis=1)
+        distances = squares - 2.0 * standard @ self.vectors.T
+        grade = mean_of_votes(np.exp(-self.gamma * distances) @ self.weights + self.offsets > 0.0)
+        return grade, np.zeros_like(grade)

@@ -1,0 +1,1592 @@
+"""Textures by tactile exploration (Roberge et al.): Fourier peaks; a network or a machine for each pair of textures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from texture_core.arrays import Array
+from texture_core.catalogue import unknown_name
+from texture_core.errors import InvalidParameter, ModelMismatch
+from texture_core.parameters import param
+from texture_core.plain_data import safe_repr
+from texture_estimation.learners.learner import Codes, Fitted, Learner
+from texture_estimation.learners.pair_coupling import uncalibrated
+from texture_estimation.learners.standardisation import standardisation
+from texture_estimation.learners.svm_predictor import SvmPredictor, export
+from texture_estimation.log_probabilities import log_softmax
+from texture_estimation.search.cost import of_machines, of_networks, of_transform
+from texture_estimation.search.halves import Mask
+from texture_estimation.search.surrogates.surrogate import ScoresOfHalf
+from texture_features.feature import WindowBatch, first_difference, power
+from texture_features.recipe_entry import choose, entry_of
+from texture_features.spectra.spectrum import amplitudes_of
+
+
+@dataclass(frozen=True)
+class SignalEnergy:
+    """Integral of the squared, zero-mean signal over the window, unit² s.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", eq. 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> SignalEnergy()(WindowBatch(np.array([[2.0], [-2.0]]), rate_hz=10.0)).item()  # 4 unit² for 0.2 s
+    0.8
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return ∫ s² dt."""
+        rows = windows.centred_rows
+        return (power(rows) * (rows.shape[-1] / windows.rate_hz))[..., None]
+
+    def operations(self, n: int) -> float:
+        """Return how many n samples cost."""
+        return 3.0 * n
+
+
+@dataclass(frozen=True)
+class ArcLength:
+    """Length of the line through the samples, with time in s and the signal in its unit.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", eq. 2.
+
+    Examples
+    --------
+    >>> still = WindowBatch(np.zeros((1001, 1)), rate_hz=1000.0)  # 1 s without any change
+    >>> round(ArcLength()(still).item(), 6)
+    1.0
+    """
+
+    per_channel: ClassVar[bool] = True
+    names: ClassVar[tuple[str, ...]] = ('',)
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return Σ √(Δt² + Δs²)."""
+        lengths: Array = np.add.reduce(np.hypot(first_difference(windows.rows), 1.0 / windows.rate_hz), axis=-1)
+        return lengths[..., None]
+
+    def operations(self, n: int) -> float:
+        """Return how many n samples cost."""
+        return 6.0 * n
+
+
+@dataclass(frozen=True)
+class SpectralPeaks:
+    """Frequency (Hz) and amplitude of the highest peaks of the Fourier transform.
+
+    With 2048 points there are 1024 steps from 0 Hz to half the sampling rate, as in the paper (500 Hz there). Peaks
+    that the spectrum lacks come last in either order; of equally high ones the lowest comes first.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.B.
+
+    Examples
+    --------
+    >>> time_s = np.arange(2048) / 1024.0
+    >>> tones = (np.sin(2 * np.pi * 50.0 * time_s) + 3 * np.sin(2 * np.pi * 200.0 * time_s))[:, None]
+    >>> SpectralPeaks(peaks=2)(WindowBatch(tones, rate_hz=1024.0))[0].round(3).tolist()
+    [200.0, 3.0, 50.0, 1.0]
+    """
+
+    per_channel: ClassVar[bool] = True
+
+    peaks: int = param(
+        5, 'Number of peaks; those that the spectrum lacks have frequency and amplitude 0.', low=1, high=64
+    )
+    gap_hz: float = param(
+        10.0,
+        'Sets the smallest distance between two peaks; a larger one suppresses side peaks.',
+        unit='Hz',
+        low=0.0,
+        high=1e6,
+    )
+    order: str = param('intensity', 'Order in which the peaks are returned.', choices=('intensity', 'frequency'))
+    points: int = param(2048, 'FFT length in samples; a shorter window is zero-padded.', low=8, high=1 << 20)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Frequency and amplitude of each peak."""
+        return tuple(f'{number + 1}/{what}' for number in range(self.peaks) for what in ('frequency_hz', 'amplitude'))
+
+    def __call__(self, windows: WindowBatch) -> Array:
+        """Return frequency and amplitude of each peak in turn."""
+        amplitudes, step_hz = amplitudes_of(windows, self.points)
+        bins, heights = highest_peaks(amplitudes, self.peaks, self.gap_hz / step_hz)
+        values = np.stack((bins * step_hz, heights), axis=-1)
+        if self.order == 'frequency':
+            values = by_frequency(values)
+        return values.reshape(*values.shape[:-2], -1)
+
+    def operations(self, n: int) -> float:
+        """Return how many n samples cost: transform, amplitudes, and twice through half the points for each peak."""
+        points = max(self.points, n)
+        return of_transform(points) + points * (2.0 + 2.0 * self.peaks)
+
+    def widest(self, most: int) -> SpectralPeaks:
+        """Return the feature whose values hold these; the highest peaks are chosen one after the other."""
+        return replace(self, peaks=max(most, self.peaks), order='intensity')
+
+    def of_widest(self, values: Array) -> Array:
+        """Return the values of this one of those of `widest`, (n, n_channels, n_peaks, 2)."""
+        peaks = values.reshape(*values.shape[:-1], -1, 2)[..., : self.peaks, :]
+        return by_frequency(peaks) if self.order == 'frequency' else peaks
+
+
+def by_frequency(peaks: Array) -> Array:
+    """Return peaks, the one of the lowest frequency first and those that are lacking last.
+
+    Parameters
+    ----------
+    peaks : (..., n_peaks, 2)
+        Frequency (Hz) and amplitude of each; amplitude 0 for a peak that is lacking.
+
+    Returns
+    -------
+    (..., n_peaks, 2)
+        The same in another order.
+    """
+    found = np.where(peaks[..., 1:] > 0, peaks[..., :1], np.inf)
+    ordered: Array = np.take_along_axis(peaks, np.argsort(found, axis=-2, kind='stable'), axis=-2)
+    return ordered
+
+
+def highest_peaks(spectrum: Array, count: int, gap: float) -> tuple[Array, Array]:
+    """Return bins and heights of the highest local maxima, highest first; 0 and 0 for those that are lacking.
+
+    Parameters
+    ----------
+    spectrum : (..., n_bins)
+        Not negative.
+    count
+        Number of peaks wanted.
+    gap
+        A maximum closer than so many bins to a higher one is left out.
+
+    Returns
+    -------
+    two arrays of shape (..., count)
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.B.
+    """
+    left = np.zeros_like(spectrum)
+    middle = spectrum[..., 1:-1]
+    is_peak = (middle > spectrum[..., :-2]) & (middle >= spectrum[..., 2:])
+    left[..., 1:-1] = np.where(is_peak, middle, 0.0)
+    bins, heights = np.zeros((2, *spectrum.shape[:-1], count))
+    index = np.arange(spectrum.shape[-1])
+    for number in range(count):
+        best = left.argmax(axis=-1)[..., None]
+        height = np.take_along_axis(left, best, axis=-1)
+        heights[..., number] = height[..., 0]
+        bins[..., number] = np.where(height > 0, best, 0)[..., 0]
+        left[np.abs(index - best) < max(gap, 1.0)] = 0.0
+    return bins, heights
+
+
+TIES = ('unclassified', 'nearest')
+
+
+@dataclass(frozen=True)
+class PairVotes:
+    """Counts what each label wins, in the pairs (0, 1), (0, 2), …, (1, 2), ….
+
+    Parameters
+    ----------
+    n_labels
+        At least 2.
+
+    Examples
+    --------
+    >>> votes = PairVotes(3)  # pairs (0, 1), (0, 2), (1, 2)
+    >>> votes.won(np.array([True, True, False])).tolist()
+    [2.0, 0.0, 1.0]
+    """
+
+    n_labels: int
+
+    @classmethod
+    def of_pairs(cls, n_pairs: int) -> PairVotes:
+        """Return what counts the votes of so many pairs, which are those of all labels.
+
+        Examples
+        --------
+        >>> PairVotes.of_pairs(6).n_labels
+        4
+        """
+        return cls(round((1.0 + (1.0 + 8.0 * n_pairs) ** 0.5) / 2.0))
+
+    def __post_init__(self) -> None:
+        pairs = np.array(list(combinations(range(self.n_labels), 2)))
+        first = np.eye(self.n_labels)[pairs[:, 0]]
+        second = np.eye(self.n_labels)[pairs[:, 1]]
+        object.__setattr__(self, '_second_wins_all', second.sum(axis=0))
+        object.__setattr__(self, '_swing', first - second)
+
+    def won(self, first_wins: NDArray[np.bool_]) -> Array:
+        """Return how many pairs each label wins, (..., n_labels), of who wins each pair, (..., n_pairs).
+
+        Whole numbers without rounding: labels that tie are equal to the last bit, which means unclassified.
+
+        Parameters
+        ----------
+        first_wins : (..., n_pairs) bool
+            Whether the first label of each pair wins.
+
+        Returns
+        -------
+        (..., n_labels)
+            Whole numbers, 0 to n_labels - 1.
+        """
+        wins: Array = first_wins @ self._swing + self._second_wins_all  # type: ignore[attr-defined]
+        return wins
+
+    def counted(self, decisions: Array | NDArray[np.float32], ties: str) -> Array:
+        """Return the pairs won, (..., n_labels), of decisions, (..., n_pairs); `ties` is one of TIES.
+
+        Parameters
+        ----------
+        decisions : (..., n_pairs)
+            Positive for the first label of a pair.
+        ties
+            'unclassified' leaves ties, 'nearest' breaks them by the clearer decisions.
+
+        Returns
+        -------
+        (..., n_labels)
+            Number of pairs won.
+        """
+        return self.won_clearly(decisions) if ties == 'nearest' else self.won(decisions > 0)
+
+    def won_clearly(self, decisions: Array | NDArray[np.float32]) -> Array:
+        """Return the pairs won, and less than half a pair more for the clearer decisions, which breaks ties.
+
+        Parameters
+        ----------
+        decisions : (..., n_pairs)
+            Positive for the first label of the pair.
+
+        Returns
+        -------
+        (..., n_labels)
+            Number of pairs won, and less than 0.5 more.
+
+        Source: scikit-learn's SVC with break_ties and decision_function_shape 'ovr'.
+        """
+        clearness = decisions @ self._swing  # type: ignore[attr-defined]
+        wins: Array = self.won(decisions > 0) + clearness / (3.0 * (np.abs(clearness) + 1.0))
+        return wins
+
+
+# As MATLAB's trainlm: damping at the start, its steps and its end, and failures on what is held out.
+FIRST_DAMPING, MORE, LESS, MAX_DAMPING = 1e-3, 10.0, 0.1, 1e10
+PATIENCE = 6
+SOLVED = 1e-7  # mean square error of targets of 0 and 1
+SIGMOID, LINEAR = 'sigmoid', 'linear'
+TRANSFERS: Mapping[str, Callable[[Array], Array]] = {SIGMOID: np.tanh, LINEAR: lambda given: given}
+SLOPES: Mapping[str, Callable[[Array], Array]] = {
+    SIGMOID: lambda active: 1.0 - active * active,
+    LINEAR: np.ones_like,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """One hidden layer and one linear output: out · f(hidden · x + hidden_bias) + out_bias.
+
+    Parameters
+    ----------
+    hidden : (n_hidden, n_features)
+    hidden_bias, out : (n_hidden,)
+    out_bias
+    transfer
+        Transfer function f of the hidden layer, one of TRANSFERS: 'sigmoid' is tanh, 'linear' leaves its input.
+
+    Examples
+    --------
+    >>> values = np.linspace(-2.0, 2.0, 40)[:, None]
+    >>> start = Network.random(3, 1, np.random.default_rng(0))
+    >>> trained = fit_network(start, values, np.tanh(2.0 * values[:, 0]), np.zeros(40, dtype=bool), 100)
+    >>> bool(np.abs(trained(values) - np.tanh(2.0 * values[:, 0])).max() < 0.01)
+    True
+    """
+
+    hidden: Array
+    hidden_bias: Array
+    out: Array
+    out_bias: float
+    transfer: str = SIGMOID
+
+    @classmethod
+    def random(cls, n_hidden: int, n_features: int, rng: np.random.Generator, transfer: str = SIGMOID) -> Network:
+        """Return a network before its training, for inputs of unit variance.
+
+        Parameters
+        ----------
+        n_hidden
+            Neurons of the hidden layer.
+        n_features
+            Number of inputs.
+        rng
+            Draws the weights.
+        transfer
+            Transfer function of the hidden layer, one of TRANSFERS.
+
+        Returns
+        -------
+        Network
+        """
+        hidden = rng.normal(size=(n_hidden, n_features)) / np.sqrt(n_features)
+        bias = rng.uniform(-1.0, 1.0, n_hidden)
+        return cls(hidden, bias, rng.normal(size=n_hidden) / np.sqrt(n_hidden), 0.5, transfer)
+
+    def active(self, X: Array) -> Array:
+        """Return what the hidden layer gives, (n, n_hidden) of (n, n_features).
+
+        Parameters
+        ----------
+        X : (n, n_features)
+            Standardised.
+
+        Returns
+        -------
+        (n, n_hidden)
+        """
+        return TRANSFERS[self.transfer](X @ self.hidden.T + self.hidden_bias)
+
+    def slope(self, active: Array) -> Array:
+        """Return the derivative of the transfer function where it gives `active`, (n, n_hidden).
+
+        Parameters
+        ----------
+        active : (n, n_hidden)
+            As `active` gives it.
+
+        Returns
+        -------
+        (n, n_hidden)
+        """
+        return SLOPES[self.transfer](active)
+
+    def __call__(self, X: Array) -> Array:
+        """Return the output, (n,) of (n, n_features)."""
+        output: Array = self.active(X) @ self.out + self.out_bias
+        return output
+
+    def jacobian(self, values: Array) -> tuple[Array, Array]:
+        """Return the output, (n,), and its derivative by each weight, (n, n_weights), in the order of `moved`.
+
+        Parameters
+        ----------
+        values : (n, n_features)
+            Standardised.
+
+        Returns
+        -------
+        (n,)
+            Output for each example.
+        (n, n_weights)
+            Derivative of each output by each weight.
+        """
+        active = self.active(values)
+        by_bias = self.slope(active) * self.out
+        by_hidden = by_bias[:, :, None] * values[:, None, :]
+        columns = (by_hidden.reshape(len(values), -1), by_bias, active, np.ones((len(values), 1)))
+        return active @ self.out + self.out_bias, np.concatenate(columns, axis=1)
+
+    def moved(self, step: Array) -> Network:
+        """Return the network with a step, (n_weights,), added to its weights.
+
+        Parameters
+        ----------
+        step : (n_weights,)
+            In the order of `jacobian`.
+        """
+        n_hidden = len(self.out)
+        hidden, bias, out, out_bias = np.split(step, np.cumsum([self.hidden.size, n_hidden, n_hidden]))
+        return Network(
+            self.hidden + hidden.reshape(self.hidden.shape),
+            self.hidden_bias + bias,
+            self.out + out,
+            self.out_bias + float(out_bias[0]),
+            self.transfer,
+        )
+
+
+def fit_network(network: Network, values: Array, targets: Array, held: NDArray[np.bool_], iterations: int) -> Network:
+    """Return the network after its training; of its states, the one with the least error on what is held out.
+
+    Parameters
+    ----------
+    network
+        Where to start.
+    values, targets : (n, n_features), (n,)
+        Examples.
+    held : (n,) bool
+        Examples held out, which tell when to stop; none to stop by `iterations` alone.
+    iterations
+        At most so many.
+
+    Returns
+    -------
+    Network
+        With the shape of `network`.
+
+    Source: Hagan & Menhaj 1994; early stopping as in MATLAB's trainlm.
+    """
+    training, wanted = values[~held], targets[~held]
+    held_rows = held if held.any() else ~held
+    best, best_error = network, _error(network, values[held_rows], targets[held_rows])
+    failures, damping = 0, FIRST_DAMPING
+    for _ in range(iterations):
+        stepped, damping = _step(network, training, wanted, damping)
+        if stepped is None:
+            break
+        network = stepped
+        error = _error(network, values[held_rows], targets[held_rows])
+        if error < best_error:
+            best, best_error, failures = network, error, 0
+        else:
+            failures += 1
+        if failures >= PATIENCE or error < SOLVED:
+            break
+    return best
+
+
+def _step(network: Network, values: Array, targets: Array, damping: float) -> tuple[Network | None, float]:
+    """Return the network after one step that lessens the error, and the next damping; None if there is no such step."""
+    n_weights = network.hidden.size + 2 * len(network.out) + 1
+    linear = _by_examples(network, values) if n_weights > len(values) else _by_weights(network, values)
+    residual = targets - linear.output
+    error = float(residual @ residual) / len(residual)
+    curvature = linear.curvature
+    slope = linear.slope(residual)
+    diagonal = np.diag_indices_from(curvature)
+    own = curvature[diagonal]
+    while damping <= MAX_DAMPING:
+        curvature[diagonal] = own + damping
+        solved: Array = np.asarray(np.linalg.solve(curvature, slope), dtype=np.float64)
+        stepped = network.moved(linear.step(solved))
+        if _error(stepped, values, targets) < error:
+            return stepped, max(damping * LESS, 1e-12)
+        damping *= MORE
+    return None, damping
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """A network near its weights: with Jacobian J and residual r, a step is (JᵀJ + μ)⁻¹ Jᵀr = Jᵀ(JJᵀ + μ)⁻¹ r."""
+
+    output: Array
+    curvature: Array
+    slope: Callable[[Array], Array]
+    step: Callable[[Array], Array]
+
+
+def _by_weights(network: Network, values: Array) -> _Linear:
+    """Return the first form, for fewer weights than examples."""
+    output, jacobian = network.jacobian(values)
+    return _Linear(output, jacobian.T @ jacobian, lambda residual: jacobian.T @ residual, lambda solved: solved)
+
+
+def _by_examples(network: Network, values: Array) -> _Linear:
+    """Return the second form, for fewer examples than weights; JJᵀ is made of its factors, without J."""
+    active = network.active(values)
+    by_bias = network.slope(active) * network.out
+    curvature = (by_bias @ by_bias.T) * (values @ values.T + 1.0) + active @ active.T + 1.0
+
+    def step(solved: Array) -> Array:
+        weighted = by_bias * solved[:, None]
+        parameters = ((weighted.T @ values).ravel(), weighted.sum(axis=0), solved @ active, solved.sum(keepdims=True))
+        return np.concatenate(parameters)
+
+    return _Linear(active @ network.out + network.out_bias, curvature, lambda residual: residual, step)
+
+
+def _error(network: Network, values: Array, targets: Array) -> float:
+    residual = targets - network(values)
+    return float(residual @ residual) / len(residual)
+
+
+STEPS = 10
+SURROGATE_FIRST_DAMPING, SURROGATE_MORE, SURROGATE_LESS = 1e-2, 10.0, 0.2
+
+
+@dataclass(eq=False)
+class SurrogateNetworks:
+    """Networks of one hidden layer and one output each, over the same features: out · f(hidden x + bias) + out_bias.
+
+    Parameters
+    ----------
+    hidden : (n_networks, n_features, n_hidden)
+    bias, out : (n_networks, 1, n_hidden)
+    out_bias : (n_networks, 1)
+    transfer
+        Transfer function f of the hidden layer, one of TRANSFERS.
+
+    Examples
+    --------
+    >>> values = np.linspace(-1.0, 1.0, 20)[None, :, None]
+    >>> networks = SurrogateNetworks.fitted(values, values[:, :, 0], n_hidden=3, rng=np.random.default_rng(0))
+    >>> bool(np.abs(networks.outputs(values[0])[:, 0] - values[0, :, 0]).max() < 0.2)
+    True
+    """
+
+    hidden: Array
+    bias: Array
+    out: Array
+    out_bias: Array
+    transfer: str = SIGMOID
+
+    @classmethod
+    def fitted(
+        cls, values: Array, targets: Array, n_hidden: int, rng: np.random.Generator, transfer: str = SIGMOID
+    ) -> SurrogateNetworks:
+        """Return networks after their training.
+
+        Parameters
+        ----------
+        values : (n_networks, n, n_features), or (1, n, n_features) if all train on the same examples
+        targets : (n_networks, n)
+        n_hidden
+            Neurons of the hidden layer.
+        rng
+            Draws the first weights.
+        transfer
+            Of the hidden layer.
+
+        Returns
+        -------
+        SurrogateNetworks
+            n_networks of them.
+        """
+        networks = cls.random(len(targets), values.shape[-1], n_hidden, rng)
+        networks.transfer = transfer
+        networks.train(values, targets, STEPS)
+        return networks
+
+    @classmethod
+    def random(cls, n_networks: int, n_features: int, n_hidden: int, rng: np.random.Generator) -> SurrogateNetworks:
+        """Return networks before their training, alike for all.
+
+        Parameters
+        ----------
+        n_networks
+            Number of networks.
+        n_features
+            Number of inputs.
+        n_hidden
+            Neurons of the hidden layer.
+        rng
+            Draws the weights.
+
+        Returns
+        -------
+        SurrogateNetworks
+        """
+        hidden = rng.normal(size=(1, n_features, n_hidden)) / np.sqrt(n_features)
+        bias = rng.uniform(-1.0, 1.0, (1, 1, n_hidden))
+        out = rng.normal(size=(1, 1, n_hidden)) / np.sqrt(n_hidden)
+        copies = (n_networks, 1, 1)
+        return cls(np.tile(hidden, copies), np.tile(bias, copies), np.tile(out, copies), np.full((n_networks, 1), 0.5))
+
+    def outputs(self, standard: Array) -> Array:
+        """Return the output of each network, (n, n_networks), of standardised values, (n, n_features).
+
+        Parameters
+        ----------
+        standard : (n, n_features)
+
+        Returns
+        -------
+        (n, n_networks)
+        """
+        n_networks, n_features, n_hidden = self.hidden.shape
+        active = standard @ self.hidden.transpose(1, 0, 2).reshape(n_features, -1)
+        active += self.bias.reshape(-1)
+        active = TRANSFERS[self.transfer](active)
+        active *= self.out.reshape(-1)
+        outputs: Array = np.add.reduce(active.reshape(len(standard), n_networks, n_hidden), axis=-1)
+        outputs += self.out_bias[:, 0]
+        return outputs
+
+    def train(self, values: Array, targets: Array, steps: int) -> None:
+        """Make Levenberg-Marquardt steps towards targets (n_networks, n) of values (n_networks or 1, n, n_features).
+
+        There are fewer examples than weights, mostly. So with the Jacobian J and the residual r, the step
+        (JᵀJ + μ)⁻¹ Jᵀ r is taken as Jᵀ (J Jᵀ + μ)⁻¹ r, where J Jᵀ is a sum of products of small matrices.
+
+        Parameters
+        ----------
+        values : (n_networks or 1, n, n_features)
+            Standardised examples of each network, or of all.
+        targets : (n_networks, n)
+            What each network is to answer.
+        steps
+            Number of steps.
+        """
+        n_networks, n = targets.shape
+        products = values @ values.swapaxes(-1, -2) + 1.0
+        damping = np.full((n_networks, 1, 1), SURROGATE_FIRST_DAMPING * n)
+        active, residual = self._forward(values, targets)
+        error = (residual * residual).sum(axis=1)
+        diagonal = np.arange(n)
+        for _ in range(steps):
+            slopes = SLOPES[self.transfer](active) * self.out
+            gram = slopes @ slopes.swapaxes(-1, -2)
+            gram *= products
+            gram += active @ active.swapaxes(-1, -2)
+            gram += 1.0
+            gram[:, diagonal, diagonal] += damping[..., 0]
+            dual = np.linalg.solve(gram, residual[..., None])
+            weighted = slopes * dual
+            moved = SurrogateNetworks(
+                self.hidden + values.swapaxes(-1, -2) @ weighted,
+                self.bias + weighted.sum(axis=1, keepdims=True),
+                self.out + dual.swapaxes(-1, -2) @ active,
+                self.out_bias + dual.sum(axis=1),
+                self.transfer,
+            )
+            new_active, new_residual = moved._forward(values, targets)
+            new_error = (new_residual * new_residual).sum(axis=1)
+            better = new_error < error
+            damping *= np.where(better, SURROGATE_LESS, SURROGATE_MORE)[:, None, None]
+            self._take(moved, better)
+            active = np.where(better[:, None, None], new_active, active)
+            residual = np.where(better[:, None], new_residual, residual)
+            error = np.where(better, new_error, error)
+
+    def _forward(self, values: Array, targets: Array) -> tuple[Array, Array]:
+        active = TRANSFERS[self.transfer](values @ self.hidden + self.bias)
+        return active, targets - (active * self.out).sum(axis=-1) - self.out_bias
+
+    def _take(self, other: SurrogateNetworks, which: Mask) -> None:
+        for name in ('hidden', 'bias', 'out', 'out_bias'):
+            getattr(self, name)[which] = getattr(other, name)[which]
+
+
+def sample_rows(y: Codes, training: Mask, most: int, rng: np.random.Generator) -> NDArray[np.intp]:
+    """Return the rows of `most` training examples of each label, of the rarest one all, (n_labels, count).
+
+    Parameters
+    ----------
+    y : (n,)
+        Number of the label of each example.
+    training : (n,) bool
+        Which examples may be drawn.
+    most
+        Largest number of rows of each label.
+    rng
+        Draws them.
+
+    Returns
+    -------
+    (n_labels, count)
+        Indices; as many of each label.
+    """
+    members = [np.flatnonzero(training & (y == label)) for label in np.unique(y)]
+    count = min(most, *map(len, members))
+    return np.array([rng.choice(of_label, count, replace=False) for of_label in members])
+
+
+# Examples that are used for training, of all labels: with many labels there are many networks, and time for few each.
+EXAMPLES = 200
+
+
+def ann_pairs_surrogate(learner: AnnPairs, X: Array, y: Codes, groups: Codes) -> ScoresOfHalf:
+    """Return a scorer of one half split by the pairs won.
+
+    Each network sees the examples of its pair, of 200 that are drawn from all labels, and makes ten steps of the
+    Levenberg-Marquardt method, without a part held out to stop early; `exact` does what the learner does. Both
+    accuracies are those of the whole half.
+    """
+    mean, scale = standardisation(X)
+    standard = np.ascontiguousarray((X - mean) / scale)
+    n_labels = int(y.max()) + 1
+    first, second = np.triu_indices(n_labels, k=1)
+    votes = PairVotes(n_labels)
+
+    def scores(training: Mask) -> Array:
+        rng = np.random.default_rng(learner.seed)
+        rows = sample_rows(y, training, EXAMPLES // n_labels, rng)
+        of_pairs = standard[np.concatenate([rows[first], rows[second]], axis=1)]
+        # 1 for the first label of a pair, 0 for the second
+        targets = np.tile(np.repeat([1.0, 0.0], rows.shape[1]), (len(first), 1))
+        networks = SurrogateNetworks.fitted(of_pairs, targets, learner.hidden, rng)
+        return votes.counted(networks.outputs(standard) - ROUNDED_UP, learner.ties)
+
+    return scores
+
+
+# A hundred times libsvm's: single decisions near the border differ, individuals rank alike, and a sixth of the time is
+# saved where it takes longest.
+TOLERANCE = 1e-1
+SURROGATE_CACHE_MB = 200
+# Rows of the kernel computed in one go: they should fit the processor's cache.
+ROWS = 64
+Kernel = NDArray[np.float32]
+
+
+def svm_pairs_surrogate(learner: SvmPairs, X: Array, y: Codes, groups: Codes) -> ScoresOfHalf:
+    """Return a scorer of one half split by the pairs won.
+
+    The kernel is computed once for all halves. So the features are standardised by all examples, not by the half
+    alone: their scale differs by about one per cent, and no label is used. `exact` does it without that.
+    """
+    kernel = kernel_of(X, learner.kernel_scale, standardise=learner.standardise)
+    votes = PairVotes(int(y.max()) + 1)
+
+    def scores(training: Mask) -> Array:
+        decisions = pair_decisions(kernel, y, training, learner.box_constraint)
+        return votes.counted(decisions, learner.ties)
+
+    return scores
+
+
+def kernel_of(values: Array, scale: float, *, standardise: bool = True) -> Kernel:
+    """Return exp(-|x - y|² / scale²) of all examples, (n, n) of (n, n_features).
+
+    In single precision, as libsvm's own cache holds it. With each example's square as two more columns, one product
+    of matrices gives -|x - y|² / 2.
+
+    Parameters
+    ----------
+    values : (n, n_features)
+        Features of all examples.
+    scale
+        Width of the kernel, above 0.
+    standardise
+        Whether the features are standardised first.
+
+    Returns
+    -------
+    (n, n) float32
+        0 to 1.
+    """
+    mean, deviation = standardisation(values)
+    standard = (values - mean) / deviation if standardise else values - mean
+    squares = -0.5 * (standard * standard).sum(axis=1, keepdims=True)
+    ones = np.ones_like(squares)
+    left = np.concatenate([standard, squares, ones], axis=1) * (2.0 * scale**-2)
+    right = np.concatenate([standard, ones, squares], axis=1).T
+    kernel = np.empty((len(values), len(values)), dtype=np.float32)
+    for start in range(0, len(values), ROWS):
+        rows = slice(start, start + ROWS)
+        np.exp(np.minimum(left[rows] @ right, 0.0).astype(np.float32), out=kernel[rows])
+    return kernel
+
+
+def pair_decisions(kernel: Kernel, y: Codes, training: Mask, box_constraint: float) -> NDArray[np.float32]:
+    """Return the decision value of each pair for every example, (n, n_pairs); positive for the pair's first label.
+
+    Parameters
+    ----------
+    kernel : (n, n)
+        As `kernel_of` gives it.
+    y : (n,)
+        Number of the label of each example.
+    training : (n,) bool
+        Which examples are trained on.
+    box_constraint
+        Penalty of a training error.
+
+    Returns
+    -------
+    (n, n_pairs) float32
+        Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+    """
+    # a second, which who only looks up names need not wait for
+    from sklearn import config_context  # noqa: PLC0415
+    from sklearn.svm import SVC  # noqa: PLC0415
+
+    rows = np.flatnonzero(training)
+    known = kernel.take(rows, axis=0)
+    svc = SVC(C=box_constraint, kernel='precomputed', tol=TOLERANCE, cache_size=SURROGATE_CACHE_MB)
+    with config_context(assume_finite=True, skip_parameter_validation=True):  # a tenth of the time
+        svc.fit(known.take(rows, axis=1).astype(np.float64), y[rows])
+    coefficients, intercepts = _pair_coefficients(svc)
+    # Zeros for what is no support vector: leaving rows of the kernel out would take longer.
+    every = np.zeros((len(rows), coefficients.shape[1]), dtype=np.float32)
+    every[svc.support_] = coefficients
+    decisions: NDArray[np.float32] = known.T @ every
+    decisions += intercepts.astype(np.float32)
+    return decisions
+
+
+def _pair_coefficients(svc: Any) -> tuple[Array, Array]:
+    """Return the coefficient of each support vector in each pair, (n_vectors, n_pairs), and the intercepts."""
+    counts = svc.n_support_
+    n_labels = len(counts)
+    # scikit-learn turns the sign round for two labels
+    sign = -1.0 if n_labels == 2 else 1.0
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    first, second = np.triu_indices(n_labels, k=1)
+    coefficients = np.zeros((int(ends[-1]), len(first)))
+    for pair, (one, other) in enumerate(zip(first.tolist(), second.tolist(), strict=True)):
+        coefficients[ends[one] : ends[one + 1], pair] = svc.dual_coef_[other - 1, ends[one] : ends[one + 1]]
+        coefficients[ends[other] : ends[other + 1], pair] = svc.dual_coef_[one, ends[other] : ends[other + 1]]
+    return sign * coefficients, sign * np.asarray(svc.intercept_)
+
+
+NOTE = 'not calibrated: the pairs won are counted'
+CACHE_MB = 500
+
+
+@dataclass(frozen=True)
+class SvmPairs:
+    """RBF machines for all pairs with one box constraint and kernel scale; most pairs won.
+
+    The kernel is exp(-|x - s|² / kernel_scale²), MATLAB's sense of the scale: gamma = 1 / kernel_scale².
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", sections III.C and IV.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = SvmPairs().fit(values, codes, groups)
+    >>> predictor = SvmPairs.predictor(fitted.parameters)
+    >>> isinstance(predictor, SvmPairsPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
+    """
+
+    box_constraint: float = param(
+        10.0,
+        'Sets the penalty of a training error (box constraint C); a larger one fits the training data more closely.',
+        low=1e-6,
+        high=1e9,
+    )
+    kernel_scale: float = param(
+        3.0,
+        "Sets the width of the RBF kernel (MATLAB's KernelScale); a larger one smooths the decision more.",
+        low=1e-9,
+        high=1e9,
+    )
+    standardise: bool = param(True, 'Whether the features are standardised to zero mean and unit variance first.')
+    ties: str = param(
+        'unclassified',
+        "How ties are broken: 'unclassified' returns no label, 'nearest' the one with larger margins.",
+        choices=TIES,
+    )
+
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
+        # Imported here: scikit-learn takes a second, and a node that only looks up names need not wait for it.
+        from sklearn.preprocessing import StandardScaler  # noqa: PLC0415
+        from sklearn.svm import SVC  # noqa: PLC0415
+
+        scaler = StandardScaler().fit(X)
+        if not self.standardise:
+            scaler.mean_, scaler.scale_ = np.zeros(X.shape[1]), np.ones(X.shape[1])
+        svc = SVC(C=self.box_constraint, kernel='rbf', gamma=self.kernel_scale**-2, cache_size=CACHE_MB)
+        parameters = {'scaler': scaler, 'svc': svc.fit(scaler.transform(X), y), 'ties': self.ties}
+        return Fitted(parameters, None, NOTE)
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> SvmPairsPredictor:
+        """Return the predictor made from the stored parameters."""
+        n_labels = len(parameters['svc'].n_support_)
+        svm = export(parameters['scaler'], parameters['svc'], uncalibrated(n_labels))
+        return SvmPairsPredictor(svm, PairVotes(n_labels), str(parameters['ties']))
+
+    def surrogate(self, X: Array, y: Codes, groups: Codes) -> ScoresOfHalf:
+        """Return what stands for the learner in a search."""
+        return svm_pairs_surrogate(self, X, y, groups)
+
+    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
+        """Return what a window costs: each example has a weight in n_labels - 1 pairs."""
+        return of_machines(n_labels - 1, n_values, n_training)
+
+
+@dataclass(frozen=True, eq=False)
+class SvmPairsPredictor:
+    """The machines of all pairs, evaluated together."""
+
+    svm: SvmPredictor
+    votes: PairVotes
+    ties: str
+
+    def __call__(self, X: Array) -> Array:
+        """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
+        return log_softmax(self.votes.counted(self.svm.decisions(X), self.ties))
+
+
+ROUNDED_UP = 0.5  # an output above it is 1, which is the first label of the pair
+# One of so many is held out of each network's training to stop it: MATLAB holds out 15 %.
+HELD_OUT = 7
+
+
+@dataclass(frozen=True)
+class AnnPairs:
+    """A network with a sigmoid hidden layer and a linear, rounded output for each pair; most pairs won.
+
+    Trained by the Levenberg-Marquardt method with early stopping on every seventh slide, as MATLAB does by default.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.C.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> fitted = AnnPairs().fit(values, codes, groups)
+    >>> predictor = AnnPairs.predictor(fitted.parameters)
+    >>> isinstance(predictor, PairNetworksPredictor), bool((predictor(values).argmax(axis=1) == codes).all())
+    (True, True)
+    """
+
+    hidden: int = param(
+        10,
+        'Sets the number of neurons in the hidden layer; more neurons separate finer and cost computing time.',
+        low=1,
+        high=200,
+    )
+    iterations: int = param(
+        30, 'Sets the largest number of training iterations; more take longer to train.', low=1, high=10_000
+    )
+    seed: int = param(0, 'Sets the seed of the initial weights; equal seeds give equal models.', low=0)
+    ties: str = param(
+        'unclassified',
+        "How ties are broken: 'unclassified' returns no label, 'nearest' the one with larger margins.",
+        choices=TIES,
+    )
+
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,)."""
+        mean, scale = standardisation(X)
+        standard = (X - mean) / scale
+        held = _held_out(y, groups)
+        rng = np.random.default_rng(self.seed)
+        n_labels = int(y.max()) + 1
+        networks = []
+        for first, second in combinations(range(n_labels), 2):
+            rows = np.flatnonzero((y == first) | (y == second))
+            start = Network.random(self.hidden, X.shape[1], rng)
+            targets = (y[rows] == first).astype(np.float64)
+            networks.append(fit_network(start, standard[rows], targets, held[rows], self.iterations))
+        parameters = {
+            'mean': mean,
+            'scale': scale,
+            'hidden': np.stack([network.hidden for network in networks]),
+            'hidden_bias': np.stack([network.hidden_bias for network in networks]),
+            'out': np.stack([network.out for network in networks]),
+            'out_bias': np.array([network.out_bias for network in networks]),
+            'ties': self.ties,
+        }
+        return Fitted(parameters, None, NOTE)
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> PairNetworksPredictor:
+        """Return the predictor made from the stored parameters."""
+        return PairNetworksPredictor(**parameters)
+
+    def surrogate(self, X: Array, y: Codes, groups: Codes) -> ScoresOfHalf:
+        """Return what stands for the learner in a search."""
+        return ann_pairs_surrogate(self, X, y, groups)
+
+    def operations(self, n_values: int, n_labels: int, n_training: int) -> float:
+        """Return what a window costs."""
+        return of_networks(n_labels * (n_labels - 1) / 2, self.hidden, n_values)
+
+
+@dataclass(frozen=True, eq=False)
+class PairNetworksPredictor:
+    """The networks of all pairs, evaluated together.
+
+    Parameters
+    ----------
+    mean, scale : (n_features,)
+        Of the standardisation.
+    hidden : (n_pairs, n_hidden, n_features)
+    hidden_bias, out : (n_pairs, n_hidden)
+    out_bias : (n_pairs,)
+    ties
+        One of TIES.
+    """
+
+    mean: Array
+    scale: Array
+    hidden: Array
+    hidden_bias: Array
+    out: Array
+    out_bias: Array
+    ties: str
+
+    def __post_init__(self) -> None:
+        n_pairs = len(self.out_bias)
+        weights = self.hidden.reshape(-1, len(self.mean)) / self.scale
+        object.__setattr__(self, '_weights', weights.T.copy())
+        object.__setattr__(self, '_votes', PairVotes.of_pairs(n_pairs))
+
+    def __call__(self, X: Array) -> Array:
+        """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
+        votes: PairVotes = self._votes  # type: ignore[attr-defined]
+        return log_softmax(votes.counted(self.outputs(X) - ROUNDED_UP, self.ties))
+
+    def outputs(self, values: Array) -> Array:
+        """Return the output of each pair's network, (..., n_pairs): about 1 for its first label, 0 for its second.
+
+        Parameters
+        ----------
+        values : (..., n_features)
+
+        Returns
+        -------
+        (..., n_pairs)
+            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+        """
+        active = (values - self.mean) @ self._weights  # type: ignore[attr-defined]
+        active += self.hidden_bias.reshape(-1)
+        np.tanh(active, out=active)
+        layers = active.reshape(*values.shape[:-1], *self.out.shape)
+        layers *= self.out
+        outputs: Array = np.add.reduce(layers, axis=-1)
+        return outputs + self.out_bias
+
+
+def _held_out(y: Codes, groups: Codes) -> NDArray[np.bool_]:
+    """Return which examples tell when to stop: every seventh slide of a label, or example if there are few slides."""
+    held = np.zeros(len(y), dtype=bool)
+    for code in np.unique(y):
+        rows = np.flatnonzero(y == code)
+        slides = np.unique(groups[rows], return_inverse=True)[1].reshape(-1)
+        number = slides if slides.max() + 1 >= HELD_OUT else np.arange(len(rows))
+        held[rows] = number % HELD_OUT == HELD_OUT - 1
+    return held
+
+
+MACHINES, NETWORKS = 'machines', 'networks'  # names of their parts in the model file
+# Number of the pair, the features it sees and the fitted parameters of its learner, trained on two labels.
+FittedPair = tuple[int, Codes, Mapping[str, Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class PairInputs:
+    """What each of several learners sees: features of its own; one with fewer is filled up with what adds nothing.
+
+    Parameters
+    ----------
+    pairs : (n,)
+        Number of the pair that each decides.
+    columns : (n, n_inputs)
+        Features that each sees; 0 where it has fewer.
+    mean, inverse_scale : (n, n_inputs)
+        Of the standardisation; an inverse scale of 0 takes a feature out.
+
+    Examples
+    --------
+    >>> inputs = PairInputs(np.array([0]), np.array([[1]]), np.array([[2.0]]), np.array([[0.5]]))
+    >>> inputs.standardised(np.array([9.0, 4.0])).tolist()  # (4 - 2) / 2, of the second feature alone
+    [[1.0]]
+    """
+
+    pairs: Codes
+    columns: Codes
+    mean: Array
+    inverse_scale: Array
+
+    def standardised(self, X: Array) -> Array:
+        """Return what each learner sees, (..., n, n_inputs) of (..., n_features).
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n, n_inputs)
+        """
+        seen: Array = (X[..., self.columns] - self.mean) * self.inverse_scale
+        return seen
+
+
+@dataclass(frozen=True, eq=False)
+class PairMachines(PairInputs):
+    """RBF machines, each with features of its own; smaller ones are filled up with what adds nothing.
+
+    Parameters
+    ----------
+    pairs, columns, mean, inverse_scale
+        As of `PairInputs`.
+    vectors : (n, n_vectors, n_inputs)
+        Standardised support vectors times 2 gamma.
+    squares, coefficients : (n, n_vectors)
+        Squared lengths of the vectors times gamma, and their coefficients; 0 where a machine has fewer.
+    intercepts, gamma : (n,)
+
+    Examples
+    --------
+    >>> one, vector = np.ones((1, 1)), np.array([[[4.0]]])  # a support vector at 2, of the second feature alone
+    >>> bank = PairMachines(np.array([0]), np.array([[1]]), 0 * one, one, vector, 4 * one, one, np.zeros(1), np.ones(1))
+    >>> bank.decisions(np.array([[9.0, 2.0], [9.0, 3.0]])).round(3)[:, 0].tolist()  # exp(-distance²)
+    [1.0, 0.368]
+    """
+
+    vectors: Array
+    squares: Array
+    coefficients: Array
+    intercepts: Array
+    gamma: Array
+
+    def decisions(self, X: Array) -> Array:
+        """Return the decision of each machine, (..., n) of (..., n_features); positive for its first label.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n)
+        """
+        standard = self.standardised(X)
+        squares = self.gamma * np.add.reduce(standard * standard, axis=-1)
+        exponents = _products(self.vectors, standard)
+        exponents -= self.squares
+        exponents -= squares[..., None]
+        np.exp(exponents, out=exponents)
+        exponents *= self.coefficients
+        decisions: Array = np.add.reduce(exponents, axis=-1)
+        return decisions + self.intercepts
+
+
+@dataclass(frozen=True, eq=False)
+class PairNetworks(PairInputs):
+    """Networks with a sigmoid hidden layer, each with features and neurons of its own; smaller ones are filled up.
+
+    Parameters
+    ----------
+    pairs, columns, mean, inverse_scale
+        As of `PairInputs`.
+    hidden : (n, n_hidden, n_inputs)
+    hidden_bias, out : (n, n_hidden)
+        0 where a network has fewer neurons.
+    out_bias : (n,)
+
+    Examples
+    --------
+    >>> one = np.ones((1, 1))  # one network with one neuron, of the second feature alone
+    >>> bank = PairNetworks(np.array([0]), np.array([[1]]), 0 * one, one, one[None], 0 * one, one, np.zeros(1))
+    >>> bank.decisions(np.array([[5.0, 0.0]])).tolist()  # tanh(0) - 0.5
+    [[-0.5]]
+    """
+
+    hidden: Array
+    hidden_bias: Array
+    out: Array
+    out_bias: Array
+
+    def decisions(self, X: Array) -> Array:
+        """Return the output of each network less what is rounded up, (..., n); positive for its first label.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n)
+        """
+        standard = self.standardised(X)
+        active = _products(self.hidden, standard)
+        active += self.hidden_bias
+        np.tanh(active, out=active)
+        active *= self.out
+        outputs: Array = np.add.reduce(active, axis=-1)
+        return outputs + self.out_bias - ROUNDED_UP
+
+
+@dataclass(frozen=True, eq=False)
+class TunedPairsPredictor:
+    """The machines and networks of all pairs, evaluated together.
+
+    Examples
+    --------
+    >>> bank = PairNetworks(np.array([0]), np.array([[1]]), np.zeros((1, 1)), np.ones((1, 1)), np.full((1, 1, 1), 9.0),
+    ...                     np.zeros((1, 1)), np.ones((1, 1)), np.zeros(1))
+    >>> predictor = TunedPairsPredictor((bank,), PairVotes(2), 'unclassified')
+    >>> predictor(np.array([[0.0, 1.0], [0.0, -1.0]])).argmax(axis=1).tolist()  # it sees the second feature alone
+    [0, 1]
+    """
+
+    banks: tuple[PairMachines | PairNetworks, ...]
+    votes: PairVotes
+    ties: str
+
+    @classmethod
+    def of(cls, parameters: Mapping[str, Any], n_pairs: int, votes: PairVotes) -> TunedPairsPredictor:
+        """Return the predictor of stored parameters.
+
+        Parameters
+        ----------
+        parameters
+            As the model file holds them.
+        n_pairs
+            Number of pairs.
+        votes
+            Counts the pairs won.
+
+        Returns
+        -------
+        TunedPairsPredictor
+            Ready to predict.
+
+        Raises
+        ------
+        ModelMismatch
+            If the pairs are not each decided once.
+        """
+        kinds: tuple[tuple[str, Any], ...] = ((MACHINES, PairMachines), (NETWORKS, PairNetworks))
+        banks = tuple(kind(**parameters[name]) for name, kind in kinds if name in parameters)
+        decided = sorted(np.concatenate([bank.pairs for bank in banks]).tolist()) if banks else []
+        if decided != list(range(n_pairs)):
+            raise ModelMismatch(f'its {n_pairs} pairs are decided by {len(decided)} learners, or some not once')
+        return cls(banks, votes, str(parameters['ties']))
+
+    def __call__(self, X: Array) -> Array:
+        """Return log softmax of the number of pairs won, (..., n_labels) of (..., n_features)."""
+        return log_softmax(self.votes.counted(self.decisions(X), self.ties))
+
+    def decisions(self, X: Array) -> Array:
+        """Return the decision of each pair, (..., n_pairs); positive for its first label.
+
+        Parameters
+        ----------
+        X : (..., n_features)
+
+        Returns
+        -------
+        (..., n_pairs)
+            Pairs in the order (0, 1), (0, 2), …, (1, 2), ….
+        """
+        decisions = np.empty((*X.shape[:-1], sum(len(bank.pairs) for bank in self.banks)))
+        for bank in self.banks:
+            decisions[..., bank.pairs] = bank.decisions(X)
+        return decisions
+
+
+def machines(members: Sequence[FittedPair]) -> dict[str, Array | Codes]:
+    """Return the arrays of `PairMachines` of machines fitted to two labels each.
+
+    Parameters
+    ----------
+    members
+        Number, features and parameters of `SvmPairs` of each.
+
+    Returns
+    -------
+    dict
+        Arrays by the names of the fields.
+    """
+    svms = [SvmPairs.predictor(parameters).svm for _, _, parameters in members]
+    common = _common(members, [svm.mean for svm in svms], [svm.scale for svm in svms])
+    return {
+        **common,
+        'vectors': _filled([svm.vectors for svm in svms]),
+        'squares': _filled([svm.squares for svm in svms]),
+        'coefficients': _filled([svm.coefficients.reshape(-1) for svm in svms]),
+        'intercepts': np.array([svm.intercepts[0] for svm in svms]),
+        'gamma': np.array([svm.gamma for svm in svms]),
+    }
+
+
+def networks(members: Sequence[FittedPair]) -> dict[str, Array | Codes]:
+    """Return the arrays of `PairNetworks` of networks fitted to two labels each.
+
+    Parameters
+    ----------
+    members
+        Number, features and parameters of `AnnPairs` of each.
+
+    Returns
+    -------
+    dict
+        Arrays by the names of the fields.
+    """
+    fitted = [parameters for _, _, parameters in members]
+    common = _common(members, [one['mean'] for one in fitted], [one['scale'] for one in fitted])
+    weights = {name: _filled([one[name][0] for one in fitted]) for name in ('hidden', 'hidden_bias', 'out')}
+    return {**common, **weights, 'out_bias': np.array([one['out_bias'][0] for one in fitted])}
+
+
+def _common(members: Sequence[FittedPair], means: Sequence[Array], scales: Sequence[Array]) -> dict[str, Any]:
+    return {
+        'pairs': np.array([number for number, _, _ in members], dtype=np.intp),
+        'columns': _filled([columns for _, columns, _ in members]).astype(np.intp),
+        'mean': _filled(means),
+        'inverse_scale': _filled([1.0 / scale for scale in scales]),
+    }
+
+
+def _filled(arrays: Sequence[Array | NDArray[np.intp]]) -> Array:
+    """Return arrays as one, smaller ones filled up with zeros."""
+    shape = np.max([array.shape for array in arrays], axis=0)
+    filled = np.zeros((len(arrays), *shape))
+    for place, array in zip(filled, arrays, strict=True):
+        place[tuple(slice(length) for length in array.shape)] = array
+    return filled
+
+
+def _products(weights: Array, values: Array) -> Array:
+    """Return the products of each learner's weights, (n, m, k), with its values, (..., n, k): (..., n, m)."""
+    if values.ndim == 2:
+        alone: Array = (weights @ values[..., None])[..., 0]
+        return alone
+    rows = values.reshape(-1, *values.shape[-2:])
+    of_many: Array = (rows.swapaxes(0, 1) @ weights.swapaxes(1, 2)).swapaxes(0, 1)
+    return np.ascontiguousarray(of_many).reshape(*values.shape[:-1], weights.shape[1])
+
+
+TUNED_NOTE = 'not calibrated: the pairs won are counted; {} of {} pairs have variables of their own'
+KEYS = ('learner', 'pairs', 'ties')
+PAIR_KEYS = ('pair', 'inputs', 'learner')
+# What decides a pair, and how a bank of fitted ones is stored.
+OF_PAIRS: Mapping[str, type[Learner]] = {
+    'texture_papers.roberge:SvmPairs': SvmPairs,
+    'texture_papers.roberge:AnnPairs': AnnPairs,
+}
+BANKS = {
+    'texture_papers.roberge:SvmPairs': (MACHINES, machines),
+    'texture_papers.roberge:AnnPairs': (NETWORKS, networks),
+}
+
+
+@dataclass(frozen=True)
+class TunedPair:
+    """The variables of one pair of textures.
+
+    Parameters
+    ----------
+    labels
+        The two textures, in any order.
+    inputs
+        Inputs of the recipe whose features it sees, such as 'signal#2'; () for all.
+    learner_name, learner
+        What decides, of OF_PAIRS.
+
+    Examples
+    --------
+    >>> TunedPair(('felt', 'cork'), ('signal#2',), 'texture_papers.roberge:SvmPairs', SvmPairs()).as_recipe()['pair']
+    ['felt', 'cork']
+    """
+
+    labels: tuple[str, str]
+    inputs: tuple[str, ...]
+    learner_name: str
+    learner: Learner
+
+    @classmethod
+    def from_recipe(cls, entry: Any, where: str) -> TunedPair:
+        """Build from one entry of the list `pairs` of a recipe.
+
+        Parameters
+        ----------
+        entry
+            Mapping with `pair`, `learner` and, if not all inputs are used, `inputs`.
+        where
+            Where it stands, for the sentence of an error.
+
+        Raises
+        ------
+        InvalidParameter, UnknownName
+            If it is no such mapping, or names no learner of pairs.
+        """
+        if not isinstance(entry, Mapping):
+            raise InvalidParameter(f'{where}: came {safe_repr(entry)}; a mapping with pair and learner is needed')
+        for key in entry:
+            if key not in PAIR_KEYS:
+                raise InvalidParameter(f'{where}: {unknown_name(str(key), PAIR_KEYS, "key")}')
+        labels, inputs = _texts(entry.get('pair'), 'pair', where), _texts(entry.get('inputs') or [], 'inputs', where)
+        if len(labels) != 2 or labels[0] == labels[1]:
+            raise InvalidParameter(f'{where}: pair is {list(labels)}; the labels of two textures are needed')
+        learner = choose(OF_PAIRS, entry.get('learner', 'texture_papers.roberge:SvmPairs'), 'learner of pairs', where)
+        return cls((labels[0], labels[1]), inputs, *learner)
+
+    def as_recipe(self) -> dict[str, Any]:
+        """Return the entry of a recipe."""
+        of_all: dict[str, Any] = {'inputs': list(self.inputs)} if self.inputs else {}
+        return {'pair': list(self.labels), **of_all, 'learner': {self.learner_name: entry_of(self.learner)}}
+
+
+@dataclass(frozen=True)
+class TunedPairs:
+    """A machine or network for each pair of textures, each with its own features and parameters; most pairs won.
+
+    The inputs of the recipe hold the features of all pairs; each pair is trained on, and sees, those of its own inputs.
+    A pair that is not listed has all features and the common learner.
+
+    Source: Roberge et al., "Textures recognition through tactile exploration", section III.C: the learning is adapted
+    to each pair of textures.
+
+    Parameters
+    ----------
+    learner_name, learner
+        What decides the pairs that are not listed.
+    pairs
+        Variables of single pairs.
+    ties
+        One of TIES: 'unclassified' returns no label, 'nearest' the one with larger margins.
+    names, labels
+        Of the features and the textures of the training; `of_examples` sets them.
+
+    Examples
+    --------
+    In a recipe::
+
+        inputs:
+          signal: {features: [{spectral_peaks: {peaks: 3}}]}
+          signal#2: {features: [{spectral_peaks: {peaks: 9}}, arc_length]}
+        learner:
+          tuned_pairs:
+            learner: {svm_pairs: {kernel_scale: 4.0}}
+            pairs:
+              - {pair: [cork, felt], inputs: [signal#2], learner: {svm_pairs: {kernel_scale: 7.0}}}
+
+    >>> codes, groups = np.repeat([0, 1], 20), np.repeat(np.arange(8), 5)
+    >>> values = codes[:, None] + 0.1 * np.random.default_rng(0).standard_normal((40, 3))
+    >>> pairs = [{'pair': ['cork', 'felt'], 'inputs': ['signal#2'], 'learner': 'texture_papers.roberge:AnnPairs'}]
+    >>> learner = TunedPairs.from_recipe({'pairs': pairs}, 'recipe')
+    >>> learner = learner.of_examples(['signal#1/a', 'signal#2/a', 'signal#2/b'], ['cork', 'felt'])
+    >>> predictor = learner.predictor(learner.fit(values, codes, groups).parameters)
+    >>> bool((predictor(values).argmax(axis=1) == codes).all())
+    True
+    """
+
+    learner_name: str = 'texture_papers.roberge:SvmPairs'
+    learner: Learner = field(default_factory=SvmPairs)
+    pairs: tuple[TunedPair, ...] = ()
+    ties: str = TIES[0]
+    names: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.ties not in TIES:
+            raise InvalidParameter(f"ties is '{self.ties}'; allowed is {' or '.join(TIES)}")
+        listed = [frozenset(pair.labels) for pair in self.pairs]
+        for labels in listed:
+            if listed.count(labels) > 1:
+                raise InvalidParameter(f'the pair {sorted(labels)} is listed twice; list it once')
+
+    @classmethod
+    def from_recipe(cls, values: Mapping[str, Any], where: str) -> TunedPairs:
+        """Build from the section of a recipe.
+
+        Parameters
+        ----------
+        values
+            The section: `learner`, `pairs`, `ties`.
+        where
+            Where it stands, for the sentence of an error.
+
+        Raises
+        ------
+        InvalidParameter, UnknownName
+            If a key, a label or a learner is wrong.
+        """
+        if not isinstance(values, Mapping) or not isinstance(values.get('pairs') or [], list):
+            raise InvalidParameter(f'{where}: came {safe_repr(values)}; a mapping with a list of pairs is needed')
+        for key in values:
+            if key not in KEYS:
+                raise InvalidParameter(f'{where}: {unknown_name(str(key), KEYS, "key")}')
+        learner = choose(OF_PAIRS, values.get('learner', 'texture_papers.roberge:SvmPairs'), 'learner of pairs', where)
+        entries = enumerate(values.get('pairs') or [], 1)
+        pairs = tuple(TunedPair.from_recipe(entry, f'{where}, pair {number}') for number, entry in entries)
+        try:
+            return cls(*learner, pairs, str(values.get('ties', TIES[0])))
+        except InvalidParameter as error:
+            raise InvalidParameter(f'{where}: {error}') from error
+
+    def as_recipe(self) -> dict[str, Any]:
+        """Return the section of a recipe."""
+        return {
+            'learner': {self.learner_name: entry_of(self.learner)},
+            'pairs': [pair.as_recipe() for pair in self.pairs],
+            'ties': self.ties,
+        }
+
+    def of_examples(self, names: Sequence[str], labels: Sequence[str]) -> TunedPairs:
+        """Return the learner for examples with these features and textures.
+
+        Parameters
+        ----------
+        names : (n_features,)
+            Of the features, each beginning with its input.
+        labels : (n_labels,)
+            Of the textures, in the order of their numbers.
+
+        Raises
+        ------
+        InvalidParameter
+            If a pair sees an input that the examples lack.
+        """
+        bound = replace(self, names=tuple(names), labels=tuple(labels))
+        for pair in self.pairs:
+            bound._columns(pair)
+        return bound
+
+    def fit(self, X: Array, y: Codes, groups: Codes) -> Fitted:
+        """Learn from features `X` (n, n_features), label numbers `y` 0… (n,) and slides `groups` (n,).
+
+        Raises
+        ------
+        InvalidParameter
+            If pairs have variables of their own, and nothing has told the names of features and textures.
+        """
+        if self.pairs and (len(self.names), len(self.labels)) != (X.shape[1], int(y.max()) + 1):
+            raise InvalidParameter(
+                'the pairs of the recipe have variables of their own, and the names of the features and textures are '
+                "not known; train with `texture train`, or call the learner's `of_examples` first"
+            )
+        tuned = {frozenset(pair.labels): pair for pair in self.pairs}
+        common = TunedPair(('', ' '), (), self.learner_name, self.learner)
+        banks: dict[str, list[tuple[int, Codes, Mapping[str, Any]]]] = {name: [] for name in OF_PAIRS}
+        n_tuned, pairs = 0, list(combinations(range(int(y.max()) + 1), 2))
+        for number, (first, second) in enumerate(pairs):
+            labels = frozenset(self.labels[code] for code in (first, second)) if self.pairs else frozenset()
+            settings = tuned.get(labels, common)
+            n_tuned += settings is not common
+            columns = self._columns(settings) if settings.inputs else np.arange(X.shape[1])
+            rows = np.flatnonzero((y == first) | (y == second))
+            codes = (y[rows] == second).astype(np.intp)
+            fitted = settings.learner.fit(X[np.ix_(rows, columns)], codes, groups[rows])
+            banks[settings.learner_name].append((number, columns, fitted.parameters))
+        parameters: dict[str, Any] = {'n_pairs': len(pairs), 'ties': self.ties}
+        for name, members in banks.items():
+            key, stack = BANKS[name]
+            if members:
+                parameters[key] = stack(members)
+        return Fitted(parameters, None, TUNED_NOTE.format(n_tuned, len(pairs)))
+
+    @staticmethod
+    def predictor(parameters: Mapping[str, Any]) -> TunedPairsPredictor:
+        """Return the predictor made from the stored parameters."""
+        n_pairs = int(parameters['n_pairs'])
+        return TunedPairsPredictor.of(parameters, n_pairs, PairVotes.of_pairs(n_pairs))
+
+    def _columns(self, pair: TunedPair) -> Codes:
+        """Return the numbers of the features that a pair sees."""
+        own = tuple(f'{topic}/' for topic in pair.inputs)
+        columns = np.flatnonzero([name.startswith(own) for name in self.names]) if own else np.arange(len(self.names))
+        for topic in own:
+            if not any(name.startswith(topic) for name in self.names):
+                known = ', '.join(dict.fromkeys(name.split('/')[0] for name in self.names))
+                raise InvalidParameter(
+                    f"pair {list(pair.labels)} sees the input '{topic[:-1]}', which is not among the inputs of the "
+                    f'recipe ({known}); name one of them'
+                )
+        return columns
+
+
+def _texts(values: Any, what: str, where: str) -> tuple[str, ...]:
+    if not isinstance(values, list | tuple) or not all(isinstance(value, str) for value in values):
+        raise InvalidParameter(f'{where}: {what} is {safe_repr(values)}; a list of names is needed')
+    return tuple(values)
